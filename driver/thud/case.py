@@ -1,0 +1,266 @@
+"""Input of a run: dataclasses that mirror the namelist groups, read and written with f90nml."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import f90nml
+import numpy as np
+
+from thud._library import call, door, text
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from typing import Self
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A hollow ball; the default is the rubber ball of Schoenwald and Zeitler (2011).
+
+    Attributes
+    ----------
+    outer_radius : float
+        Outer radius R, m.
+    wall_thickness : float
+        Wall thickness h, m.
+    mass : float
+        Mass M, kg.
+    youngs_modulus : float
+        Modulus of elasticity E, Pa.
+    poisson_ratio : float
+        Poisson's ratio.
+    gauge_pressure : float
+        Overpressure of the gas in the undeformed ball, Pa; 0 for a ball with a hole.
+    ambient_pressure : float
+        Pressure of the air around the ball, Pa.
+    heat_capacity_ratio : float
+        Ratio of specific heats of the enclosed gas.
+    """
+
+    outer_radius: float = 0.089
+    wall_thickness: float = 0.032
+    mass: float = 2.5
+    youngs_modulus: float = 1.6e6
+    poisson_ratio: float = 0.5
+    gauge_pressure: float = 0.0
+    ambient_pressure: float = 101325.0
+    heat_capacity_ratio: float = 1.4
+
+
+@dataclass(frozen=True)
+class Drop:
+    """A free fall onto the floor; the default is the standards' drop.
+
+    Attributes
+    ----------
+    height : float
+        Height of the ball's lowest point over the floor, m.
+    gravity : float
+        Acceleration of free fall, m/s2.
+    """
+
+    height: float = 1.0
+    gravity: float = 9.81
+
+
+@dataclass(frozen=True)
+class Model:
+    """The source model.
+
+    Attributes
+    ----------
+    name : str
+        ``"hollow_sphere"``, the analytical model of the paper.
+    momentum_flux : str
+        ``"momentum_balance"``, ``"retarding"``, ``"conservative"`` or ``"none"``.
+    """
+
+    name: str = "hollow_sphere"
+    momentum_flux: str = "momentum_balance"
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Sampling of the force.
+
+    Attributes
+    ----------
+    sample_rate : float
+        Samples per second, Hz.
+    duration : float
+        Length of the record from first touch, s.
+    substeps : int
+        Integration steps per sampling interval.
+    """
+
+    sample_rate: float = 44100.0
+    duration: float = 0.05
+    substeps: int = 1
+
+
+@dataclass(frozen=True)
+class Levels:
+    """How levels are computed and which force is judged.
+
+    Attributes
+    ----------
+    method : str
+        ``"exact"`` (band energy of the record) or ``"fft"`` (1 Hz bins of a 1 s record).
+    bands : str
+        ``"octave"``, ``"third"`` or ``"both"``: the bands of ``levels.csv``.
+    force : str
+        ``"elastic"`` or ``"floor"``.
+    """
+
+    method: str = "exact"
+    bands: str = "octave"
+    force: str = "elastic"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The standards' limits that apply.
+
+    Attributes
+    ----------
+    source : str
+        ``"rubber_ball"`` or ``"tyre"``.
+    """
+
+    source: str = "rubber_ball"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Everything that one run needs, one attribute per namelist group.
+
+    Attributes
+    ----------
+    name : str
+        Name of the case, also of its output directory.
+    ball, drop, model, sampling, levels, limits
+        The namelist groups.
+    """
+
+    name: str = "python"
+    ball: Ball = field(default_factory=Ball)
+    drop: Drop = field(default_factory=Drop)
+    model: Model = field(default_factory=Model)
+    sampling: Sampling = field(default_factory=Sampling)
+    levels: Levels = field(default_factory=Levels)
+    limits: Limits = field(default_factory=Limits)
+
+    def to_namelist(self) -> f90nml.Namelist:
+        """Return the case as a namelist with every key.
+
+        Raises
+        ------
+        InputError
+            Where a value is neither a number nor text.
+        """
+        namelist = f90nml.Namelist({"case": {"name": self.name}})
+        for group in _GROUPS:
+            values = vars(getattr(self, group))
+            namelist[group] = {key: _plain(group, key, value) for key, value in values.items()}
+        return namelist
+
+    @classmethod
+    def from_namelist(cls, namelist: f90nml.Namelist) -> Self:
+        """Return the case of a namelist; keys that it lacks have their default value."""
+        groups = {
+            group: kind(**namelist[group]) for group, kind in _GROUPS.items() if group in namelist
+        }
+        return cls(name=namelist.get("case", {}).get("name", cls.name), **groups)
+
+
+_GROUPS: dict[str, type[Any]] = {
+    "ball": Ball,
+    "drop": Drop,
+    "model": Model,
+    "sampling": Sampling,
+    "levels": Levels,
+    "limits": Limits,
+}
+
+
+def _plain(group: str, key: str, value: object) -> float | str:
+    """Return a value as f90nml knows it."""
+    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
+        value = value.item()
+    if not isinstance(value, int | float | str):
+        message = f"&{group}: {key} = {value!r} is not allowed; allowed: a number or text"
+        raise InputError(message)
+    return value
+
+
+def case_text(case: Case) -> bytes:
+    """Return the text of the namelist file of a case, for the library."""
+    return f"{case.to_namelist()}\n".encode(errors="surrogateescape")
+
+
+def read_case(path: str | os.PathLike[str]) -> Case:
+    """Read a case from a namelist file.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    Case
+        The case with every key.
+
+    Raises
+    ------
+    InputError
+        Names file, group, key, value and allowed range.
+    """
+    (effective,) = call(door.effective_case, os.fsencode(path))
+    return Case.from_namelist(f90nml.reads(text(effective)))
+
+
+def write_case(case: Case, path: str | os.PathLike[str]) -> None:
+    """Write a case as a namelist file, completely or not at all.
+
+    Parameters
+    ----------
+    case
+        The case.
+    path
+        Path of the file; an older one is replaced.
+
+    Raises
+    ------
+    InputError
+        Where the case holds a value that is not allowed; nothing is written.
+    OSError
+        Where the file cannot be written.
+    """
+    content = case_text(case)
+    call(door.count_samples, content)
+    replace_file(Path(path), content)
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file under another name, then give it its own: nobody sees half a file."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def with_values(case: Case, **groups: dict[str, object]) -> Case:
+    """Return a case with some values changed: ``with_values(case, drop={"height": 0.1})``."""
+    changed = {
+        group: dataclasses.replace(getattr(case, group), **values)
+        for group, values in groups.items()
+    }
+    return dataclasses.replace(case, **changed)  # type: ignore[arg-type]

@@ -1,0 +1,214 @@
+"""Impact of a source on a rigid floor: the answer of every source model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._library import call, door, words
+from thud.case import Ball, Case, Drop, Model, Sampling, case_text
+from thud.errors import InputError
+from thud.levels import Conformity, force_exposure_levels, judge, peak_count
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FORCES = ("elastic", "floor")
+
+
+@dataclass(frozen=True, eq=False)
+class Impact:
+    """Force and motion of one impact, sampled from first touch on.
+
+    Attributes
+    ----------
+    case : Case
+        The input.
+    time : ndarray, shape (n_sample,)
+        Time since first touch, s.
+    deflection, velocity : ndarray, shape (n_sample,)
+        Deflection of the source, m, and its rate, m/s.
+    elastic_force : ndarray, shape (n_sample,)
+        Force of shell and gas, the ball force of the paper (eq. 1), N.
+    floor_force : ndarray, shape (n_sample,)
+        Whole force on the floor, flux of momentum included, N.
+    parts : dict of str to ndarray, shape (n_sample,)
+        The parts that the model tells apart, N.
+    sample_rate : float
+        Samples per second, Hz.
+    impact_velocity : float
+        Velocity at first touch, m/s.
+    contact_time : float
+        Time from first touch to release, s.
+    peak_force : float
+        Largest elastic force, N.
+    peak_floor_force : float
+        Largest force on the floor, N.
+    max_deflection : float
+        Largest deflection, m.
+    restitution : float
+        Velocity at release over velocity at first touch.
+    impulse : float
+        Time integral of the force on the floor, N s.
+    impulse_residual, energy_residual : float
+        How far the balances of impulse and energy miss, relative.
+    """
+
+    case: Case
+    time: NDArray[np.float64]
+    deflection: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    elastic_force: NDArray[np.float64]
+    floor_force: NDArray[np.float64]
+    parts: dict[str, NDArray[np.float64]]
+    sample_rate: float
+    impact_velocity: float
+    contact_time: float
+    peak_force: float
+    peak_floor_force: float
+    max_deflection: float
+    restitution: float
+    impulse: float
+    impulse_residual: float
+    energy_residual: float
+
+    @property
+    def shell_force(self) -> NDArray[np.float64]:
+        """Force of the shell F_B, N, shape (n_sample,)."""
+        return self._part("shell_force")
+
+    @property
+    def gas_force(self) -> NDArray[np.float64]:
+        """Force of the enclosed gas F_G, N, shape (n_sample,)."""
+        return self._part("gas_force")
+
+    @property
+    def flux_force(self) -> NDArray[np.float64]:
+        """Flux of momentum of the wall into the floor F_M, N, shape (n_sample,)."""
+        return self._part("flux_force")
+
+    def _part(self, name: str) -> NDArray[np.float64]:
+        if name not in self.parts:
+            message = f"the model {self.case.model.name!r} has no {name}; it has {list(self.parts)}"
+            raise AttributeError(message)
+        return self.parts[name]
+
+    def force(self, kind: str = "elastic") -> NDArray[np.float64]:
+        """Return the ``"elastic"`` or the ``"floor"`` force, N, shape (n_sample,)."""
+        if kind not in FORCES:
+            message = f"force = {kind!r} is not known; allowed: {', '.join(map(repr, FORCES))}"
+            raise InputError(message)
+        return self.elastic_force if kind == "elastic" else self.floor_force
+
+    def levels(
+        self, bands: str = "octave", method: str | None = None, force: str | None = None
+    ) -> NDArray[np.float64]:
+        """Return the force exposure levels, dB, shape (n_band,).
+
+        Parameters
+        ----------
+        bands
+            ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
+        method
+            ``"exact"`` or ``"fft"``; by default that of the case.
+        force
+            ``"elastic"`` or ``"floor"``; by default that of the case.
+        """
+        return force_exposure_levels(
+            self.force(force or self.case.levels.force),
+            self.sample_rate,
+            bands,
+            method or self.case.levels.method,
+        )
+
+    def conformity(self, source: str | None = None, force: str | None = None) -> Conformity:
+        """Return the verdict of the standards.
+
+        Parameters
+        ----------
+        source
+            ``"rubber_ball"`` or ``"tyre"``; by default that of the case.
+        force
+            ``"elastic"`` or ``"floor"``; by default that of the case.
+        """
+        kind = force or self.case.levels.force
+        return judge(
+            self.levels(force=kind),
+            self.contact_time,
+            self.restitution,
+            peak_count(self.force(kind)),
+            self.case.ball.mass,
+            self.case.drop.height,
+            source or self.case.limits.source,
+        )
+
+
+def solve(  # noqa: PLR0913 - the keywords are the keys of three namelist groups
+    ball: Ball | None = None,
+    drop: Drop | None = None,
+    model: str = "hollow_sphere",
+    *,
+    momentum_flux: str = Model.momentum_flux,
+    sample_rate: float = Sampling.sample_rate,
+    duration: float = Sampling.duration,
+    substeps: int = Sampling.substeps,
+) -> Impact:
+    """Drop a ball on a rigid floor.
+
+    Parameters
+    ----------
+    ball, drop
+        By default the rubber ball of the paper, from 1 m.
+    model
+        ``"hollow_sphere"``, the analytical model of the paper.
+    momentum_flux
+        ``"momentum_balance"``, ``"retarding"``, ``"conservative"`` or ``"none"``.
+    sample_rate
+        Samples per second, Hz.
+    duration
+        Length of the record, s; longer than the contact.
+    substeps
+        Integration steps per sampling interval.
+
+    Returns
+    -------
+    Impact
+        Force, motion and the numbers that describe them.
+
+    Raises
+    ------
+    InputError
+        Names group, key, value and allowed range.
+    NumericalError
+        Where the drop closes the shell or the steps are too coarse.
+    """
+    return solve_case(
+        Case(
+            ball=ball or Ball(),
+            drop=drop or Drop(),
+            model=Model(model, momentum_flux),
+            sampling=Sampling(sample_rate, duration, substeps),
+        )
+    )
+
+
+def solve_case(case: Case) -> Impact:
+    """Compute the impact of a case; see `solve`."""
+    content = case_text(case)
+    (n_sample,) = call(door.count_samples, content)
+    deflection, velocity, part, elastic, floor, part_names, scalars = call(
+        door.solve, content, n_sample
+    )
+    sample_rate = float(scalars[0])
+    return Impact(
+        case,
+        np.arange(n_sample) / sample_rate,
+        deflection,
+        velocity,
+        elastic,
+        floor,
+        dict(zip(words(part_names), part.T, strict=False)),
+        *map(float, scalars),
+    )

@@ -1,0 +1,223 @@
+"""Force exposure levels of any force record, and the verdict of the standards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._library import call, door, words
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+BANDWIDTHS = ("octave", "third")
+
+
+@dataclass(frozen=True)
+class Bands:
+    """Frequency bands of base 10 (IEC 61260-1), ascending.
+
+    Attributes
+    ----------
+    nominal : ndarray, shape (n_band,)
+        Rounded mid frequencies, Hz.
+    centre : ndarray, shape (n_band,)
+        Exact mid frequencies, Hz.
+    lower, upper : ndarray, shape (n_band,)
+        Band edges, Hz.
+    """
+
+    nominal: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One quantity and the range that the standards ask for.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name and unit of the quantity; levels in dB re 1 N.
+    value, lower, upper : float
+        Value of the source and the ends of the range, which belong to it.
+    conforms : bool
+        The value lies in the range.
+    """
+
+    name: str
+    unit: str
+    value: float
+    lower: float
+    upper: float
+    conforms: bool
+
+
+@dataclass(frozen=True)
+class Conformity:
+    """Verdict on a source.
+
+    Attributes
+    ----------
+    source : str
+        Source whose limits apply.
+    criteria : tuple of Criterion
+        Five octave levels, contact time, restitution, number of peaks, mass, drop height.
+    """
+
+    source: str
+    criteria: tuple[Criterion, ...]
+
+    @property
+    def conforms(self) -> bool:
+        """All criteria are met."""
+        return all(criterion.conforms for criterion in self.criteria)
+
+    def __bool__(self) -> bool:
+        """Return whether all criteria are met."""
+        return self.conforms
+
+
+def get_bands(bands: str = "octave") -> Bands:
+    """Return the octaves 31.5 to 500 Hz or the thirds 25 to 630 Hz.
+
+    Parameters
+    ----------
+    bands
+        ``"octave"`` or ``"third"``.
+
+    Raises
+    ------
+    InputError
+        Where `bands` is something else.
+    """
+    if bands not in BANDWIDTHS:
+        message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
+        raise InputError(message)
+    n_band, *columns = door.get_bands(bands)
+    return Bands(*(column[:n_band].copy() for column in columns))
+
+
+def force_exposure_levels(
+    force: ArrayLike, sample_rate: float, bands: str = "octave", method: str = "exact"
+) -> NDArray[np.float64]:
+    """Return the force exposure levels of a force record.
+
+    The level of a band is 10 lg of its energy, 2 * integral of abs(F(f))**2 df, over 1 N2 s
+    (JIS A 1418-2). The record is taken as zero before its first and after its last sample.
+
+    Parameters
+    ----------
+    force : array_like, shape (n_sample,)
+        Force, N.
+    sample_rate
+        Samples per second, Hz; more than twice the highest band edge.
+    bands
+        ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
+    method
+        ``"exact"``: the energy of the record as it is; ``"fft"``: the sum over the 1 Hz bins of
+        a record of 1 s, as in the paper.
+
+    Returns
+    -------
+    ndarray, shape (n_band,)
+        Levels in ascending bands, dB re 1 N and 1 s. Bands whose energy is lost in the rounding
+        of the whole (156 dB below it) have the level of that rounding.
+
+    Raises
+    ------
+    InputError
+        Where the record is empty, zero throughout, not finite or not one-dimensional, or the
+        rate, the bands or the method cannot be used.
+    """
+    count = len(get_bands(bands).nominal)
+    record = _record(force)
+    rate = _number("sample_rate", sample_rate)
+    (levels,) = call(door.force_exposure, record, rate, bands, str(method), count)
+    result: NDArray[np.float64] = levels
+    return result
+
+
+def peak_count(force: ArrayLike) -> int:
+    """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
+
+    Parameters
+    ----------
+    force : array_like, shape (n_sample,)
+        Force, N, that starts and ends at zero.
+    """
+    return int(door.count_peaks(_record(force)))
+
+
+def judge(  # noqa: PLR0913 - each is one criterion of the standards
+    levels: ArrayLike,
+    contact_time: float,
+    restitution: float,
+    peaks: int,
+    mass: float,
+    drop_height: float,
+    source: str = "rubber_ball",
+) -> Conformity:
+    """Return the verdict of the standards on a source.
+
+    Parameters
+    ----------
+    levels : array_like, shape (5,)
+        Force exposure levels of the octaves 31.5 to 500 Hz, dB.
+    contact_time
+        Contact time, s.
+    restitution
+        Coefficient of restitution.
+    peaks
+        Number of peaks of the force.
+    mass
+        Mass of the source, kg.
+    drop_height
+        Height of drop, m.
+    source
+        ``"rubber_ball"`` or ``"tyre"``.
+
+    Raises
+    ------
+    InputError
+        Where the source is not known or `levels` does not hold five numbers.
+    """
+    octaves = np.asarray(levels, dtype=float)
+    if octaves.shape != (5,):
+        message = f"levels have the shape {octaves.shape}; allowed: (5,), the octaves 31.5 to 500"
+        raise InputError(message)
+    names, units, value, lower, upper, met = call(
+        door.judge, source, octaves, contact_time, restitution, peaks, mass, drop_height
+    )
+    rows = zip(words(names), words(units), value, lower, upper, met, strict=True)
+    return Conformity(
+        source,
+        tuple(Criterion(n, u, float(v), float(a), float(b), bool(m)) for n, u, v, a, b, m in rows),
+    )
+
+
+def _record(force: ArrayLike) -> NDArray[np.float64]:
+    """Return a force as the library takes it."""
+    try:
+        record = np.ascontiguousarray(force, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        message = "force is not an array of numbers; allowed: one dimension of real numbers, N"
+        raise InputError(message) from error
+    if np.ndim(force) != 1 or np.iscomplexobj(force):
+        message = f"force has {np.ndim(force)} dimensions; allowed: one, of real numbers, N"
+        raise InputError(message)
+    return record
+
+
+def _number(name: str, value: object) -> float:
+    """Return a number as a float."""
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError) as error:
+        message = f"{name} = {value!r} is not a number"
+        raise InputError(message) from error

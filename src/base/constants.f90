@@ -1,0 +1,21 @@
+!> Mathematical constants, reference values of levels and the program's version.
+module thud_constants
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: pi, reference_force, reference_time, version
+
+   !> Ratio of a circle's circumference to its diameter.
+   real(wp), parameter :: pi = acos(-1.0_wp)
+
+   !> Reference force of the force exposure level, N (JIS A 1418-2).
+   real(wp), parameter :: reference_force = 1.0_wp
+
+   !> Reference time of the force exposure level, s (JIS A 1418-2).
+   real(wp), parameter :: reference_time = 1.0_wp
+
+   !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.
+   character(len=*), parameter :: version = '0.1.0'
+
+end module thud_constants

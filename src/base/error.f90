@@ -1,0 +1,45 @@
+!> Errors as values: a routine that can fail has an allocatable `error` that stays
+!> unallocated when all went well.
+module thud_error
+   implicit none (type, external)
+   private
+
+   public :: error_type, bad_input, numerical_failure, input_error, numerical_error
+
+   !> The input cannot be used; also the exit code of the executable.
+   integer, parameter :: bad_input = 1
+
+   !> The computation broke down; also the exit code of the executable.
+   integer, parameter :: numerical_failure = 2
+
+   !> What went wrong, in one sentence for the user.
+   type :: error_type
+      !> `bad_input` or `numerical_failure`.
+      integer :: code = numerical_failure
+      !> One sentence that names the place, the value and what is allowed.
+      character(len=:), allocatable :: message
+   end type error_type
+
+contains
+
+   !> Error of the user's input.
+   pure function input_error(message) result(error)
+      !> One sentence for the user.
+      character(len=*), intent(in) :: message
+      !> The error.
+      type(error_type) :: error
+
+      error = error_type(code=bad_input, message=message)
+   end function input_error
+
+   !> Error of a computation that could not be carried through.
+   pure function numerical_error(message) result(error)
+      !> One sentence for the user.
+      character(len=*), intent(in) :: message
+      !> The error.
+      type(error_type) :: error
+
+      error = error_type(code=numerical_failure, message=message)
+   end function numerical_error
+
+end module thud_error

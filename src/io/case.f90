@@ -1,0 +1,259 @@
+!> A case: everything that one run needs, as the namelist file gives it.
+module thud_case
+   use thud_ball, only: ball_type, get_ball_fields
+   use thud_constants, only: version
+   use thud_drop, only: drop_type, get_drop_fields
+   use thud_error, only: error_type, input_error
+   use thud_field, only: check_fields, choice_field, field_type, name_length, text_field
+   use thud_force_exposure, only: level_methods
+   use thud_hollow_sphere, only: get_hollow_sphere_fields, hollow_sphere_type
+   use thud_namelist_text, only: group_type, parse_groups
+   use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
+   use thud_source_limits, only: source_names
+   use thud_text, only: join_quoted, newline, quoted, to_text
+   implicit none (type, external)
+   private
+
+   public :: case_type, describe_keys, get_case_text, get_fields, read_case
+
+   !> Source models that can be asked for.
+   character(len=24), parameter :: model_names(1) = [character(len=24) :: 'hollow_sphere']
+
+   !> Groups that every file must hold.
+   character(len=24), parameter :: required_groups(3) = [character(len=24) :: 'ball', 'drop', 'model']
+
+   !> Input of one run.
+   type :: case_type
+      !> Name of the case, also of its output directory.
+      character(len=name_length) :: name = ''
+      !> The ball.
+      type(ball_type) :: ball
+      !> The drop.
+      type(drop_type) :: drop
+      !> Source model, one of `model_names`.
+      character(len=name_length) :: model = 'hollow_sphere'
+      !> Options of the model `hollow_sphere`.
+      type(hollow_sphere_type) :: hollow_sphere
+      !> Sampling of the record.
+      type(sampling_type) :: sampling
+      !> Method of the levels.
+      character(len=name_length) :: level_method = 'exact'
+      !> Bands of the levels: octave, third or both.
+      character(len=name_length) :: bands = 'octave'
+      !> Force that the verdict is on: elastic or floor.
+      character(len=name_length) :: level_force = 'elastic'
+      !> Source whose limits apply.
+      character(len=name_length) :: source = 'rubber_ball'
+   end type case_type
+
+contains
+
+   !> Every key of the input, in the order of the written file.
+   function get_fields(case) result(fields)
+      !> The case that the fields read and set.
+      type(case_type), intent(in), target :: case
+      !> The keys: [n_field].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         text_field('case', 'name', case%name, 'name of the case, also of its output directory'), &
+         get_ball_fields(case%ball), &
+         get_drop_fields(case%drop), &
+         choice_field('model', 'name', case%model, 'source model', model_names), &
+         get_hollow_sphere_fields(case%hollow_sphere), &
+         get_sampling_fields(case%sampling), &
+         choice_field('levels', 'method', case%level_method, 'method of the levels', level_methods), &
+         choice_field('levels', 'bands', case%bands, 'bands of levels.csv', &
+         [character(len=8) :: 'octave', 'third', 'both']), &
+         choice_field('levels', 'force', case%level_force, 'force that the verdict is on', &
+         [character(len=8) :: 'elastic', 'floor']), &
+         choice_field('limits', 'source', case%source, 'source whose limits apply', source_names)]
+   end function get_fields
+
+   !> Case from the text of a namelist file, complete and inside all ranges.
+   subroutine read_case(text, default_name, case, error)
+      !> Text of the file.
+      character(len=*), intent(in) :: text
+      !> Name of the case where the text gives none.
+      character(len=*), intent(in) :: default_name
+      !> The case.
+      type(case_type), target, intent(out) :: case
+      !> What is wrong, with group, key, value and allowed range.
+      type(error_type), allocatable, intent(out) :: error
+      type(group_type), allocatable :: groups(:)
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      if (len(default_name) <= name_length) case%name = default_name
+      call parse_groups(text, groups, error)
+      if (allocated(error)) return
+      allocate (fields, source=get_fields(case))
+      call check_groups(groups, fields, error)
+      if (allocated(error)) return
+      do i = 1, size(groups)
+         call assign_group(groups(i), fields, error)
+         if (allocated(error)) return
+      end do
+      ! Anew, because some ranges depend on other values.
+      call check_fields(get_fields(case), error)
+      if (allocated(error)) return
+      call check_sampling(case%sampling, error)
+      if (allocated(error)) return
+      call check_name(case%name, error)
+   end subroutine read_case
+
+   !> Complains about groups that are missing, unknown or given twice.
+   subroutine check_groups(groups, fields, error)
+      !> Groups of the file: [n_group].
+      type(group_type), intent(in) :: groups(:)
+      !> Known keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i, j
+
+      do i = 1, size(groups)
+         if (.not. any(fields%group == groups(i)%name)) then
+            error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
+               //' is not a known group; allowed: '//join_quoted(distinct(fields%group)))
+            return
+         end if
+         do j = 1, i - 1
+            if (groups(j)%name /= groups(i)%name) cycle
+            error = input_error('&'//groups(i)%name//' is given twice, in line '//to_text(groups(j)%line) &
+               //' and in line '//to_text(groups(i)%line)//'; allowed: once')
+            return
+         end do
+      end do
+      do i = 1, size(required_groups)
+         if (any([(groups(j)%name == required_groups(i), j=1, size(groups))])) cycle
+         error = input_error('&'//trim(required_groups(i))//' is missing; allowed: files with the groups ' &
+            //join_quoted(required_groups))
+         return
+      end do
+   end subroutine check_groups
+
+   !> Sets the variables of one group.
+   subroutine assign_group(group, fields, error)
+      !> The group.
+      type(group_type), intent(in) :: group
+      !> Known keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> A key is unknown or given twice, or its value has the wrong type.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i, j, place
+
+      do i = 1, size(group%assignments)
+         associate (given => group%assignments(i))
+            place = findloc(fields%group == group%name .and. fields%key == given%key, .true., dim=1)
+            if (place == 0) then
+               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+                  //' is not a known key; allowed: '//join_quoted(pack(fields%key, fields%group == group%name)))
+            else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then
+               error = input_error('&'//group%name//': '//given%key//' is given a second time in line ' &
+                  //to_text(given%line)//'; allowed: once')
+            else if (given%value == '') then
+               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+                  //' has no value; allowed: '//fields(place)%get_allowed())
+            else
+               call fields(place)%set_from_text(given%value, error)
+            end if
+         end associate
+         if (allocated(error)) return
+      end do
+   end subroutine assign_group
+
+   !> Complains about a name that cannot name a directory.
+   subroutine check_name(name, error)
+      !> Name of the case.
+      character(len=*), intent(in) :: name
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+      logical :: usable
+      integer :: i
+
+      usable = name /= '' .and. name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/') == 0 &
+         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
+      if (.not. usable) error = input_error('&case: name = '//quoted(name) &
+         //' is not allowed; allowed: a name for a directory, without ''/'', up to '//to_text(name_length)//' characters')
+   end subroutine check_name
+
+   !> Each text once, in order.
+   pure function distinct(texts) result(once)
+      !> The texts: [n].
+      character(len=*), intent(in) :: texts(:)
+      !> The texts without repetition.
+      character(len=len(texts)), allocatable :: once(:)
+      logical :: first(size(texts))
+      integer :: i
+
+      do i = 1, size(texts)
+         first(i) = .not. any(texts(:i - 1) == texts(i))
+      end do
+      once = pack(texts, first)
+   end function distinct
+
+   !> The complete input as a namelist file; reading it gives the same case.
+   function get_case_text(case) result(text)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> Text of the file.
+      character(len=:), allocatable :: text
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      allocate (fields, source=get_fields(case))
+      text = '! thud '//version//': the full input of case '//trim(case%name)//', SI units'//newline
+      do i = 1, size(fields)
+         call open_group(fields, i, text)
+         text = text//'   '//fields(i)%key//' = '//fields(i)%get_text()
+         if (fields(i)%unit /= '') text = text//' ! '//trim(fields(i)%unit)
+         text = text//newline
+         if (closes_group(fields, i)) text = text//'/'//newline
+      end do
+   end function get_case_text
+
+   !> Every key with its default, allowed range and meaning, as a commented namelist file.
+   function describe_keys() result(text)
+      !> The description; a valid input file.
+      character(len=:), allocatable :: text
+      type(case_type), target :: case
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      case%name = 'my_case'
+      allocate (fields, source=get_fields(case))
+      text = '! Every key of an input file with its default value. SI units.'//newline
+      do i = 1, size(fields)
+         call open_group(fields, i, text)
+         text = text//'   ! '//trim(fields(i)%meaning)//'; allowed: '//fields(i)%get_allowed()//newline &
+            //'   '//trim(fields(i)%key)//' = '//fields(i)%get_text()//newline
+         if (closes_group(fields, i)) text = text//'/'//newline
+      end do
+   end function describe_keys
+
+   !> Adds the opening line where a field is the first of its group.
+   pure subroutine open_group(fields, i, text)
+      !> All fields: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> Number of the field.
+      integer, intent(in) :: i
+      !> The text so far.
+      character(len=:), allocatable, intent(inout) :: text
+
+      if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
+   end subroutine open_group
+
+   !> Whether a field is the last of its group.
+   pure function closes_group(fields, i) result(last)
+      !> All fields: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> Number of the field.
+      integer, intent(in) :: i
+      !> No later field has the same group.
+      logical :: last
+
+      last = .not. any(fields(i + 1:)%group == fields(i)%group)
+   end function closes_group
+
+end module thud_case

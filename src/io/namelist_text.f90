@@ -1,0 +1,254 @@
+!> Splits the text of an input file into namelist groups and assignments. The run-time library
+!> reads the values later; it alone cannot tell a missing group from an unterminated one, nor say
+!> which key holds a bad value.
+module thud_namelist_text
+   use thud_error, only: error_type, input_error
+   use thud_text, only: lower_case, newline, to_text
+   implicit none (type, external)
+   private
+
+   public :: assignment_type, group_type, parse_groups
+
+   !> One `key = value`.
+   type :: assignment_type
+      !> Key in lower case.
+      character(len=:), allocatable :: key
+      !> Text of the value as written, without comments.
+      character(len=:), allocatable :: value
+      !> Line of the key.
+      integer :: line = 0
+   end type assignment_type
+
+   !> One namelist group.
+   type :: group_type
+      !> Name in lower case.
+      character(len=:), allocatable :: name
+      !> Line of the `&`.
+      integer :: line = 0
+      !> What stands in it, in order: [n_assignment].
+      type(assignment_type), allocatable :: assignments(:)
+   end type group_type
+
+   !> Letters, digits and the underscore make a name.
+   character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
+
+   !> What may stand between the parts.
+   character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
+
+contains
+
+   !> All groups of a text, in order.
+   subroutine parse_groups(text, groups, error)
+      !> Text of the input file.
+      character(len=*), intent(in) :: text
+      !> Its groups: [n_group].
+      type(group_type), allocatable, intent(out) :: groups(:)
+      !> The text is not made of closed groups.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: clean, structure
+      type(group_type) :: group
+      integer :: start, finish, gap
+
+      allocate (groups(0))
+      call separate(text, clean, structure, error)
+      if (allocated(error)) return
+      start = 1
+      do
+         gap = verify(structure(start:), blanks)
+         if (gap == 0) return
+         start = start + gap - 1
+         call find_group(structure, start, group, finish, error)
+         if (allocated(error)) return
+         call split_group(clean, structure, start + 1 + len(group%name), finish - 1, group, error)
+         if (allocated(error)) return
+         groups = [groups, group]
+         start = finish + 1
+         if (structure(finish:finish) == '&') start = finish + len('&end')
+      end do
+   end subroutine parse_groups
+
+   !> Blanks out comments, and in a second copy also the inside of quotes.
+   subroutine separate(text, clean, structure, error)
+      !> Text of the input file.
+      character(len=*), intent(in) :: text
+      !> The text without comments, every character in its old place.
+      character(len=:), allocatable, intent(out) :: clean
+      !> In lower case, with all quoted text made of `x`.
+      character(len=:), allocatable, intent(out) :: structure
+      !> A quote is not closed, or the file is not text.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=1) :: quote
+      logical :: in_comment
+      integer :: i
+
+      clean = text
+      structure = lower_case(text)
+      quote = ' '
+      in_comment = .false.
+      do i = 1, len(text)
+         if (text(i:i) == newline) then
+            if (quote /= ' ') exit
+            in_comment = .false.
+         else if (in_comment) then
+            clean(i:i) = ' '
+            structure(i:i) = ' '
+         else if (quote /= ' ') then
+            if (text(i:i) == quote) quote = ' '
+            structure(i:i) = 'x'
+         else if (text(i:i) == '!') then
+            in_comment = .true.
+            clean(i:i) = ' '
+            structure(i:i) = ' '
+         else if (text(i:i) == '''' .or. text(i:i) == '"') then
+            quote = text(i:i)
+            structure(i:i) = 'x'
+         else if (iachar(text(i:i)) < 32 .and. scan(text(i:i), blanks) == 0) then
+            error = input_error('line '//to_text(line_of(text, i))//' is not plain text')
+            return
+         end if
+      end do
+      if (quote /= ' ') error = input_error('a quote is not closed in line '//to_text(line_of(text, i - 1)))
+   end subroutine separate
+
+   !> Name and end of the group that starts at a place.
+   subroutine find_group(structure, start, group, finish, error)
+      !> Text without comments and quoted text.
+      character(len=*), intent(in) :: structure
+      !> Place of the first character.
+      integer, intent(in) :: start
+      !> The group, without its assignments yet.
+      type(group_type), intent(out) :: group
+      !> Place of the `/` or of the `&` in `&end`.
+      integer, intent(out) :: finish
+      !> No group starts here, or it has no end.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: length
+      logical :: closed
+
+      finish = start
+      group%line = line_of(structure, start)
+      length = verify(structure(start + 1:)//' ', name_characters) - 1
+      if (structure(start:start) /= '&' .or. length == 0) then
+         error = input_error('line '//to_text(group%line)//' stands outside a group; ' &
+            //'allowed: groups ''&name key = value /'' and comments after ''!''')
+         return
+      end if
+      group%name = structure(start + 1:start + length)
+      finish = start + length + scan(structure(start + length + 1:), '/&')
+      closed = finish > start + length
+      if (closed) then
+         if (structure(finish:finish) == '&') closed = index(structure(finish:)//' ', '&end') == 1
+      end if
+      if (.not. closed) error = input_error('&'//group%name//' in line '//to_text(group%line) &
+         //' is not terminated; allowed: a ''/'' at the end of the group')
+   end subroutine find_group
+
+   !> Splits the inside of a group at its equals signs.
+   subroutine split_group(clean, structure, start, finish, group, error)
+      !> Text without comments.
+      character(len=*), intent(in) :: clean
+      !> The same without quoted text.
+      character(len=*), intent(in) :: structure
+      !> First place behind the group's name.
+      integer, intent(in) :: start
+      !> Last place before the group's end.
+      integer, intent(in) :: finish
+      !> The group, to which the assignments are added.
+      type(group_type), intent(inout) :: group
+      !> Something is not `key = value`.
+      type(error_type), allocatable, intent(out) :: error
+      type(assignment_type) :: given
+      integer :: equals, key_start, key_end, next_key, place
+
+      allocate (group%assignments(0))
+      place = start
+      call find_key(place, key_start, key_end, equals)
+      if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
+      if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
+         error = input_error('&'//group%name//' in line '//to_text(group%line)//': '//quoted_start(clean(start:finish)) &
+            //' is not ''key = value''')
+         return
+      end if
+      do while (key_start <= finish)
+         given%line = line_of(structure, key_start)
+         if (key_end < key_start) then
+            error = input_error('&'//group%name//': an equals sign in line '//to_text(given%line)//' has no key')
+            return
+         end if
+         given%key = structure(key_start:key_end)
+         place = equals + 1
+         call find_key(place, next_key, key_end, equals)
+         given%value = trimmed(clean(place:min(next_key, finish + 1) - 1))
+         group%assignments = [group%assignments, given]
+         key_start = next_key
+      end do
+
+   contains
+
+      !> The next key and its equals sign; behind the group's end where there is none.
+      subroutine find_key(from, first, last, sign)
+         !> Place to search from.
+         integer, intent(in) :: from
+         !> First character of the key.
+         integer, intent(out) :: first
+         !> Last character of the key.
+         integer, intent(out) :: last
+         !> Place of the equals sign.
+         integer, intent(out) :: sign
+
+         sign = from - 1 + index(structure(from:finish), '=')
+         if (sign < from) then
+            sign = finish + 1
+            first = finish + 1
+            last = finish + 1
+            return
+         end if
+         last = from - 1 + verify(structure(from:sign - 1), blanks, back=.true.)
+         first = from + verify(structure(from:last), name_characters, back=.true.)
+      end subroutine find_key
+
+   end subroutine split_group
+
+   !> Value without blanks around it and without the comma that may follow.
+   pure function trimmed(text) result(value)
+      !> Text between an equals sign and the next key.
+      character(len=*), intent(in) :: text
+      !> The value.
+      character(len=:), allocatable :: value
+      integer :: first, last
+
+      first = verify(text, blanks)
+      last = verify(text, blanks//',', back=.true.)
+      value = ''
+      if (first > 0 .and. last >= first) value = text(first:last)
+   end function trimmed
+
+   !> The first words of a text, in quotes, for messages.
+   pure function quoted_start(text) result(start)
+      !> Any text.
+      character(len=*), intent(in) :: text
+      !> Up to 40 characters of it.
+      character(len=:), allocatable :: start
+      character(len=:), allocatable :: value
+
+      value = trimmed(text)
+      start = ''''//value(:min(len(value), 40))//''''
+   end function quoted_start
+
+   !> Number of the line that a place is in.
+   pure function line_of(text, place) result(line)
+      !> The whole text.
+      character(len=*), intent(in) :: text
+      !> Place of a character.
+      integer, intent(in) :: place
+      !> Line, the first one is 1.
+      integer :: line
+      integer :: i
+
+      line = 1
+      do i = 1, min(place, len(text)) - 1
+         if (text(i:i) == newline) line = line + 1
+      end do
+   end function line_of
+
+end module thud_namelist_text

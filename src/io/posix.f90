@@ -1,0 +1,154 @@
+!> The few calls of the operating system that Fortran lacks (POSIX.1-2008).
+module thud_posix
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_ptr
+   implicit none (type, external)
+   private
+
+   public :: directory_exists, get_process_id, is_empty_directory, make_directory, remove_file, rename_file
+
+   interface
+      function c_getpid() bind(c, name='getpid') result(process)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int) :: process
+      end function c_getpid
+
+      function c_mkdir(path, mode) bind(c, name='mkdir') result(status)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+         integer(c_int) :: status
+      end function c_mkdir
+
+      function c_rename(old_path, new_path) bind(c, name='rename') result(status)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: old_path(*), new_path(*)
+         integer(c_int) :: status
+      end function c_rename
+
+      function c_remove(path) bind(c, name='remove') result(status)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int) :: status
+      end function c_remove
+
+      function c_opendir(path) bind(c, name='opendir') result(directory)
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr) :: directory
+      end function c_opendir
+
+      function c_readdir(directory) bind(c, name='readdir') result(entry)
+         import :: c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: directory
+         type(c_ptr) :: entry
+      end function c_readdir
+
+      function c_closedir(directory) bind(c, name='closedir') result(status)
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: directory
+         integer(c_int) :: status
+      end function c_closedir
+   end interface
+
+contains
+
+   !> Number of this process, for the names of temporary files.
+   function get_process_id() result(process)
+      !> Process number.
+      integer :: process
+
+      process = int(c_getpid())
+   end function get_process_id
+
+   !> Whether a directory of that name is there.
+   function directory_exists(path) result(there)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> It exists and can be read.
+      logical :: there
+
+      there = count_entries(path) >= 0
+   end function directory_exists
+
+   !> Whether a directory is there and holds nothing.
+   function is_empty_directory(path) result(empty)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> It holds no more than `.` and `..`.
+      logical :: empty
+      integer :: entries
+
+      entries = count_entries(path)
+      empty = entries >= 0 .and. entries <= 2
+   end function is_empty_directory
+
+   !> Entries of a directory, `.` and `..` included; -1 where it cannot be read. Stops at three.
+   function count_entries(path) result(entries)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> Number of entries, up to 3.
+      integer :: entries
+      type(c_ptr) :: directory
+      integer(c_int) :: status
+
+      entries = -1
+      directory = c_opendir(path//c_null_char)
+      if (.not. c_associated(directory)) return
+      entries = 0
+      do while (entries < 3)
+         if (.not. c_associated(c_readdir(directory))) exit
+         entries = entries + 1
+      end do
+      status = c_closedir(directory)
+      if (status /= 0) entries = -1
+   end function count_entries
+
+   !> Makes a directory and those above it.
+   subroutine make_directory(path, done)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> The directory is there now.
+      logical, intent(out) :: done
+      integer(c_int), parameter :: permissions = int(o'777', c_int)
+      integer(c_int) :: status
+      integer :: i
+
+      do i = 2, len(path)
+         if (path(i:i) /= '/') cycle
+         if (directory_exists(path(:i - 1))) cycle
+         status = c_mkdir(path(:i - 1)//c_null_char, permissions)
+      end do
+      status = c_mkdir(path//c_null_char, permissions)
+      done = status == 0 .or. directory_exists(path)
+   end subroutine make_directory
+
+   !> Gives a file another name; a file that has that name is replaced in the same instant.
+   subroutine rename_file(old_path, new_path, done)
+      !> Path of the file.
+      character(len=*), intent(in) :: old_path
+      !> New path in the same file system.
+      character(len=*), intent(in) :: new_path
+      !> The file has its new name.
+      logical, intent(out) :: done
+
+      done = c_rename(old_path//c_null_char, new_path//c_null_char) == 0
+   end subroutine rename_file
+
+   !> Removes a file or an empty directory if it is there.
+   subroutine remove_file(path)
+      !> Path.
+      character(len=*), intent(in) :: path
+      integer(c_int) :: status
+
+      status = c_remove(path//c_null_char)
+      if (status /= 0) return
+   end subroutine remove_file
+
+end module thud_posix

@@ -1,0 +1,146 @@
+!> One run from end to end: case, source model, force history, levels, verdict, files.
+module thud_run
+   use thud_band, only: band_type, get_octaves, get_thirds, octave_count
+   use thud_case, only: case_type, get_case_text, read_case
+   use thud_error, only: error_type, input_error
+   use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, write_files
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_force_history, only: force_history_type
+   use thud_hollow_sphere, only: solve_hollow_sphere
+   use thud_kinds, only: wp
+   use thud_report, only: get_force_csv, get_levels_csv, get_summary, get_table
+   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
+      get_source_limits, source_limits_type
+   use thud_text, only: newline, to_text
+   implicit none (type, external)
+   private
+
+   public :: load_case, outcome_type, run_case, solve_case
+
+   !> What a run leaves for its caller.
+   type :: outcome_type
+      !> Directory that holds the files.
+      character(len=:), allocatable :: directory
+      !> Table for the screen.
+      character(len=:), allocatable :: table
+      !> The source conforms to the limits.
+      logical :: conforms = .false.
+   end type outcome_type
+
+contains
+
+   !> Runs a namelist file and writes its results.
+   subroutine run_case(path, output, outcome, error)
+      !> Path of the namelist file.
+      character(len=*), intent(in) :: path
+      !> Directory for the results; empty for `outputs/<name of the case>`.
+      character(len=*), intent(in) :: output
+      !> Table, verdict and place of the results.
+      type(outcome_type), intent(out) :: outcome
+      !> The run failed; nothing was written.
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: case
+      type(force_history_type) :: history
+      type(criterion_type) :: criteria(criterion_count)
+      type(band_type), allocatable :: bands(:)
+      real(wp), allocatable :: elastic_level(:), floor_level(:)
+      character(len=:), allocatable :: input
+      integer :: first
+
+      call load_case(path, case, error)
+      if (allocated(error)) return
+      input = get_case_text(case)
+      outcome%directory = output
+      if (output == '') outcome%directory = 'outputs/'//trim(case%name)
+      call check_owner(outcome%directory, 'effective.nml', input(:index(input, newline)), error)
+      if (.not. allocated(error)) call solve_case(case, history, error)
+      if (.not. allocated(error)) call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
+      if (.not. allocated(error)) then
+         outcome%conforms = all(conforms(criteria))
+         outcome%table = get_table(case, history, elastic_level, floor_level, criteria)
+         ! The octaves come first and serve the verdict also where only thirds are asked for.
+         first = merge(octave_count, 0, case%bands == 'third') + 1
+         call write_files(outcome%directory, [ &
+            text_file_type('force.csv', get_force_csv(history)), &
+            text_file_type('levels.csv', get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), &
+            criteria, trim(case%level_force))), &
+            text_file_type('summary.nml', get_summary(case, history, criteria)), &
+            text_file_type('effective.nml', input)], error)
+      end if
+      if (allocated(error)) error%message = path//': '//error%message
+   end subroutine run_case
+
+   !> Reads a case from a namelist file.
+   subroutine load_case(path, case, error)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> The case.
+      type(case_type), intent(out) :: case
+      !> Names file, group, key, value and allowed range.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: text
+
+      call read_text_file(path, text, error)
+      if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error)
+      if (allocated(error)) error%message = path//': '//error%message
+   end subroutine load_case
+
+   !> Force history of a case. A new source model is one line here.
+   subroutine solve_case(case, history, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its force history.
+      type(force_history_type), intent(out) :: history
+      !> The model failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      select case (case%model)
+      case ('hollow_sphere')
+         call solve_hollow_sphere(case%ball, case%drop, case%hollow_sphere, case%sampling, history, error)
+      case default
+         error = input_error('&model: name = '//trim(case%model)//' has no solver')
+      end select
+   end subroutine solve_case
+
+   !> Levels and criteria of a force history.
+   subroutine judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its force history.
+      type(force_history_type), intent(in) :: history
+      !> The bands, octaves first: [n_band].
+      type(band_type), allocatable, intent(out) :: bands(:)
+      !> Levels of the elastic force, dB: [n_band].
+      real(wp), allocatable, intent(out) :: elastic_level(:)
+      !> Levels of the force on the floor, dB: [n_band].
+      real(wp), allocatable, intent(out) :: floor_level(:)
+      !> The criteria: [n_criterion].
+      type(criterion_type), intent(out) :: criteria(:)
+      !> A level cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(source_limits_type) :: limits
+      real(wp), allocatable :: force(:)
+
+      bands = get_octaves()
+      if (case%bands /= 'octave') bands = [get_octaves(), get_thirds()]
+      allocate (elastic_level(size(bands)), floor_level(size(bands)))
+      call get_force_exposure_levels(history%elastic_force, history%sample_rate, bands, trim(case%level_method), &
+         elastic_level, error)
+      if (allocated(error)) return
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, bands, trim(case%level_method), &
+         floor_level, error)
+      if (allocated(error)) return
+      call get_source_limits(case%source, limits, error)
+      if (allocated(error)) return
+      if (case%level_force == 'elastic') then
+         force = history%elastic_force
+         criteria = get_criteria(limits, elastic_level(:octave_count), history%contact_time, history%restitution, &
+            get_peak_count(force), case%ball%mass, case%drop%height)
+      else
+         force = history%floor_force
+         criteria = get_criteria(limits, floor_level(:octave_count), history%contact_time, history%restitution, &
+            get_peak_count(force), case%ball%mass, case%drop%height)
+      end if
+   end subroutine judge_case
+
+end module thud_run

@@ -1,0 +1,182 @@
+!> What the standards ask of heavy/soft impact sources, and the verdict on a force history
+!> (JIS A 1418-2:2019 tables A.1 and A.2, ISO 10140-5:2021 table F.1, ISO 16283-2:2020 table A.1).
+module thud_source_limits
+   use thud_band, only: octave_count
+   use thud_error, only: error_type, input_error
+   use thud_kinds, only: wp
+   use thud_text, only: join_quoted, quoted
+   implicit none (type, external)
+   private
+
+   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits
+   public :: criterion_count, source_limits_type, source_names
+
+   !> Heavy/soft impact sources with limits in the standards.
+   character(len=24), parameter :: source_names(2) = [character(len=24) :: 'rubber_ball', 'tyre']
+
+   !> Criteria of a verdict: five octaves, contact time, restitution, peaks, mass, drop height.
+   integer, parameter :: criterion_count = octave_count + 5
+
+   !> A peak counts where the force falls by more than this part of its maximum on both sides.
+   !> The standards ask for a single peak without defining one; ripples of a few percent do not
+   !> make a second impact.
+   real(wp), parameter :: peak_prominence = 0.1_wp
+
+   !> Smallest and largest conforming values of one source.
+   type :: source_limits_type
+      !> Smallest force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      real(wp) :: lower_level(octave_count)
+      !> Largest force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      real(wp) :: upper_level(octave_count)
+      !> Contact time, s.
+      real(wp) :: contact_time(2) = [18.0e-3_wp, 22.0e-3_wp]
+      !> Coefficient of restitution.
+      real(wp) :: restitution(2) = [0.7_wp, 0.9_wp]
+      !> Mass, kg.
+      real(wp) :: mass(2)
+      !> Height of drop, m.
+      real(wp) :: drop_height(2)
+   end type source_limits_type
+
+   !> Rubber ball, impact force characteristic (2): 39 +- 1, 31 +- 1.5, 23 +- 1.5, 17 +- 2,
+   !> 12.5 +- 2 dB.
+   type(source_limits_type), parameter :: rubber_ball = source_limits_type( &
+      lower_level=[38.0_wp, 29.5_wp, 21.5_wp, 15.0_wp, 10.5_wp], &
+      upper_level=[40.0_wp, 32.5_wp, 24.5_wp, 19.0_wp, 14.5_wp], &
+      mass=[2.4_wp, 2.6_wp], drop_height=[0.99_wp, 1.01_wp])
+
+   !> Tyre ("bang machine"), characteristic (1): 47 +- 1, 40 +- 1.5, 22 +- 1.5, 11.5 +- 2,
+   !> 5.5 +- 2 dB. Its drop height comes without a tolerance; the ball's 1 cm is used.
+   type(source_limits_type), parameter :: tyre = source_limits_type( &
+      lower_level=[46.0_wp, 38.5_wp, 20.5_wp, 9.5_wp, 3.5_wp], &
+      upper_level=[48.0_wp, 41.5_wp, 23.5_wp, 13.5_wp, 7.5_wp], &
+      mass=[7.1_wp, 7.5_wp], drop_height=[0.84_wp, 0.86_wp])
+
+   !> One quantity, the range that it must lie in, and whether it does.
+   type :: criterion_type
+      !> Name of the quantity.
+      character(len=24) :: name = ''
+      !> SI unit or dB; empty for pure numbers.
+      character(len=8) :: unit = ''
+      !> Value of the source under test.
+      real(wp) :: value = 0.0_wp
+      !> Smallest conforming value.
+      real(wp) :: lower = 0.0_wp
+      !> Largest conforming value.
+      real(wp) :: upper = 0.0_wp
+   end type criterion_type
+
+contains
+
+   !> Limits of a source.
+   subroutine get_source_limits(source, limits, error)
+      !> One of `source_names`.
+      character(len=*), intent(in) :: source
+      !> Its limits.
+      type(source_limits_type), intent(out) :: limits
+      !> The source is not known.
+      type(error_type), allocatable, intent(out) :: error
+
+      select case (source)
+      case ('rubber_ball')
+         limits = rubber_ball
+      case ('tyre')
+         limits = tyre
+      case default
+         error = input_error('the source '//quoted(source)//' is not known; allowed: '//join_quoted(source_names))
+      end select
+   end subroutine get_source_limits
+
+   !> All criteria for a source, in a fixed order.
+   pure function get_criteria(limits, levels, contact_time, restitution, peak_count, mass, drop_height) &
+      result(criteria)
+      !> Limits of the standards.
+      type(source_limits_type), intent(in) :: limits
+      !> Force exposure levels of the octaves 31.5 to 500 Hz, dB: [5].
+      real(wp), intent(in) :: levels(:)
+      !> Contact time, s.
+      real(wp), intent(in) :: contact_time
+      !> Coefficient of restitution.
+      real(wp), intent(in) :: restitution
+      !> Peaks of the force.
+      integer, intent(in) :: peak_count
+      !> Mass of the source, kg.
+      real(wp), intent(in) :: mass
+      !> Height of drop, m.
+      real(wp), intent(in) :: drop_height
+      !> The criteria: [10].
+      type(criterion_type) :: criteria(criterion_count)
+      character(len=24), parameter :: level_names(octave_count) = [character(len=24) :: &
+         'octave_31_5', 'octave_63', 'octave_125', 'octave_250', 'octave_500']
+      integer :: i
+
+      associate (n => octave_count)
+         criteria(:n) = [(criterion_type(level_names(i), 'dB', levels(i), limits%lower_level(i), &
+            limits%upper_level(i)), i=1, n)]
+         criteria(n + 1) = between('contact_time', 's', contact_time, limits%contact_time)
+         criteria(n + 2) = between('restitution', '', restitution, limits%restitution)
+         criteria(n + 3) = between('peak_count', '', real(peak_count, wp), [1.0_wp, 1.0_wp])
+         criteria(n + 4) = between('mass', 'kg', mass, limits%mass)
+         criteria(n + 5) = between('drop_height', 'm', drop_height, limits%drop_height)
+      end associate
+   end function get_criteria
+
+   !> Criterion of a value within a range.
+   pure function between(name, unit, value, range) result(criterion)
+      !> Name of the quantity.
+      character(len=*), intent(in) :: name
+      !> Its unit.
+      character(len=*), intent(in) :: unit
+      !> Value of the source under test.
+      real(wp), intent(in) :: value
+      !> Smallest and largest conforming value: [2].
+      real(wp), intent(in) :: range(2)
+      !> The criterion.
+      type(criterion_type) :: criterion
+
+      criterion = criterion_type(name, unit, value, range(1), range(2))
+   end function between
+
+   !> Whether a criterion is met; a value that is not a number never conforms.
+   elemental function conforms(criterion) result(met)
+      !> The criterion.
+      type(criterion_type), intent(in) :: criterion
+      !> The value lies in the range, its ends included.
+      logical :: met
+
+      met = criterion%value >= criterion%lower .and. criterion%value <= criterion%upper
+   end function conforms
+
+   !> Number of peaks of a force: maxima with a drop on both sides, see `peak_prominence`.
+   pure function get_peak_count(force) result(peak_count)
+      !> Force, N, that starts and ends at zero: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Peaks.
+      integer :: peak_count
+      real(wp) :: extreme, threshold
+      logical :: rising
+      integer :: i
+
+      peak_count = 0
+      threshold = peak_prominence*maxval(force)
+      extreme = 0.0_wp
+      rising = .true.
+      do i = 1, size(force)
+         if (rising) then
+            extreme = max(extreme, force(i))
+            if (extreme - force(i) > threshold) then
+               peak_count = peak_count + 1
+               extreme = force(i)
+               rising = .false.
+            end if
+         else
+            extreme = min(extreme, force(i))
+            if (force(i) - extreme > threshold) then
+               extreme = force(i)
+               rising = .true.
+            end if
+         end if
+      end do
+   end function get_peak_count
+
+end module thud_source_limits

@@ -1,0 +1,70 @@
+!> The ball: geometry, mass, material and the gas in it.
+module thud_ball
+   use thud_constants, only: pi
+   use thud_field, only: field_type, real_field
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: ball_type, get_ball_fields, get_density
+
+   !> A hollow ball; the default is the paper's rubber ball (section 2.3).
+   type :: ball_type
+      !> Outer radius R, m.
+      real(wp) :: outer_radius = 0.089_wp
+      !> Wall thickness h, m.
+      real(wp) :: wall_thickness = 0.032_wp
+      !> Mass M, kg.
+      real(wp) :: mass = 2.5_wp
+      !> Modulus of elasticity E, Pa.
+      real(wp) :: youngs_modulus = 1.6e6_wp
+      !> Poisson's ratio.
+      real(wp) :: poisson_ratio = 0.5_wp
+      !> Overpressure of the gas in the undeformed ball, Pa; 0 for a ball with a hole.
+      real(wp) :: gauge_pressure = 0.0_wp
+      !> Pressure of the air around the ball, Pa.
+      real(wp) :: ambient_pressure = 101325.0_wp
+      !> Ratio of specific heats of the enclosed gas.
+      real(wp) :: heat_capacity_ratio = 1.4_wp
+   end type ball_type
+
+contains
+
+   !> Keys, units and allowed ranges of the group `&ball`.
+   function get_ball_fields(ball) result(fields)
+      !> The ball that the fields read and set.
+      type(ball_type), intent(in), target :: ball
+      !> One field per component: [8].
+      type(field_type) :: fields(8)
+      character(len=*), parameter :: group = 'ball'
+
+      fields = [ &
+         real_field(group, 'outer_radius', ball%outer_radius, 'm', 'outer radius', &
+         0.0_wp, 10.0_wp, lower_open=.true.), &
+         real_field(group, 'wall_thickness', ball%wall_thickness, 'm', 'wall thickness, less than the outer radius', &
+         0.0_wp, ball%outer_radius, lower_open=.true., upper_open=.true.), &
+         real_field(group, 'mass', ball%mass, 'kg', 'mass', &
+         0.0_wp, 1.0e6_wp, lower_open=.true.), &
+         real_field(group, 'youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
+         0.0_wp, 1.0e13_wp, lower_open=.true.), &
+         real_field(group, 'poisson_ratio', ball%poisson_ratio, '', 'Poisson''s ratio', &
+         -1.0_wp, 0.5_wp, lower_open=.true.), &
+         real_field(group, 'gauge_pressure', ball%gauge_pressure, 'Pa', &
+         'overpressure of the gas in the undeformed ball', 0.0_wp, 1.0e8_wp), &
+         real_field(group, 'ambient_pressure', ball%ambient_pressure, 'Pa', &
+         'pressure of the air around the ball', 0.0_wp, 1.0e8_wp), &
+         real_field(group, 'heat_capacity_ratio', ball%heat_capacity_ratio, '', &
+         'ratio of specific heats of the enclosed gas', 1.0_wp, 2.0_wp)]
+   end function get_ball_fields
+
+   !> Density of the wall, kg/m3.
+   pure function get_density(ball) result(density)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Mass over the volume of the wall, kg/m3.
+      real(wp) :: density
+
+      density = ball%mass/(4.0_wp/3.0_wp*pi*(ball%outer_radius**3 - (ball%outer_radius - ball%wall_thickness)**3))
+   end function get_density
+
+end module thud_ball

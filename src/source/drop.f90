@@ -1,0 +1,45 @@
+!> The drop: from what height, in what gravity.
+module thud_drop
+   use thud_field, only: field_type, real_field
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: drop_type, get_drop_fields, get_impact_velocity
+
+   !> A free fall onto the floor; the default is the standards' drop.
+   type :: drop_type
+      !> Height of the ball's lowest point over the floor, m.
+      real(wp) :: height = 1.0_wp
+      !> Acceleration of free fall, m/s2.
+      real(wp) :: gravity = 9.81_wp
+   end type drop_type
+
+contains
+
+   !> Keys, units and allowed ranges of the group `&drop`.
+   function get_drop_fields(drop) result(fields)
+      !> The drop that the fields read and set.
+      type(drop_type), intent(in), target :: drop
+      !> One field per component: [2].
+      type(field_type) :: fields(2)
+      character(len=*), parameter :: group = 'drop'
+
+      fields = [ &
+         real_field(group, 'height', drop%height, 'm', 'height of the ball''s lowest point over the floor', &
+         0.0_wp, 1.0e6_wp, lower_open=.true.), &
+         real_field(group, 'gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
+         0.0_wp, 1.0e3_wp, lower_open=.true.)]
+   end function get_drop_fields
+
+   !> Velocity at first touch, m/s (paper eq. 4).
+   pure function get_impact_velocity(drop) result(velocity)
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Velocity towards the floor, m/s.
+      real(wp) :: velocity
+
+      velocity = sqrt(2.0_wp*drop%gravity*drop%height)
+   end function get_impact_velocity
+
+end module thud_drop

@@ -1,0 +1,70 @@
+!> The answer of every source model: the force on a rigid floor, sampled from first touch on.
+!> Levels, verdicts and files know this type only, never the model behind it.
+module thud_force_history
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: force_history_type, new_force_history, part_name_length
+
+   !> Length of the name of a part of the force.
+   integer, parameter :: part_name_length = 24
+
+   !> Force of one impact and the numbers that describe it.
+   type :: force_history_type
+      !> Samples per second, Hz; sample i belongs to the time (i - 1)/sample_rate after first touch.
+      real(wp) :: sample_rate = 0.0_wp
+      !> Deflection of the source, m: [n_sample].
+      real(wp), allocatable :: deflection(:)
+      !> Rate of the deflection, m/s: [n_sample].
+      real(wp), allocatable :: velocity(:)
+      !> Names of the parts that the model can tell apart: [n_part].
+      character(len=part_name_length), allocatable :: part_name(:)
+      !> Parts of the force, N: [n_sample, n_part].
+      real(wp), allocatable :: part(:, :)
+      !> Force without flux of momentum, the paper's ball force, N: [n_sample].
+      real(wp), allocatable :: elastic_force(:)
+      !> Whole force on the floor, N: [n_sample].
+      real(wp), allocatable :: floor_force(:)
+      !> Velocity towards the floor at first touch, m/s.
+      real(wp) :: impact_velocity = 0.0_wp
+      !> Time from first touch to release, s.
+      real(wp) :: contact_time = 0.0_wp
+      !> Largest elastic force, N.
+      real(wp) :: peak_force = 0.0_wp
+      !> Largest force on the floor, N.
+      real(wp) :: peak_floor_force = 0.0_wp
+      !> Largest deflection, m.
+      real(wp) :: max_deflection = 0.0_wp
+      !> Velocity at release over velocity at first touch.
+      real(wp) :: restitution = 0.0_wp
+      !> Time integral of the force on the floor, N s.
+      real(wp) :: impulse = 0.0_wp
+      !> |impulse - change of momentum| over the change of momentum.
+      real(wp) :: impulse_residual = 0.0_wp
+      !> |energy at release + loss - energy at first touch| over the latter.
+      real(wp) :: energy_residual = 0.0_wp
+   end type force_history_type
+
+contains
+
+   !> A history of zero force.
+   pure function new_force_history(sample_rate, n_sample, part_name) result(history)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> Number of samples.
+      integer, intent(in) :: n_sample
+      !> Names of the parts of the force: [n_part].
+      character(len=*), intent(in) :: part_name(:)
+      !> The history, all arrays allocated and zero.
+      type(force_history_type) :: history
+
+      history%sample_rate = sample_rate
+      allocate (history%part_name(size(part_name)))
+      history%part_name = part_name
+      allocate (history%deflection(n_sample), history%velocity(n_sample), history%elastic_force(n_sample), &
+         history%floor_force(n_sample), source=0.0_wp)
+      allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
+   end function new_force_history
+
+end module thud_force_history

@@ -1,0 +1,160 @@
+!> Classical fourth-order Runge-Kutta steps for any system of ordinary differential equations,
+!> and the location of events inside a step.
+module thud_rk4
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: locate_zero, longest_valid, ode_type, rk4_step
+
+   !> A first-order system of ordinary differential equations.
+   type, abstract :: ode_type
+   contains
+      procedure(derivative_interface), deferred :: get_derivative
+   end type ode_type
+
+   abstract interface
+      !> Right-hand side of the system.
+      pure subroutine derivative_interface(self, time, state, rate, valid)
+         import :: ode_type, wp
+         implicit none (type, external)
+         !> The system.
+         class(ode_type), intent(in) :: self
+         !> Independent variable.
+         real(wp), intent(in) :: time
+         !> State: [n_state].
+         real(wp), intent(in) :: state(:)
+         !> Its derivative: [n_state].
+         real(wp), intent(out) :: rate(:)
+         !> False where the state has left the domain of the equations.
+         logical, intent(out) :: valid
+      end subroutine derivative_interface
+   end interface
+
+contains
+
+   !> One step; also for part of a step, which makes it its own dense output: the result as a
+   !> function of `step` follows the solution with a local error of order step**5.
+   pure subroutine rk4_step(ode, time, state, step, new_state, valid)
+      !> The system.
+      class(ode_type), intent(in) :: ode
+      !> Time at the beginning of the step.
+      real(wp), intent(in) :: time
+      !> State at the beginning: [n_state].
+      real(wp), intent(in) :: state(:)
+      !> Length of the step.
+      real(wp), intent(in) :: step
+      !> State at the end: [n_state]; that of the beginning where the step is not valid.
+      real(wp), intent(out) :: new_state(:)
+      !> False where a stage has left the domain of the equations.
+      logical, intent(out) :: valid
+      real(wp), dimension(size(state)) :: k1, k2, k3, k4
+
+      new_state = state
+      call ode%get_derivative(time, state, k1, valid)
+      if (.not. valid) return
+      call ode%get_derivative(time + step/2, state + step/2*k1, k2, valid)
+      if (.not. valid) return
+      call ode%get_derivative(time + step/2, state + step/2*k2, k3, valid)
+      if (.not. valid) return
+      call ode%get_derivative(time + step, state + step*k3, k4, valid)
+      if (.not. valid) return
+      new_state = state + step/6*(k1 + 2*(k2 + k3) + k4)
+   end subroutine rk4_step
+
+   !> Length of the step at whose end one component of the state falls to zero, to rounding.
+   !>
+   !> The component is positive at (or just after) the beginning and not positive after the full
+   !> step. Root of the dense output by the Illinois form of regula falsi, safeguarded by
+   !> bisection.
+   pure function locate_zero(ode, time, state, step, component) result(length)
+      !> The system.
+      class(ode_type), intent(in) :: ode
+      !> Time at the beginning of the step.
+      real(wp), intent(in) :: time
+      !> State at the beginning: [n_state].
+      real(wp), intent(in) :: state(:)
+      !> Length of the full step.
+      real(wp), intent(in) :: step
+      !> Component that becomes zero.
+      integer, intent(in) :: component
+      !> Length of the step that ends at the zero.
+      real(wp) :: length
+      integer, parameter :: most_iterations = 200
+      real(wp) :: left, right, left_value, right_value, value
+      logical :: left_moved_last, right_moved_last
+      integer :: iteration
+
+      left = 0.0_wp
+      left_value = state(component)
+      right = step
+      right_value = component_after(step)
+      left_moved_last = .false.
+      right_moved_last = .false.
+      do iteration = 1, most_iterations
+         if (right - left <= 2*spacing(right)) exit
+         length = right - right_value*(right - left)/(right_value - left_value)
+         if (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
+         value = component_after(length)
+         ! An end that stays twice has its value halved, or regula falsi would creep.
+         if (value > 0.0_wp) then
+            left = length
+            left_value = value
+            if (left_moved_last) right_value = right_value/2
+         else
+            right = length
+            right_value = value
+            if (right_moved_last) left_value = left_value/2
+         end if
+         left_moved_last = value > 0.0_wp
+         right_moved_last = .not. left_moved_last
+      end do
+      length = right
+
+   contains
+
+      !> The component after part of the step.
+      pure function component_after(part) result(component_value)
+         !> Length of the part.
+         real(wp), intent(in) :: part
+         !> Value of the component.
+         real(wp) :: component_value
+         real(wp) :: new_state(size(state))
+         logical :: valid
+
+         call rk4_step(ode, time, state, part, new_state, valid)
+         component_value = new_state(component)
+      end function component_after
+
+   end function locate_zero
+
+   !> Longest step that stays in the domain of the equations, to rounding, by bisection.
+   pure function longest_valid(ode, time, state, step) result(length)
+      !> The system.
+      class(ode_type), intent(in) :: ode
+      !> Time at the beginning of the step.
+      real(wp), intent(in) :: time
+      !> State at the beginning, inside the domain: [n_state].
+      real(wp), intent(in) :: state(:)
+      !> Length of a step that leaves the domain.
+      real(wp), intent(in) :: step
+      !> Length of the longest step that does not.
+      real(wp) :: length
+      real(wp) :: middle, outside, new_state(size(state))
+      logical :: valid
+
+      length = 0.0_wp
+      outside = step
+      do
+         middle = (length + outside)/2
+         if (.not. (middle > length .and. middle < outside)) exit
+         call rk4_step(ode, time, state, middle, new_state, valid)
+         if (valid) then
+            length = middle
+         else
+            outside = middle
+         end if
+      end do
+   end function longest_valid
+
+end module thud_rk4

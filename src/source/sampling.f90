@@ -1,0 +1,75 @@
+!> How a force is sampled in time: rate, length of the record, steps per sample.
+module thud_sampling
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, integer_field, real_field
+   use thud_kinds, only: wp
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: check_sampling, get_sample_count, get_sampling_fields, sampling_type
+
+   !> Samples of one record; more would fill the memory and no drop needs them.
+   real(wp), parameter :: most_samples = 5.0e6_wp
+
+   !> Integration steps of one record; more would run for minutes.
+   real(wp), parameter :: most_steps = 1.0e8_wp
+
+   !> The sampled record; the default rate is the paper's.
+   type :: sampling_type
+      !> Samples per second, Hz.
+      real(wp) :: sample_rate = 44100.0_wp
+      !> Length of the record from first touch, s.
+      real(wp) :: duration = 0.05_wp
+      !> Integration steps per sampling interval.
+      integer :: substeps = 1
+   end type sampling_type
+
+contains
+
+   !> Keys, units and allowed ranges of the group `&sampling`.
+   function get_sampling_fields(sampling) result(fields)
+      !> The sampling that the fields read and set.
+      type(sampling_type), intent(in), target :: sampling
+      !> One field per component: [3].
+      type(field_type) :: fields(3)
+      character(len=*), parameter :: group = 'sampling'
+
+      fields = [ &
+         real_field(group, 'sample_rate', sampling%sample_rate, 'Hz', 'samples per second', 2000.0_wp, 1.0e7_wp), &
+         real_field(group, 'duration', sampling%duration, 's', 'length of the record from first touch', &
+         1.0e-3_wp, 10.0_wp), &
+         integer_field(group, 'substeps', sampling%substeps, 'integration steps per sampling interval', 1, 10000)]
+   end function get_sampling_fields
+
+   !> Complains about a record with too many samples or steps.
+   subroutine check_sampling(sampling, error)
+      !> The sampling, each value of it inside its own range.
+      type(sampling_type), intent(in) :: sampling
+      !> Names the keys, their product and the allowed range.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: samples
+
+      samples = sampling%duration*sampling%sample_rate
+      if (samples > most_samples) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s at sample_rate = ' &
+            //to_text(sampling%sample_rate)//' Hz makes '//to_text(samples)//' samples; allowed: up to ' &
+            //to_text(most_samples))
+      else if (samples*real(sampling%substeps, wp) > most_steps) then
+         error = input_error('&sampling: substeps = '//to_text(sampling%substeps)//' with '//to_text(samples) &
+            //' samples makes '//to_text(samples*real(sampling%substeps, wp))//' steps; allowed: up to ' &
+            //to_text(most_steps))
+      end if
+   end subroutine check_sampling
+
+   !> Number of samples of the record.
+   pure function get_sample_count(sampling) result(n_sample)
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> Samples from first touch on, the first one included.
+      integer :: n_sample
+
+      n_sample = int(sampling%duration*sampling%sample_rate)
+   end function get_sample_count
+
+end module thud_sampling
