@@ -1,0 +1,173 @@
+"""The command ``thud-driver``: cases with figures, and the figures of the paper."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+import thud
+from thud._library import call, door, text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.figure import Figure
+
+NOT_CONFORMING = 3
+INTERRUPTED = 130
+FORMATS = (".png", ".svg")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments
+        Words of the command line; by default those of this process.
+
+    Returns
+    -------
+    int
+        0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming,
+        130 interrupted.
+    """
+    parser = _parser()
+    try:
+        options = parser.parse_args(arguments)
+    except SystemExit as stop:
+        # argparse leaves with 2 for bad usage, which is a numerical failure here.
+        return thud.InputError.exit_code if stop.code else 0
+    try:
+        return int(options.command(options))
+    except KeyboardInterrupt:
+        print("thud-driver: interrupted; what was finished is kept", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return thud.InputError.exit_code
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(
+        prog="thud-driver",
+        description="Cases with figures, and the figures of the paper.",
+        epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
+        "3 not conforming (run --check), 130 interrupted.",
+    )
+    parser.add_argument("--version", action="version", version=f"thud {thud.__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    run = commands.add_parser("run", help="run cases, write their results and figures")
+    run.set_defaults(command=_run)
+    run.add_argument("cases", nargs="+", metavar="CASE.nml", help="namelist files")
+    run.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        help="directory for the results; one below it for each of several cases "
+        "(default: outputs/<case name>)",
+    )
+    run.add_argument("--check", action="store_true", help="exit with 3 where a source fails")
+    run.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors")
+    run.add_argument("--no-figures", action="store_true", help="results only")
+
+    figures = commands.add_parser("figures", help="draw figures 2 and 3 of the paper")
+    figures.set_defaults(command=_figures)
+    figures.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        type=Path,
+        default=Path("outputs/figures"),
+        help="directory for the figures (default: outputs/figures)",
+    )
+    figures.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors")
+    return parser
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Run the cases of the command line; a bad one does not keep the others from running."""
+    worst = 0
+    for path in tqdm(options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet):
+        try:
+            conforms = _run_case(path, options)
+        except (thud.ThudError, OSError) as error:
+            tqdm.write(f"thud-driver: {_sentence(error)}", file=sys.stderr)
+            failure = getattr(error, "exit_code", thud.InputError.exit_code)
+            worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
+        else:
+            if options.check and not conforms and worst == 0:
+                worst = NOT_CONFORMING
+    return worst
+
+
+def _run_case(path: str, options: argparse.Namespace) -> bool:
+    """Run one case as the executable does, then draw it; return whether it conforms."""
+    output = options.output or ""
+    if output and len(options.cases) > 1:
+        output = os.path.join(output, thud.read_case(path).name)  # noqa: PTH118 - may be ""
+    directory, table, conforming = call(door.run, os.fsencode(path), os.fsencode(output))
+    folder = Path(os.fsdecode(directory.rstrip()))
+    if not options.no_figures:
+        impact = thud.solve_case(thud.read_case(path))
+        name = impact.case.name.replace("_", " ")
+        source = impact.case.limits.source
+        _draw(
+            folder,
+            {
+                "force": lambda: thud.plot.force_history({name: impact}, force=None),
+                "levels": lambda: thud.plot.levels({name: impact}, source=source),
+            },
+        )
+    if not options.quiet:
+        tqdm.write(f"{text(table)}\n  Results: {folder}\n")
+    return bool(conforming)
+
+
+def _figures(options: argparse.Namespace) -> int:
+    """Draw the figures of the paper."""
+    heights = {f"{height:.2f} m": height for height in (0.1, 1.0, 1.6)}
+    choices = ("momentum_balance", "retarding", "conservative", "none")
+    try:
+        options.output.mkdir(parents=True, exist_ok=True)
+        _draw(
+            options.output,
+            {
+                "figure2_force_history": lambda: thud.plot.force_history(
+                    {name: thud.solve(drop=thud.Drop(height)) for name, height in heights.items()}
+                ),
+                "figure3_levels": lambda: thud.plot.levels({"hollow sphere": thud.solve()}),
+                "momentum_flux": lambda: thud.plot.levels(
+                    {choice: thud.solve(momentum_flux=choice) for choice in choices}, "elastic"
+                ),
+            },
+            quiet=options.quiet,
+        )
+    except OSError as error:
+        print(f"thud-driver: {_sentence(error)}", file=sys.stderr)
+        return thud.InputError.exit_code
+    if not options.quiet:
+        print(f"Figures: {options.output}")
+    return 0
+
+
+def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:
+    """Draw figures and save them as PNG and SVG."""
+    for name, draw in tqdm(figures.items(), unit="figure", disable=quiet, leave=False):
+        figure = draw()
+        for ending in FORMATS:
+            thud.plot.save(figure, folder / f"{name}{ending}")
+
+
+def _sentence(error: Exception) -> str:
+    """Return an error as one sentence."""
+    if isinstance(error, OSError):
+        return f"{error.filename}: {error.strerror}; allowed: a place that you may write to"
+    return str(error)

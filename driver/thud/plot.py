@@ -1,0 +1,158 @@
+"""Figures: force against time and levels against the standards' limits (paper, figures 2 and 3).
+
+Every function returns a matplotlib figure as wide as a column of a journal page.
+"""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from thud.case import replace_file
+from thud.impact import FORCES
+from thud.levels import get_bands, judge
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+
+    from thud.impact import Impact
+
+# Okabe and Ito's colours, told apart with any colour vision; line styles tell them apart in print.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
+MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+WIDTH = 3.5
+SIZE = 8
+
+
+def _axes(height: float) -> tuple[Figure, Axes]:
+    """Return an empty figure of column width and its axes."""
+    figure = Figure(figsize=(WIDTH, height), dpi=300, layout="constrained")
+    axes = figure.add_subplot()
+    axes.tick_params(labelsize=SIZE)
+    axes.grid(visible=True, linewidth=0.4, alpha=0.5)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    return figure, axes
+
+
+def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") -> Figure:
+    """Draw forces against time (paper, figure 2).
+
+    Parameters
+    ----------
+    impacts
+        Impacts by their names in the legend.
+    force
+        ``"elastic"`` (the paper's ball force), ``"floor"``, or None for both.
+
+    Returns
+    -------
+    Figure
+        Time in ms, force in kN.
+    """
+    figure, axes = _axes(2.5)
+    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
+        axes.plot(1e3 * impact.time, 1e-3 * impact.force(kind), label=name, **_style(i))
+    axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
+    axes.set_ylabel("Blocked force, kN", fontsize=SIZE)
+    axes.legend(fontsize=SIZE, frameon=False)
+    return figure
+
+
+def levels(
+    impacts: Mapping[str, Impact],
+    force: str | None = None,
+    source: str = "rubber_ball",
+    method: str | None = None,
+) -> Figure:
+    """Draw octave levels over the tolerance band of the standards (paper, figure 3).
+
+    Parameters
+    ----------
+    impacts
+        Impacts by their names in the legend.
+    force
+        ``"elastic"`` (the paper's ball force), ``"floor"``, or None for both.
+    source
+        ``"rubber_ball"`` or ``"tyre"``: whose tolerance band is drawn.
+    method
+        ``"exact"`` or ``"fft"``; by default that of each case.
+
+    Returns
+    -------
+    Figure
+        Octave bands in Hz, force exposure level in dB re 1 N.
+    """
+    figure, axes = _axes(2.8)
+    _draw_tolerance(axes, source)
+    place = np.arange(5)
+    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
+        values = impact.levels(method=method, force=kind)
+        marker = MARKERS[i % len(MARKERS)]
+        axes.plot(place, values, label=name, marker=marker, markersize=4, **_style(i))
+    axes.set_xticks(place, [f"{frequency:g}" for frequency in get_bands().nominal])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlim(-0.6, 4.6)
+    axes.set_xlabel("Octave band, Hz", fontsize=SIZE)
+    axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
+    axes.legend(fontsize=SIZE, frameon=False)
+    return figure
+
+
+def _curves(impacts: Mapping[str, Impact], force: str | None) -> Iterator[tuple[str, Impact, str]]:
+    """Yield name, impact and kind of force of each curve."""
+    for name, impact in impacts.items():
+        for kind in [force] if force else FORCES:
+            yield (name if force else f"{name}, {kind} force"), impact, kind
+
+
+def _style(i: int) -> dict[str, Any]:
+    """Return colour and line style of a curve."""
+    return {
+        "color": COLOURS[i % len(COLOURS)],
+        "linestyle": LINES[i % len(LINES)],
+        "linewidth": 1.2,
+    }
+
+
+def _draw_tolerance(axes: Axes, source: str) -> None:
+    """Draw the range of each octave as a grey box with its nominal value."""
+    octaves = judge(np.zeros(5), 0.0, 0.0, 0, 0.0, 0.0, source).criteria[:5]
+    for place, octave in enumerate(octaves):
+        axes.fill_between(
+            [place - 0.4, place + 0.4],
+            octave.lower,
+            octave.upper,
+            color="0.82",
+            linewidth=0,
+            label=f"Tolerance, {source.replace('_', ' ')}" if place == 0 else None,
+        )
+        nominal = (octave.lower + octave.upper) / 2
+        axes.plot([place - 0.4, place + 0.4], [nominal, nominal], color="0.45", linewidth=0.8)
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Save a figure in the format of the path's ending, completely or not at all.
+
+    Parameters
+    ----------
+    figure
+        The figure.
+    path
+        Path of the file; an older one is replaced.
+    """
+    content = io.BytesIO()
+    metadata = {"Date": None} if path.suffix == ".svg" else {}
+    figure.savefig(content, format=path.suffix[1:], metadata=metadata)
+    replace_file(path, content.getvalue())
