@@ -8,11 +8,13 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Any
 
+import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from thud.case import replace_file
+from thud.errors import InputError
 from thud.impact import FORCES
 from thud.levels import get_bands, judge
 
@@ -113,8 +115,12 @@ def levels(
 def _curves(impacts: Mapping[str, Impact], force: str | None) -> Iterator[tuple[str, Impact, str]]:
     """Yield name, impact and kind of force of each curve."""
     for name, impact in impacts.items():
-        for kind in [force] if force else FORCES:
-            yield (name if force else f"{name}, {kind} force"), impact, kind
+        if force:
+            yield name, impact, force
+        else:
+            prefix = f"{name}, " if len(impacts) > 1 else ""
+            for kind in FORCES:
+                yield f"{prefix}{kind} force", impact, kind
 
 
 def _style(i: int) -> dict[str, Any]:
@@ -151,8 +157,22 @@ def save(figure: Figure, path: Path) -> None:
         The figure.
     path
         Path of the file; an older one is replaced.
+
+    Raises
+    ------
+    InputError
+        Where the ending names no format that matplotlib writes.
+    OSError
+        Where the file cannot be written.
     """
+    known = figure.canvas.get_supported_filetypes()
+    kind = path.suffix[1:].lower()
+    if kind not in known:
+        message = f"{path}: ending {kind!r} is not known; allowed: {', '.join(sorted(known))}"
+        raise InputError(message)
     content = io.BytesIO()
-    metadata = {"Date": None} if path.suffix == ".svg" else {}
-    figure.savefig(content, format=path.suffix[1:], metadata=metadata)
+    # Without a date and with names that do not change, the same figure gives the same bytes.
+    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    with matplotlib.rc_context({"svg.hashsalt": "thud"}):
+        figure.savefig(content, format=kind, metadata=metadata)
     replace_file(path, content.getvalue())

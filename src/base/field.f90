@@ -193,6 +193,7 @@ contains
       class(field_type), intent(in) :: self
       !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: text
       real(wp) :: value
       logical :: inside
 
@@ -209,7 +210,9 @@ contains
          inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
             .and. (value < self%upper .or. (.not. self%upper_open .and. value <= self%upper))
       end if
-      if (.not. inside) error = self%complain(self%get_text(), 'is not allowed')
+      if (inside) return
+      call self%get_text(text)
+      error = self%complain(text, 'is not allowed')
    end subroutine check
 
    !> Error that names group, key, value and allowed range.
@@ -222,17 +225,19 @@ contains
       character(len=*), intent(in) :: what
       !> The error.
       type(error_type) :: error
+      character(len=:), allocatable :: allowed
 
+      call self%get_allowed(allowed)
       error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//value//' '//what &
-         //'; allowed: '//self%get_allowed())
+         //'; allowed: '//allowed)
    end function complain
 
    !> The value as it stands in a namelist.
-   function get_text(self) result(text)
+   subroutine get_text(self, text)
       !> The field.
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       if (associated(self%real_value)) then
          text = to_text(self%real_value)
@@ -241,38 +246,37 @@ contains
       else
          text = quoted(self%text_value)
       end if
-   end function get_text
+   end subroutine get_text
 
    !> The allowed range in words: `0 < outer_radius <= 10 m`.
-   function get_allowed(self) result(text)
+   subroutine get_allowed(self, text)
       !> The field.
       class(field_type), intent(in) :: self
       !> The range with its unit, or the list of allowed words.
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       if (allocated(self%choices)) then
          text = join_quoted(self%choices)
       else if (associated(self%text_value)) then
          text = 'text in quotes, up to '//to_text(name_length)//' characters'
       else
-         text = bound(self%lower)//trim(merge(' < ', ' <=', self%lower_open))//' '//trim(self%key)// &
-            ' '//trim(merge('< ', '<=', self%upper_open))//' '//bound(self%upper)
+         text = to_text(self%lower)
+         call drop_idle_decimal(text)
+         text = text//' '//trim(merge('< ', '<=', self%lower_open))//' '//trim(self%key)//' ' &
+            //trim(merge('< ', '<=', self%upper_open))//' '//to_text(self%upper)
+         call drop_idle_decimal(text)
          if (self%unit /= '') text = text//' '//trim(self%unit)
          if (associated(self%integer_value)) text = text//', whole'
       end if
-   end function get_allowed
+   end subroutine get_allowed
 
-   !> A bound as short text: whole numbers without a point.
-   pure function bound(value) result(text)
-      !> The bound.
-      real(wp), intent(in) :: value
-      !> Its text.
-      character(len=:), allocatable :: text
+   !> Takes `.0` from the end of a text.
+   pure subroutine drop_idle_decimal(text)
+      !> A text that ends with a number.
+      character(len=:), allocatable, intent(inout) :: text
 
-      text = to_text(value)
-      if (len(text) > 2) then
-         if (text(len(text) - 1:) == '.0') text = text(:len(text) - 2)
-      end if
-   end function bound
+      if (len(text) < 3) return
+      if (text(len(text) - 1:) == '.0') text = text(:len(text) - 2)
+   end subroutine drop_idle_decimal
 
 end module thud_field

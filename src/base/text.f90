@@ -1,14 +1,20 @@
 !> Numbers as text and small helpers on character strings.
+!>
+!> The lengths of results are stated, not deferred: gfortran keeps the length of a deferred-length
+!> result in static memory, which threads would share.
 module thud_text
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: fixed, join_quoted, lower_case, newline, quoted, replaced, to_text
+   public :: fixed, join_quoted, lower_case, newline, quoted, to_text
 
    !> Line feed, the line end of every file that thud writes.
    character(len=*), parameter :: newline = new_line('a')
+
+   !> Room for any number.
+   integer, parameter :: number_length = 40
 
    !> Shortest text that reads back as the same value.
    interface to_text
@@ -24,11 +30,9 @@ contains
       !> The number.
       integer, intent(in) :: value
       !> Its digits.
-      character(len=:), allocatable :: text
-      character(len=16) :: buffer
+      character(len=len_trim(format_integer(value))) :: text
 
-      write (buffer, '(i0)') value
-      text = trim(buffer)
+      text = format_integer(value)
    end function integer_to_text
 
    !> Logical as a namelist holds it.
@@ -36,9 +40,9 @@ contains
       !> The truth value.
       logical, intent(in) :: value
       !> `.true.` or `.false.`.
-      character(len=:), allocatable :: text
+      character(len=merge(6, 7, value)) :: text
 
-      text = trim(merge('.true. ', '.false.', value))
+      text = merge('.true. ', '.false.', value)
    end function logical_to_text
 
    !> Shortest decimal text that reads back as exactly the same number.
@@ -46,33 +50,81 @@ contains
       !> The number.
       real(wp), intent(in) :: value
       !> Decimal notation from 1e-4 to 1e7, else with an exponent.
-      character(len=:), allocatable :: text
-      character(len=32) :: buffer, form
+      character(len=len_trim(format_real(value))) :: text
+
+      text = format_real(value)
+   end function real_to_text
+
+   !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
+   pure function fixed(value, decimals) result(text)
+      !> The number.
+      real(wp), intent(in) :: value
+      !> Digits behind the point.
+      integer, intent(in) :: decimals
+      !> The rounded number, with a leading zero.
+      character(len=len_trim(format_fixed(value, decimals))) :: text
+
+      text = format_fixed(value, decimals)
+   end function fixed
+
+   !> Integer with blanks behind it.
+   pure function format_integer(value) result(buffer)
+      !> The number.
+      integer, intent(in) :: value
+      !> Its digits.
+      character(len=number_length) :: buffer
+
+      write (buffer, '(i0)') value
+   end function format_integer
+
+   !> Number with a fixed count of decimals and blanks behind it.
+   pure function format_fixed(value, decimals) result(buffer)
+      !> The number.
+      real(wp), intent(in) :: value
+      !> Digits behind the point.
+      integer, intent(in) :: decimals
+      !> The rounded number.
+      character(len=number_length) :: buffer
+      character(len=12) :: form
+
+      write (form, '(a,i0,a)') '(f40.', decimals, ')'
+      write (buffer, form) value
+      buffer = adjustl(buffer)
+      if (decimals == 0) buffer(len_trim(buffer):) = ''
+   end function format_fixed
+
+   !> Shortest decimal text of a number with blanks behind it.
+   pure function format_real(value) result(buffer)
+      !> The number.
+      real(wp), intent(in) :: value
+      !> Its text.
+      character(len=number_length) :: buffer
+      character(len=12) :: form
       real(wp) :: read_back
       integer :: digits
 
       if (ieee_is_nan(value)) then
-         text = 'NaN'
+         buffer = 'NaN'
       else if (.not. ieee_is_finite(value)) then
-         text = trim(merge('-Infinity', 'Infinity ', value < 0.0_wp))
+         buffer = merge('-Infinity', 'Infinity ', value < 0.0_wp)
       else
          do digits = 0, 16
-            write (form, '(a,i0,a)') '(es32.', digits, 'e3)'
+            write (form, '(a,i0,a)') '(es40.', digits, 'e3)'
             write (buffer, form) value
             read (buffer, form) read_back
             ! "not different" says what is meant where == on reals is a mistake.
             if (.not. abs(read_back - value) > 0.0_wp) exit
          end do
-         text = tidy_exponent(trim(adjustl(buffer)))
+         buffer = tidy_exponent(adjustl(buffer))
       end if
-   end function real_to_text
+   end function format_real
 
    !> Rewrites `1.25E+001` as `12.5`, and `1.E-010` as `1.0e-10`.
    pure function tidy_exponent(scientific) result(text)
       !> Number in `es` format with three exponent digits.
       character(len=*), intent(in) :: scientific
       !> The same number, readable.
-      character(len=:), allocatable :: text
+      character(len=number_length) :: text
       character(len=:), allocatable :: digits, sign
       integer :: exponent, mark
 
@@ -94,25 +146,9 @@ contains
          text = sign//'0.'//repeat('0', -exponent - 1)//digits
       else
          if (len(digits) == 1) digits = digits//'0'
-         text = sign//digits(1:1)//'.'//digits(2:)//'e'//integer_to_text(exponent)
+         text = sign//digits(1:1)//'.'//digits(2:)//'e'//trim(format_integer(exponent))
       end if
    end function tidy_exponent
-
-   !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
-   pure function fixed(value, decimals) result(text)
-      !> The number.
-      real(wp), intent(in) :: value
-      !> Digits behind the point.
-      integer, intent(in) :: decimals
-      !> The rounded number, with a leading zero.
-      character(len=:), allocatable :: text
-      character(len=40) :: buffer, form
-
-      write (form, '(a,i0,a)') '(f40.', decimals, ')'
-      write (buffer, form) value
-      text = trim(adjustl(buffer))
-      if (decimals == 0) text = text(:len(text) - 1)
-   end function fixed
 
    !> ASCII letters in lower case; everything else unchanged.
    pure function lower_case(text) result(lower)
@@ -133,46 +169,59 @@ contains
       !> Any text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
       !> The text in single quotes.
-      character(len=:), allocatable :: constant
+      character(len=quoted_length(text)) :: constant
+      integer :: i, at
 
-      constant = "'"//replaced(trim(text), "'", "''")//"'"
+      constant = "'"
+      at = 2
+      do i = 1, len_trim(text)
+         constant(at:at) = text(i:i)
+         at = at + 1
+         if (text(i:i) /= "'") cycle
+         constant(at:at) = "'"
+         at = at + 1
+      end do
+      constant(at:) = "'"
    end function quoted
+
+   !> Length of a text as a namelist character constant.
+   pure function quoted_length(text) result(length)
+      !> Any text.
+      character(len=*), intent(in) :: text
+      !> Characters with quotes around and quotes inside doubled.
+      integer :: length
+      integer :: i
+
+      length = len_trim(text) + count([(text(i:i) == "'", i=1, len_trim(text))]) + 2
+   end function quoted_length
 
    !> `'one', 'two', 'three'` from a list of words.
    pure function join_quoted(words) result(text)
       !> The words: [n_word].
       character(len=*), intent(in) :: words(:)
       !> All of them, in quotes, with commas between.
-      character(len=:), allocatable :: text
-      integer :: i
+      character(len=joined_length(words)) :: text
+      integer :: i, at
 
       text = ''
+      at = 1
       do i = 1, size(words)
-         if (i > 1) text = text//', '
-         text = text//quoted(words(i))
+         text(at:) = quoted(words(i))
+         at = at + quoted_length(words(i))
+         if (i < size(words)) text(at:) = ','
+         at = at + 2
       end do
    end function join_quoted
 
-   !> Text with every occurrence of a single character replaced.
-   pure function replaced(text, old, new) result(changed)
-      !> Any text.
-      character(len=*), intent(in) :: text
-      !> Character to be replaced.
-      character(len=1), intent(in) :: old
-      !> What stands in its place.
-      character(len=*), intent(in) :: new
-      !> The text after replacement.
-      character(len=:), allocatable :: changed
+   !> Length of a joined list.
+   pure function joined_length(words) result(length)
+      !> The words: [n_word].
+      character(len=*), intent(in) :: words(:)
+      !> Characters of the words in quotes with commas and blanks between.
+      integer :: length
       integer :: i
 
-      changed = ''
-      do i = 1, len(text)
-         if (text(i:i) == old) then
-            changed = changed//new
-         else
-            changed = changed//text(i:i)
-         end if
-      end do
-   end function replaced
+      length = sum([(quoted_length(words(i)), i=1, size(words))]) + 2*max(size(words) - 1, 0)
+   end function joined_length
 
 end module thud_text

@@ -141,6 +141,7 @@ contains
       type(field_type), intent(in) :: fields(:)
       !> A key is unknown or given twice, or its value has the wrong type.
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: allowed
       integer :: i, j, place
 
       do i = 1, size(group%assignments)
@@ -153,8 +154,9 @@ contains
                error = input_error('&'//group%name//': '//given%key//' is given a second time in line ' &
                   //to_text(given%line)//'; allowed: once')
             else if (given%value == '') then
+               call fields(place)%get_allowed(allowed)
                error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
-                  //' has no value; allowed: '//fields(place)%get_allowed())
+                  //' has no value; allowed: '//allowed)
             else
                call fields(place)%set_from_text(given%value, error)
             end if
@@ -199,6 +201,7 @@ contains
       type(case_type), intent(in), target :: case
       !> Text of the file.
       character(len=:), allocatable :: text
+      character(len=:), allocatable :: value
       type(field_type), allocatable :: fields(:)
       integer :: i
 
@@ -206,7 +209,8 @@ contains
       text = '! thud '//version//': the full input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
          call open_group(fields, i, text)
-         text = text//'   '//fields(i)%key//' = '//fields(i)%get_text()
+         call fields(i)%get_text(value)
+         text = text//'   '//fields(i)%key//' = '//value
          if (fields(i)%unit /= '') text = text//' ! '//trim(fields(i)%unit)
          text = text//newline
          if (closes_group(fields, i)) text = text//'/'//newline
@@ -217,6 +221,7 @@ contains
    function describe_keys() result(text)
       !> The description; a valid input file.
       character(len=:), allocatable :: text
+      character(len=:), allocatable :: allowed, value
       type(case_type), target :: case
       type(field_type), allocatable :: fields(:)
       integer :: i
@@ -226,8 +231,10 @@ contains
       text = '! Every key of an input file with its default value. SI units.'//newline
       do i = 1, size(fields)
          call open_group(fields, i, text)
-         text = text//'   ! '//trim(fields(i)%meaning)//'; allowed: '//fields(i)%get_allowed()//newline &
-            //'   '//trim(fields(i)%key)//' = '//fields(i)%get_text()//newline
+         call fields(i)%get_allowed(allowed)
+         call fields(i)%get_text(value)
+         text = text//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline &
+            //'   '//trim(fields(i)%key)//' = '//value//newline
          if (closes_group(fields, i)) text = text//'/'//newline
       end do
    end function describe_keys

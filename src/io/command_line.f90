@@ -1,9 +1,9 @@
 !> The command line of the executable.
 module thud_command_line
-   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use thud_case, only: describe_keys
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
+   use thud_posix, only: ignore_size_signal, print_text, standard_error, standard_output
    use thud_run, only: outcome_type, run_case
    use thud_text, only: newline, quoted
    implicit none (type, external)
@@ -39,37 +39,38 @@ contains
       type(error_type), allocatable :: error
 
       exit_code = 0
+      call ignore_size_signal()
       call parse_arguments(request, error)
       if (allocated(error)) then
-         call say(error_unit, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)
+         call say(standard_error, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)
          exit_code = bad_input
       else if (allocated(request%information)) then
-         call say(output_unit, request%information, exit_code)
+         call say(standard_output, request%information, exit_code)
       else
          call run_case(request%case_file, request%output, outcome, error)
          if (allocated(error)) then
-            call say(error_unit, 'thud: '//error%message, exit_code)
+            call say(standard_error, 'thud: '//error%message, exit_code)
             exit_code = error%code
             return
          end if
-         if (.not. request%quiet) call say(output_unit, outcome%table//'  Results: '//outcome%directory, exit_code)
+         if (outcome%remark /= '') call say(standard_error, 'thud: '//outcome%remark, exit_code)
+         if (.not. request%quiet) call say(standard_output, outcome%table//'  Results: '//outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming
       end if
    end subroutine execute
 
    !> Writes to the screen; a closed or full output is an error, not a crash.
-   subroutine say(unit, text, exit_code)
-      !> Unit of the output.
-      integer, intent(in) :: unit
+   subroutine say(descriptor, text, exit_code)
+      !> `standard_output` or `standard_error`.
+      integer, intent(in) :: descriptor
       !> The text.
       character(len=*), intent(in) :: text
       !> Becomes 1 where the text could not be written.
       integer, intent(inout) :: exit_code
-      integer :: status
+      logical :: done
 
-      write (unit, '(a)', iostat=status) text
-      if (status == 0) flush (unit, iostat=status)
-      if (status /= 0) exit_code = bad_input
+      call print_text(descriptor, text//newline, done)
+      if (.not. done) exit_code = bad_input
    end subroutine say
 
    !> Turns the arguments into a request.
@@ -153,7 +154,7 @@ contains
          //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR   directory for the results (default: outputs/<case name>)'//newline &
          //'  --check            exit with 3 where the source does not conform to the limits'//newline &
-         //'  -q, --quiet        show nothing but errors'//newline &
+         //'  -q, --quiet        show nothing but errors and remarks'//newline &
          //'  --keys             show every key with default, range and meaning'//newline &
          //'  -h, --help         show this text'//newline &
          //'  --version          show the version'//newline//newline &

@@ -3,7 +3,7 @@ module thud_file
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
    use thud_posix, only: directory_exists, get_process_id, is_empty_directory, make_directory, remove_file, rename_file
-   use thud_text, only: to_text
+   use thud_text, only: newline, to_text
    implicit none (type, external)
    private
 
@@ -76,23 +76,29 @@ contains
    end function get_file_stem
 
    !> Complains where a directory holds anything else than an earlier run of the same case.
-   subroutine check_owner(directory, marker, first_line, error)
+   subroutine check_owner(directory, marker, content, differs, error)
       !> The directory.
       character(len=*), intent(in) :: directory
-      !> Name of the file that tells whose directory it is.
+      !> Name of the file whose first line tells whose directory it is.
       character(len=*), intent(in) :: marker
-      !> First line of that file for this case.
-      character(len=*), intent(in) :: first_line
+      !> What this file will hold.
+      character(len=*), intent(in) :: content
+      !> The directory holds the same case with another content of this file.
+      logical, intent(out) :: differs
       !> The directory belongs to something else.
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: unreadable
       character(len=:), allocatable :: text
 
+      differs = .false.
       if (.not. directory_exists(directory)) return
       if (is_empty_directory(directory)) return
       call read_text_file(directory//'/'//marker, text, unreadable)
       if (.not. allocated(unreadable)) then
-         if (index(text, first_line) == 1) return
+         if (index(text, content(:index(content, newline))) == 1) then
+            differs = text /= content
+            return
+         end if
       end if
       error = input_error('--output '//directory//' holds files of something else; allowed: a new or empty directory, ' &
          //'or results of the same case')

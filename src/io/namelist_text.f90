@@ -103,11 +103,12 @@ contains
             quote = text(i:i)
             structure(i:i) = 'x'
          else if (iachar(text(i:i)) < 32 .and. scan(text(i:i), blanks) == 0) then
-            error = input_error('line '//to_text(line_of(text, i))//' is not plain text')
+            error = input_error('line '//to_text(line_of(text, i))//' holds a control character; allowed: plain text')
             return
          end if
       end do
-      if (quote /= ' ') error = input_error('a quote is not closed in line '//to_text(line_of(text, i - 1)))
+      if (quote /= ' ') error = input_error('a quote is not closed in line '//to_text(line_of(text, i - 1)) &
+         //'; allowed: quotes that begin and end in one line')
    end subroutine separate
 
    !> Name and end of the group that starts at a place.
@@ -165,20 +166,22 @@ contains
       call find_key(place, key_start, key_end, equals)
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
-         error = input_error('&'//group%name//' in line '//to_text(group%line)//': '//quoted_start(clean(start:finish)) &
-            //' is not ''key = value''')
+         call get_value(clean(start:finish), given%value)
+         error = input_error('&'//group%name//' in line '//to_text(group%line)//': ''' &
+            //given%value//''' is not an assignment; allowed: ''key = value''')
          return
       end if
       do while (key_start <= finish)
          given%line = line_of(structure, key_start)
          if (key_end < key_start) then
-            error = input_error('&'//group%name//': an equals sign in line '//to_text(given%line)//' has no key')
+            error = input_error('&'//group%name//': an equals sign in line '//to_text(given%line) &
+               //' has no key; allowed: ''key = value''')
             return
          end if
          given%key = structure(key_start:key_end)
          place = equals + 1
          call find_key(place, next_key, key_end, equals)
-         given%value = trimmed(clean(place:min(next_key, finish + 1) - 1))
+         call get_value(clean(place:min(next_key, finish + 1) - 1), given%value)
          group%assignments = [group%assignments, given]
          key_start = next_key
       end do
@@ -209,31 +212,22 @@ contains
 
    end subroutine split_group
 
-   !> Value without blanks around it and without the comma that may follow.
-   pure function trimmed(text) result(value)
+   !> Value in one line, without blanks around it and without the comma that may follow.
+   pure subroutine get_value(text, value)
       !> Text between an equals sign and the next key.
       character(len=*), intent(in) :: text
       !> The value.
-      character(len=:), allocatable :: value
-      integer :: first, last
+      character(len=:), allocatable, intent(out) :: value
+      integer :: first, last, i
 
       first = verify(text, blanks)
       last = verify(text, blanks//',', back=.true.)
       value = ''
       if (first > 0 .and. last >= first) value = text(first:last)
-   end function trimmed
-
-   !> The first words of a text, in quotes, for messages.
-   pure function quoted_start(text) result(start)
-      !> Any text.
-      character(len=*), intent(in) :: text
-      !> Up to 40 characters of it.
-      character(len=:), allocatable :: start
-      character(len=:), allocatable :: value
-
-      value = trimmed(text)
-      start = ''''//value(:min(len(value), 40))//''''
-   end function quoted_start
+      do i = 1, len(value)
+         if (scan(value(i:i), blanks) > 0) value(i:i) = ' '
+      end do
+   end subroutine get_value
 
    !> Number of the line that a place is in.
    pure function line_of(text, place) result(line)

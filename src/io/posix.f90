@@ -1,10 +1,14 @@
 !> The few calls of the operating system that Fortran lacks (POSIX.1-2008).
 module thud_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_null_char, c_ptr, c_size_t
    implicit none (type, external)
    private
 
-   public :: directory_exists, get_process_id, is_empty_directory, make_directory, remove_file, rename_file
+   public :: directory_exists, get_process_id, ignore_size_signal, is_empty_directory, make_directory, print_text
+   public :: remove_file, rename_file, standard_error, standard_output
+
+   !> Descriptors of the process.
+   integer, parameter :: standard_output = 1, standard_error = 2
 
    interface
       function c_getpid() bind(c, name='getpid') result(process)
@@ -55,9 +59,57 @@ module thud_posix
          type(c_ptr), value :: directory
          integer(c_int) :: status
       end function c_closedir
+
+      function c_write(descriptor, buffer, length) bind(c, name='write') result(written)
+         import :: c_char, c_int, c_intptr_t, c_size_t
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         character(kind=c_char), intent(in) :: buffer(*)
+         integer(c_size_t), value :: length
+         integer(c_intptr_t) :: written
+      end function c_write
+
+      function c_signal(number, handler) bind(c, name='signal') result(old_handler)
+         import :: c_int, c_intptr_t
+         implicit none (type, external)
+         integer(c_int), value :: number
+         integer(c_intptr_t), value :: handler
+         integer(c_intptr_t) :: old_handler
+      end function c_signal
    end interface
 
 contains
+
+   !> Writes to the screen; the run-time library would not tell that it is full or closed.
+   subroutine print_text(descriptor, text, done)
+      !> `standard_output` or `standard_error`.
+      integer, intent(in) :: descriptor
+      !> The text.
+      character(len=*), intent(in) :: text
+      !> All of it was written.
+      logical, intent(out) :: done
+      integer(c_intptr_t) :: written
+      integer :: at
+
+      at = 0
+      done = .true.
+      do while (done .and. at < len(text))
+         written = c_write(int(descriptor, c_int), text(at + 1:), int(len(text) - at, c_size_t))
+         done = written > 0
+         at = at + int(written)
+      end do
+   end subroutine print_text
+
+   !> Makes a file that grows beyond the limit of the process an error of its write and not the
+   !> end of the process.
+   subroutine ignore_size_signal()
+      integer(c_int), parameter :: sigxfsz = 25
+      integer(c_intptr_t), parameter :: ignore = 1
+      integer(c_intptr_t) :: old_handler
+
+      old_handler = c_signal(sigxfsz, ignore)
+      if (old_handler < 0) return
+   end subroutine ignore_size_signal
 
    !> Number of this process, for the names of temporary files.
    function get_process_id() result(process)

@@ -11,7 +11,6 @@ module thud_run
    use thud_report, only: get_force_csv, get_levels_csv, get_summary, get_table
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
-   use thud_text, only: newline, to_text
    implicit none (type, external)
    private
 
@@ -23,6 +22,8 @@ module thud_run
       character(len=:), allocatable :: directory
       !> Table for the screen.
       character(len=:), allocatable :: table
+      !> A remark for the user, empty where there is none.
+      character(len=:), allocatable :: remark
       !> The source conforms to the limits.
       logical :: conforms = .false.
    end type outcome_type
@@ -45,6 +46,7 @@ contains
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: elastic_level(:), floor_level(:)
       character(len=:), allocatable :: input
+      logical :: differs
       integer :: first
 
       call load_case(path, case, error)
@@ -52,7 +54,7 @@ contains
       input = get_case_text(case)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      call check_owner(outcome%directory, 'effective.nml', input(:index(input, newline)), error)
+      call check_owner(outcome%directory, 'effective.nml', input, differs, error)
       if (.not. allocated(error)) call solve_case(case, history, error)
       if (.not. allocated(error)) call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
       if (.not. allocated(error)) then
@@ -66,6 +68,9 @@ contains
             criteria, trim(case%level_force))), &
             text_file_type('summary.nml', get_summary(case, history, criteria)), &
             text_file_type('effective.nml', input)], error)
+         outcome%remark = ''
+         if (differs) outcome%remark = path//': replaces the results of another input of the same name in ' &
+            //outcome%directory
       end if
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
@@ -98,6 +103,7 @@ contains
       case ('hollow_sphere')
          call solve_hollow_sphere(case%ball, case%drop, case%hollow_sphere, case%sampling, history, error)
       case default
+         ! Reading a case has refused all other names.
          error = input_error('&model: name = '//trim(case%model)//' has no solver')
       end select
    end subroutine solve_case

@@ -16,6 +16,9 @@ module thud_force_exposure
    !> `exact`: band energy of the record as it is; `fft`: sum over the 1 Hz bins of a 1 s record.
    character(len=24), parameter :: level_methods(2) = [character(len=24) :: 'exact', 'fft']
 
+   !> Highest sampling rate, Hz: one second of it still fits into memory.
+   real(wp), parameter :: highest_rate = 1.0e7_wp
+
 contains
 
    !> Levels of a record in the given bands.
@@ -64,12 +67,12 @@ contains
       type(band_type), intent(in) :: bands(:)
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: highest
+      real(wp) :: lowest_rate
 
-      highest = maxval(bands%upper)
-      if (.not. ieee_is_finite(sample_rate) .or. .not. sample_rate >= 2*highest) then
+      lowest_rate = 2*maxval(bands%upper)
+      if (.not. (sample_rate >= lowest_rate .and. sample_rate <= highest_rate)) then
          error = input_error('sample_rate = '//to_text(sample_rate)//' Hz is not allowed; allowed: from ' &
-            //to_text(2*highest)//' Hz, twice the highest band edge')
+            //to_text(lowest_rate)//' Hz, twice the highest band edge, to '//to_text(highest_rate)//' Hz')
       else if (size(force) == 0) then
          error = input_error('the force has no samples')
       else if (.not. all(ieee_is_finite(force))) then

@@ -1,7 +1,9 @@
 !> The flat door for Python: plain arguments, explicit shapes, a status and a message.
 !> f2py wraps these procedures and nothing else; they pass on and decide nothing.
 !>
-!> `status` is 0, or the code of the error whose sentence is in `message`.
+!> `status` is 0, or the code of the error whose sentence is in `message`. Procedures marked
+!> `threadsafe` let other Python threads run meanwhile; those that make long texts are not, see
+!> `thud_text`.
 module thud_door
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count, third_count
    use thud_case, only: case_type, describe_keys, get_case_text, read_case
@@ -32,7 +34,6 @@ contains
 
    !> The commented list of all keys.
    subroutine keys(text)
-      !f2py threadsafe
       !> A namelist file.
       character(len=16384), intent(out) :: text
 
@@ -41,7 +42,6 @@ contains
 
    !> The full input of a namelist file.
    subroutine effective_case(path, text, status, message)
-      !f2py threadsafe
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> The case with every key.
@@ -270,8 +270,7 @@ contains
    end subroutine judge
 
    !> Runs a namelist file as the executable does.
-   subroutine run(path, output, directory, table, conforming, status, message)
-      !f2py threadsafe
+   subroutine run(path, output, directory, table, remark, conforming, status, message)
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> Output directory, empty for the default.
@@ -280,6 +279,8 @@ contains
       character(len=4096), intent(out) :: directory
       !> Table for the screen.
       character(len=8192), intent(out) :: table
+      !> A remark for the user, or blanks.
+      character(len=4096), intent(out) :: remark
       !> 1 where the source conforms to the limits, else 0.
       integer, intent(out) :: conforming
       !> Code of the error, or 0.
@@ -291,12 +292,14 @@ contains
 
       directory = ''
       table = ''
+      remark = ''
       conforming = 0
       call run_case(path, output, outcome, error)
       call tell(error, status, message)
       if (status /= 0) return
       directory = outcome%directory
       table = outcome%table
+      remark = outcome%remark
       conforming = merge(1, 0, outcome%conforms)
    end subroutine run
 

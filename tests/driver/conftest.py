@@ -1,0 +1,57 @@
+"""Fixtures: the executable, the inputs of the repository, a case file to be varied."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sysconfig
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+REPOSITORY = Path(__file__).parents[2]
+INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
+MINIMAL = "&ball /\n&drop /\n&model /\n"
+
+
+@pytest.fixture(scope="session")
+def executable() -> str:
+    """Path of the Fortran executable that was installed with the package."""
+    path = Path(sysconfig.get_path("scripts")) / "thud"
+    assert path.exists(), f"{path} is missing: run ./bootstrap setup"
+    return str(path)
+
+
+@pytest.fixture
+def run(executable: str, tmp_path: Path) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run the executable in an empty directory."""
+
+    def run_there(*arguments: str | Path, **options: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(  # type: ignore[call-overload, no-any-return]
+            [executable, *map(str, arguments)],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+            env={**os.environ, "LC_ALL": "C"},
+            **options,
+        )
+
+    return run_there
+
+
+@pytest.fixture
+def case_file(tmp_path: Path) -> Callable[[str], Path]:
+    """Write a case file."""
+
+    def write(text: str, name: str = "case.nml") -> Path:
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write

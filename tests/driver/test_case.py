@@ -1,0 +1,71 @@
+"""Cases as dataclasses and namelist files."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import INPUTS, MINIMAL
+
+import thud
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+
+def test_defaults_are_those_of_the_library(case_file: Callable[..., Path]) -> None:
+    assert thud.read_case(case_file(MINIMAL)) == thud.Case(name="case")
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
+def test_written_case_reads_back_the_same(path: Path, tmp_path: Path) -> None:
+    case = thud.read_case(path)
+    assert case.name == path.stem
+    thud.write_case(case, tmp_path / "copy.nml")
+    assert thud.read_case(tmp_path / "copy.nml") == case
+
+
+def test_numbers_survive_to_the_last_bit(tmp_path: Path) -> None:
+    case = thud.Case(ball=thud.Ball(mass=2.5 + 2**-50, youngs_modulus=1e6 / 3), name="it's")
+    thud.write_case(case, tmp_path / "case.nml")
+    assert thud.read_case(tmp_path / "case.nml") == case
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    ball = thud.Ball(mass=np.float32(2.5), outer_radius=np.array(0.089))  # type: ignore[arg-type]
+    assert thud.solve(ball).contact_time == thud.solve().contact_time
+
+
+def test_cases_do_not_change() -> None:
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        thud.Ball().mass = 3.0  # type: ignore[misc]
+
+
+def test_invalid_case_is_not_written(tmp_path: Path) -> None:
+    case = thud.Case(ball=thud.Ball(mass=-1.0))
+    with pytest.raises(thud.InputError, match=r"&ball: mass = -1.0 is not allowed"):
+        thud.write_case(case, tmp_path / "case.nml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="nowhere"):
+        thud.write_case(thud.Case(), tmp_path / "nowhere/case.nml")
+
+
+@pytest.mark.parametrize("value", [None, [1.0], 1j, {}, b"2"], ids=repr)
+def test_values_of_other_types_are_refused(value: object) -> None:
+    with pytest.raises(thud.InputError, match=r"&ball: mass = .* allowed"):
+        thud.solve(thud.Ball(mass=value))  # type: ignore[arg-type]
+
+
+def test_errors_of_a_file_name_the_file(case_file: Callable[..., Path]) -> None:
+    path = case_file("&ball mass = 'x' / &drop / &model /")
+    with pytest.raises(thud.InputError) as caught:
+        thud.read_case(path)
+    assert str(caught.value).startswith(f"{path}: &ball: mass = 'x' is not a number; allowed: 0 <")
+    with pytest.raises(thud.InputError, match="no such file"):
+        thud.read_case("nowhere.nml")

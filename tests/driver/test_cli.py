@@ -1,0 +1,141 @@
+"""The command thud-driver."""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from conftest import INPUTS, MINIMAL
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    CaseFile = Callable[..., Path]
+
+
+@pytest.fixture(autouse=True)
+def in_empty_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_run_writes_results_and_figures(
+    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["run", str(case_file(MINIMAL, "ball.nml"))]) == 0
+    assert sorted(path.name for path in (tmp_path / "outputs/ball").iterdir()) == [
+        "effective.nml",
+        "force.csv",
+        "force.png",
+        "force.svg",
+        "levels.csv",
+        "levels.png",
+        "levels.svg",
+        "summary.nml",
+    ]
+    output = capsys.readouterr().out
+    assert re.search(r"31\.5 +38\.53 +38\.70 +38\.0 to 40\.0 +conforms", output)
+    assert "does not conform" in output
+
+
+def test_run_writes_the_same_bytes_again(case_file: CaseFile, tmp_path: Path) -> None:
+    arguments = ["run", "-q", str(case_file(MINIMAL, "ball.nml"))]
+    assert cli.main(arguments) == 0
+    before = {path.name: path.read_bytes() for path in (tmp_path / "outputs/ball").iterdir()}
+    assert cli.main(arguments) == 0
+    after = {path.name: path.read_bytes() for path in (tmp_path / "outputs/ball").iterdir()}
+    assert before == after
+
+
+def test_run_agrees_with_the_executable(
+    run: Callable[..., object], case_file: CaseFile, tmp_path: Path
+) -> None:
+    case = case_file(MINIMAL)
+    assert cli.main(["run", "-q", "--no-figures", "-o", "driver", str(case)]) == 0
+    run(case, "-o", "executable")
+    for path in (tmp_path / "executable").iterdir():
+        assert path.read_bytes() == (tmp_path / "driver" / path.name).read_bytes()
+
+
+def test_several_cases_have_their_own_directories(tmp_path: Path) -> None:
+    paths = list(map(str, INPUTS))
+    assert cli.main(["run", "--no-figures", "-q", "-o", "all", *paths]) == 0
+    assert sorted(path.name for path in (tmp_path / "all").iterdir()) == sorted(
+        path.stem for path in INPUTS
+    )
+
+
+def test_bad_case_does_not_stop_the_others(
+    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = case_file(MINIMAL, "good.nml")
+    bad = case_file("&ball", "bad.nml")
+    assert cli.main(["run", "-q", "--no-figures", str(bad), "nowhere.nml", str(good)]) == 1
+    assert (tmp_path / "outputs/good/summary.nml").exists()
+    errors = capsys.readouterr().err
+    assert f"thud-driver: {bad}: &ball in line 1 is not terminated" in errors
+    assert "nowhere.nml: there is no such file" in errors
+
+
+@pytest.mark.parametrize(
+    ("text", "check", "code"),
+    [
+        (MINIMAL, False, 0),
+        (MINIMAL, True, 3),
+        ("&ball", True, 1),
+        ("&ball / &drop height = 5000 / &model /", True, 2),
+    ],
+)
+def test_exit_codes_are_those_of_the_executable(
+    run: Callable[..., object], case_file: CaseFile, text: str, code: int, *, check: bool
+) -> None:
+    arguments = ["--quiet", *(["--check"] if check else []), str(case_file(text))]
+    assert cli.main(["run", "--no-figures", *arguments]) == code
+    assert run(*arguments).returncode == code  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("arguments", [[], ["dance"], ["run"], ["run", "--what", "x.nml"]])
+def test_bad_usage_is_told(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(arguments) == 1
+    assert "usage: thud-driver" in capsys.readouterr().err
+
+
+def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.strip() == f"thud {thud.__version__}"
+
+
+def test_figures_of_the_paper(tmp_path: Path) -> None:
+    assert cli.main(["figures", "-q", "-o", "drawn"]) == 0
+    assert sorted(path.name for path in (tmp_path / "drawn").iterdir()) == [
+        "figure2_force_history.png",
+        "figure2_force_history.svg",
+        "figure3_levels.png",
+        "figure3_levels.svg",
+        "momentum_flux.png",
+        "momentum_flux.svg",
+    ]
+
+
+def test_figures_that_cannot_be_saved_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert cli.main(["figures", "-q", "-o", "file/drawn"]) == 1
+    assert "allowed: a place that you may write to" in capsys.readouterr().err
+
+
+def test_interruption_is_not_a_traceback(
+    case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["thud.cli"], "call", interrupt)
+    assert cli.main(["run", str(case_file(MINIMAL))]) == 130
+    assert "interrupted" in capsys.readouterr().err

@@ -1,0 +1,114 @@
+"""Impacts: shapes, units, relations between the arrays, errors."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import thud
+
+
+def test_arrays_share_one_clock() -> None:
+    impact = thud.solve(sample_rate=48000.0, duration=0.03)
+    assert impact.time.shape == (1440,)
+    assert impact.time[1] == 1 / 48000
+    for array in (
+        impact.deflection,
+        impact.velocity,
+        impact.shell_force,
+        impact.gas_force,
+        impact.flux_force,
+        impact.elastic_force,
+        impact.floor_force,
+    ):
+        assert array.shape == impact.time.shape
+        assert array.dtype == np.float64
+
+
+def test_forces_add_up() -> None:
+    impact = thud.solve()
+    assert np.allclose(impact.elastic_force, impact.shell_force + impact.gas_force, rtol=1e-15)
+    assert np.allclose(impact.floor_force, impact.elastic_force + impact.flux_force, rtol=1e-15)
+    assert impact.peak_force == pytest.approx(impact.elastic_force.max(), rel=1e-5)
+    assert impact.peak_force >= impact.elastic_force.max()
+
+
+def test_force_is_zero_after_release() -> None:
+    impact = thud.solve()
+    after = impact.time > impact.contact_time
+    assert after.any()
+    assert not impact.floor_force[after].any()
+    assert (impact.floor_force[~after] > 0).all()
+
+
+def test_impulse_changes_the_momentum() -> None:
+    ball = thud.Ball(mass=2.4)
+    impact = thud.solve(ball, thud.Drop(0.5))
+    momentum = ball.mass * impact.impact_velocity * (1 + impact.restitution)
+    assert impact.impulse == pytest.approx(momentum, rel=1e-6)
+
+
+def test_paper_s_ball_does_not_conform() -> None:
+    verdict = thud.solve().conformity()
+    assert not verdict
+    met = {criterion.name: criterion.conforms for criterion in verdict.criteria}
+    assert met == {
+        "octave_31_5": True,
+        "octave_63": True,
+        "octave_125": False,
+        "octave_250": False,
+        "octave_500": False,
+        "contact_time": True,
+        "restitution": True,
+        "peak_count": True,
+        "mass": True,
+        "drop_height": True,
+    }
+
+
+def test_low_drop_is_not_the_standard_s() -> None:
+    verdict = thud.solve(drop=thud.Drop(0.1)).conformity()
+    assert not next(c for c in verdict.criteria if c.name == "drop_height").conforms
+
+
+def test_threads_do_not_disturb_each_other() -> None:
+    heights = np.linspace(0.1, 2.0, 40)
+
+    def levels(height: float) -> list[float]:
+        impact = thud.solve(drop=thud.Drop(float(height)))
+        return [*impact.levels(), *impact.levels("third", "fft", "floor")]
+
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(levels, heights)) == list(map(levels, heights))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"model": "cube"}, r"&model: name = 'cube' is not allowed; allowed: 'hollow_sphere'"),
+        ({"momentum_flux": "some"}, r"&model: momentum_flux = 'some' .* 'momentum_balance'"),
+        ({"sample_rate": 0.0}, r"&sampling: sample_rate = 0.0"),
+        ({"duration": 0.01}, r"&sampling: duration = 0.01 s ends while"),
+        ({"substeps": 0}, r"&sampling: substeps = 0 is not allowed; allowed: 1 <= substeps"),
+        ({"ball": thud.Ball(poisson_ratio=0.7)}, r"&ball: poisson_ratio = 0.7"),
+        ({"drop": thud.Drop(height=-1.0)}, r"&drop: height = -1.0"),
+    ],
+    ids=str,
+)
+def test_bad_arguments_are_told(arguments: dict[str, object], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.solve(**arguments)  # type: ignore[arg-type]
+
+
+def test_numerical_failures_are_told() -> None:
+    with pytest.raises(thud.NumericalError, match=r"&drop: height = 1000.0 m closes the shell"):
+        thud.solve(drop=thud.Drop(1000.0))
+    with pytest.raises(thud.NumericalError, match=r"&sampling: substeps is too low"):
+        thud.solve(thud.Ball(youngs_modulus=7e10))
+
+
+def test_unknown_force_is_told() -> None:
+    with pytest.raises(thud.InputError, match="'elastic', 'floor'"):
+        thud.solve().levels(force="total")

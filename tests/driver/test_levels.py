@@ -1,0 +1,77 @@
+"""Levels of any record, and verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import thud
+
+PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
+
+
+def test_bands_are_complete_and_adjacent() -> None:
+    octaves, thirds = thud.get_bands(), thud.get_bands("third")
+    assert octaves.nominal.tolist() == [31.5, 63, 125, 250, 500]
+    assert len(thirds.nominal) == 15
+    np.testing.assert_allclose(thirds.upper[:-1], thirds.lower[1:], rtol=1e-14)
+    np.testing.assert_allclose(octaves.centre, np.sqrt(octaves.lower * octaves.upper), rtol=1e-14)
+
+
+def test_anything_like_an_array_is_a_record() -> None:
+    expected = thud.force_exposure_levels(PULSE, 44100)
+    assert expected.shape == (5,)
+    assert (thud.force_exposure_levels(PULSE.tolist(), 44100.0) == expected).all()
+    assert (thud.force_exposure_levels(np.repeat(PULSE, 2)[::2], 44100) == expected).all()
+    integers = np.round(1000 * PULSE).astype(np.int16)
+    np.testing.assert_allclose(
+        thud.force_exposure_levels(integers, 44100) - 60, expected, atol=0.05
+    )
+
+
+@pytest.mark.parametrize(
+    ("record", "options", "words"),
+    [
+        ([], {}, "no samples"),
+        ([0.0, 0.0], {}, "zero throughout"),
+        ([1.0, np.nan], {}, "not finite, first at sample 2"),
+        ([1.0, np.inf], {}, "not finite"),
+        ([[1.0]], {}, "2 dimensions"),
+        (1.0, {}, "0 dimensions"),
+        ([1j, 2j], {}, "real numbers"),
+        (["a"], {}, "not an array of numbers"),
+        (None, {}, "force"),
+        ([1e200], {}, "too large"),
+        (PULSE, {"sample_rate": 1000.0}, "sample_rate = 1000.0 Hz is not allowed"),
+        (PULSE, {"sample_rate": np.nan}, "sample_rate = NaN"),
+        (PULSE, {"sample_rate": "fast"}, "sample_rate = 'fast' is not a number"),
+        (PULSE, {"bands": "fifth"}, "bands = 'fifth' is not known; allowed: 'octave', 'third'"),
+        (PULSE, {"method": "guess"}, "'guess' is not known; allowed: 'exact', 'fft'"),
+    ],
+    ids=str,
+)
+@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
+def test_useless_records_are_told(record: object, options: dict[str, object], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.force_exposure_levels(record, **{"sample_rate": 44100.0, **options})  # type: ignore[arg-type]
+
+
+def test_silence_between_bands_has_the_level_of_rounding() -> None:
+    # A slow, smooth pulse: nothing but rounding is left at 500 Hz, yet the level is a number.
+    slow = np.hanning(44101) ** 4
+    levels = thud.force_exposure_levels(slow, 44100)
+    total = 10 * np.log10(np.sum(slow**2) / 44100)
+    assert np.isfinite(levels).all()
+    assert levels[-1] < total - 140
+
+
+def test_verdict_needs_five_levels() -> None:
+    with pytest.raises(thud.InputError, match=r"shape \(4,\)"):
+        thud.judge([1, 2, 3, 4], 0.02, 0.8, 1, 2.5, 1.0)
+    with pytest.raises(thud.InputError, match="'rubber_ball', 'tyre'"):
+        thud.judge([1, 2, 3, 4, 5], 0.02, 0.8, 1, 2.5, 1.0, source="hammer")
+
+
+def test_nominal_tyre_conforms() -> None:
+    assert thud.judge([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
+    assert not thud.judge([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
