@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from thud import _core  # type: ignore[attr-defined]
+from thud import _core
 from thud.errors import InputError, NumericalError
 
 if TYPE_CHECKING:

@@ -263,4 +263,4 @@ def with_values(case: Case, **groups: dict[str, object]) -> Case:
         group: dataclasses.replace(getattr(case, group), **values)
         for group, values in groups.items()
     }
-    return dataclasses.replace(case, **changed)  # type: ignore[arg-type]
+    return dataclasses.replace(case, **changed)

@@ -75,7 +75,9 @@ def _parser() -> argparse.ArgumentParser:
         "(default: outputs/<case name>)",
     )
     run.add_argument("--check", action="store_true", help="exit with 3 where a source fails")
-    run.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors and remarks")
+    run.add_argument(
+        "-q", "--quiet", action="store_true", help="show nothing but errors and remarks"
+    )
     run.add_argument("--no-figures", action="store_true", help="results only")
 
     figures = commands.add_parser("figures", help="draw figures 2 and 3 of the paper")
@@ -88,7 +90,9 @@ def _parser() -> argparse.ArgumentParser:
         default=Path("outputs/figures"),
         help="directory for the figures (default: outputs/figures)",
     )
-    figures.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors and remarks")
+    figures.add_argument(
+        "-q", "--quiet", action="store_true", help="show nothing but errors and remarks"
+    )
     return parser
 
 
@@ -113,9 +117,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, thud.read_case(path).name)  # noqa: PTH118 - may be ""
-    directory, table, remark, conforming = call(
-        door.run, os.fsencode(path), os.fsencode(output)
-    )
+    directory, table, remark, conforming = call(door.run, os.fsencode(path), os.fsencode(output))
     if text(remark):
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     folder = Path(os.fsdecode(directory.rstrip()))

@@ -154,7 +154,7 @@ def peak_count(force: ArrayLike) -> int:
     return int(door.count_peaks(_record(force)))
 
 
-def judge(  # noqa: PLR0913 - each is one criterion of the standards
+def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     levels: ArrayLike,
     contact_time: float,
     restitution: float,

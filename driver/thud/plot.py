@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Any
 
-import matplotlib
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -173,6 +173,6 @@ def save(figure: Figure, path: Path) -> None:
     content = io.BytesIO()
     # Without a date and with names that do not change, the same figure gives the same bytes.
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with matplotlib.rc_context({"svg.hashsalt": "thud"}):
+    with mpl.rc_context({"svg.hashsalt": "thud"}):
         figure.savefig(content, format=kind, metadata=metadata)
     replace_file(path, content.getvalue())

@@ -177,7 +177,7 @@ contains
       usable = name /= '' .and. name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/') == 0 &
          .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
       if (.not. usable) error = input_error('&case: name = '//quoted(name) &
-         //' is not allowed; allowed: a name for a directory, without ''/'', up to '//to_text(name_length)//' characters')
+         //" is not allowed; allowed: a name for a directory, without '/', up to "//to_text(name_length)//' characters')
    end subroutine check_name
 
    !> Each text once, in order.

@@ -50,8 +50,8 @@ contains
          end if
          inquire (unit=unit, size=bytes)
          if (bytes > largest_input .or. bytes < 1) then
-            error = input_error('the file has '//to_text(real(bytes, kind(1.0d0)))//' bytes; allowed: a namelist file of 1 to ' &
-               //to_text(int(largest_input))//' bytes')
+            error = input_error('the file is '//trim(merge('empty    ', 'too large', bytes < 1)) &
+               //'; allowed: a namelist file of 1 to '//to_text(int(largest_input))//' bytes')
          else
             allocate (character(len=bytes) :: text)
             read (unit, iostat=status, iomsg=message) text
@@ -152,7 +152,7 @@ contains
       character(len=*), intent(in) :: content
       !> It could not be written completely.
       type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message
+      character(len=256) :: message, close_message
       integer :: status, close_status, unit
 
       message = ''
@@ -161,8 +161,11 @@ contains
       if (status == 0) then
          write (unit, iostat=status, iomsg=message) content
          if (status == 0) flush (unit, iostat=status, iomsg=message)
-         close (unit, iostat=close_status)
-         if (status == 0) status = close_status
+         close (unit, iostat=close_status, iomsg=close_message)
+         if (status == 0 .and. close_status /= 0) then
+            status = close_status
+            message = close_message
+         end if
       end if
       if (status /= 0) error = input_error('--output: '//path//' cannot be written ('//trim(message) &
          //'); allowed: a directory that you may write to, with room on its disk')

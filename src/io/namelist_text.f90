@@ -99,7 +99,7 @@ contains
             in_comment = .true.
             clean(i:i) = ' '
             structure(i:i) = ' '
-         else if (text(i:i) == '''' .or. text(i:i) == '"') then
+         else if (text(i:i) == "'" .or. text(i:i) == '"') then
             quote = text(i:i)
             structure(i:i) = 'x'
          else if (iachar(text(i:i)) < 32 .and. scan(text(i:i), blanks) == 0) then
@@ -131,7 +131,7 @@ contains
       length = verify(structure(start + 1:)//' ', name_characters) - 1
       if (structure(start:start) /= '&' .or. length == 0) then
          error = input_error('line '//to_text(group%line)//' stands outside a group; ' &
-            //'allowed: groups ''&name key = value /'' and comments after ''!''')
+            //"allowed: groups '&name key = value /' and comments after '!'")
          return
       end if
       group%name = structure(start + 1:start + length)
@@ -141,7 +141,7 @@ contains
          if (structure(finish:finish) == '&') closed = index(structure(finish:)//' ', '&end') == 1
       end if
       if (.not. closed) error = input_error('&'//group%name//' in line '//to_text(group%line) &
-         //' is not terminated; allowed: a ''/'' at the end of the group')
+         //" is not terminated; allowed: a '/' at the end of the group")
    end subroutine find_group
 
    !> Splits the inside of a group at its equals signs.
@@ -167,15 +167,15 @@ contains
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
          call get_value(clean(start:finish), given%value)
-         error = input_error('&'//group%name//' in line '//to_text(group%line)//': ''' &
-            //given%value//''' is not an assignment; allowed: ''key = value''')
+         error = input_error('&'//group%name//' in line '//to_text(group%line)//": '" &
+            //given%value//"' is not an assignment; allowed: 'key = value'")
          return
       end if
       do while (key_start <= finish)
          given%line = line_of(structure, key_start)
          if (key_end < key_start) then
             error = input_error('&'//group%name//': an equals sign in line '//to_text(given%line) &
-               //' has no key; allowed: ''key = value''')
+               //" has no key; allowed: 'key = value'")
             return
          end if
          given%key = structure(key_start:key_end)

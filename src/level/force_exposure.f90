@@ -35,7 +35,8 @@ contains
       real(wp), intent(out) :: levels(:)
       !> The record or the rate cannot be used, or the method is unknown.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: energy(size(bands)), resolution
+      real(wp) :: energy(size(bands))
+      real(wp) :: resolution
       integer :: first, last
 
       call check_record(force, sample_rate, bands, error)

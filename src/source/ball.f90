@@ -35,7 +35,7 @@ contains
       !> The ball that the fields read and set.
       type(ball_type), intent(in), target :: ball
       !> One field per component: [8].
-      type(field_type) :: fields(8)
+      type(field_type), allocatable :: fields(:)
       character(len=*), parameter :: group = 'ball'
 
       fields = [ &
@@ -47,7 +47,7 @@ contains
          0.0_wp, 1.0e6_wp, lower_open=.true.), &
          real_field(group, 'youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
          0.0_wp, 1.0e13_wp, lower_open=.true.), &
-         real_field(group, 'poisson_ratio', ball%poisson_ratio, '', 'Poisson''s ratio', &
+         real_field(group, 'poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", &
          -1.0_wp, 0.5_wp, lower_open=.true.), &
          real_field(group, 'gauge_pressure', ball%gauge_pressure, 'Pa', &
          'overpressure of the gas in the undeformed ball', 0.0_wp, 1.0e8_wp), &

@@ -26,7 +26,7 @@ contains
       character(len=*), parameter :: group = 'drop'
 
       fields = [ &
-         real_field(group, 'height', drop%height, 'm', 'height of the ball''s lowest point over the floor', &
+         real_field(group, 'height', drop%height, 'm', "height of the ball's lowest point over the floor", &
          0.0_wp, 1.0e6_wp, lower_open=.true.), &
          real_field(group, 'gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
          0.0_wp, 1.0e3_wp, lower_open=.true.)]

@@ -200,7 +200,8 @@ contains
       !> The shell closes, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
       type(shell_type) :: shell
-      real(wp) :: state(n_state), time, step
+      real(wp) :: state(n_state)
+      real(wp) :: time, step
       integer :: choice, i, j, n_sample
       logical :: compressing, released
 
@@ -239,7 +240,8 @@ contains
       subroutine advance(end_time)
          !> Time at the end of the step, s.
          real(wp), intent(in) :: end_time
-         real(wp) :: new_state(n_state), length
+         real(wp) :: new_state(n_state)
+         real(wp) :: length
          logical :: valid
          integer :: component
 

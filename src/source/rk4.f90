@@ -140,7 +140,8 @@ contains
       real(wp), intent(in) :: step
       !> Length of the longest step that does not.
       real(wp) :: length
-      real(wp) :: middle, outside, new_state(size(state))
+      real(wp) :: new_state(size(state))
+      real(wp) :: middle, outside
       logical :: valid
 
       length = 0.0_wp

@@ -55,7 +55,12 @@ def main() -> None:
             uses.append(f"   use {suite.stem}, only: {alias} => {test}")
             calls.append(f"   call run_test('{suite.stem}: {test}', {alias})")
     program = ["program driver", "   use funit, only: finish_tests, run_test", *uses]
-    program += ["   implicit none (type, external)", *calls, "   call finish_tests()", "end program"]
+    program += [
+        "   implicit none (type, external)",
+        *calls,
+        "   call finish_tests()",
+        "end program",
+    ]
     driver.write_text("\n".join(program) + "\n", encoding="utf-8")
 
 

@@ -1,0 +1,157 @@
+"""Benchmarks of thud against named competitors, in one run on one thread.
+
+Every row is the median of several runs of both sides, taken in turn, with their ratio. The
+requirements that the project sets itself stand behind the rows. Run with ./bootstrap bench.
+"""
+
+from __future__ import annotations
+
+import platform
+import statistics
+import subprocess
+import sys
+import sysconfig
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+from scipy.integrate import solve_ivp
+from scipy.signal import ZoomFFT
+
+import thud
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+INPUT = Path(__file__).parents[2] / "inputs/rubber_ball_100cm.nml"
+EXECUTABLE = Path(sysconfig.get_path("scripts")) / "thud"
+RATE = 44100
+
+
+def medians(ours: Callable[[], object], theirs: Callable[[], object], runs: int) -> list[float]:
+    """Return the median times of both, in seconds, run in turn after one run to warm up."""
+    times: list[list[float]] = [[], []]
+    for i in range(runs + 1):
+        for side, function in enumerate((ours, theirs)):
+            start = time.perf_counter()
+            function()
+            if i > 0:
+                times[side].append(time.perf_counter() - start)
+    return [statistics.median(side) for side in times]
+
+
+def scipy_drop() -> tuple[np.ndarray, float]:
+    """Return the elastic force of the standard drop, sampled, and the contact time, by SciPy."""
+    radius, mass, p_a = 0.089, 2.5, 101325.0
+    k = 8 * 1.6e6 * 0.032**2 / (radius * 3)
+
+    def elastic(d: np.ndarray) -> np.ndarray:
+        ratio = 1 - d**2 * (3 * radius - d) / (4 * radius**3)
+        return k * d + p_a * (ratio**-1.4 - 1) * np.pi * d * (2 * radius - d)
+
+    def right_hand_side(_: float, y: np.ndarray) -> tuple[float, float]:
+        d, v = y
+        flux = mass / (2 * radius) * v**2 if v < 0 else 0.0
+        return v, (flux - elastic(d)) / (mass * (1 - d / (2 * radius)))
+
+    def release(_: float, y: np.ndarray) -> float:
+        return float(y[0])
+
+    release.terminal, release.direction = True, -1  # type: ignore[attr-defined]
+    found = solve_ivp(
+        right_hand_side, (0, 0.05), (0, np.sqrt(19.62)), "DOP853", events=release,
+        rtol=1e-9, atol=1e-11, dense_output=True, max_step=1e-3,
+    )  # fmt: skip
+    at = np.arange(0, found.t[-1], 1 / RATE)
+    return elastic(found.sol(at)[0]), float(found.t[-1])
+
+
+def numpy_levels(force: np.ndarray) -> np.ndarray:
+    """Return the octave levels of a record with NumPy: 1 Hz bins of 1 s."""
+    power = np.abs(np.fft.rfft(force, RATE)) ** 2 / RATE**2
+    bands = thud.get_bands()
+    edges = zip(np.ceil(bands.lower).astype(int), bands.upper.astype(int) + 1, strict=True)
+    return np.array([10 * np.log10(2 * power[a:b].sum()) for a, b in edges])
+
+
+def zoom_levels(force: np.ndarray, transforms: list[ZoomFFT]) -> np.ndarray:
+    """Return the octave levels of a record with SciPy's ZoomFFT, 64 lines per band."""
+    bands = thud.get_bands()
+    energy = [
+        2 * np.mean(np.abs(transform(force)) ** 2) / RATE**2 * (upper - lower)
+        for transform, lower, upper in zip(transforms, bands.lower, bands.upper, strict=True)
+    ]
+    return 10 * np.log10(energy)
+
+
+def row(name: str, competitor: str, seconds: list[float], required: str = "") -> None:
+    """Print one comparison."""
+    ours, theirs = seconds
+    print(
+        f"{name:34} {1e3 * ours:9.3f} ms   {competitor:38} {1e3 * theirs:9.3f} ms"
+        f"   ratio {theirs / ours:7.1f}   {required}"
+    )
+
+
+def processor() -> str:
+    """Return the name of the processor."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.split(":")[1].strip() for line in lines if "model name" in line), "unknown")
+
+
+def main() -> None:
+    """Run all benchmarks."""
+    print(f"thud {thud.__version__}, NumPy {np.__version__}, SciPy {scipy.__version__}")
+    print(f"Processor {processor()}, one thread, medians\n")
+
+    force = thud.solve().elastic_force
+    contact = force[: np.flatnonzero(force)[-1] + 1]
+    reference, contact_time = scipy_drop()
+    worst = np.max(np.abs(contact - reference[: len(contact)]))
+    print(f"Equal results: force within {worst:.1e} N of DOP853, contact time within "
+          f"{abs(contact_time - thud.solve().contact_time):.1e} s\n")  # fmt: skip
+
+    with tempfile.TemporaryDirectory() as directory:
+
+        def executable() -> None:
+            command = [EXECUTABLE, INPUT, "--quiet", "--output", f"{directory}/out"]
+            subprocess.run(command, check=True)
+
+        def interpreter() -> None:
+            subprocess.run([sys.executable, "-c", "import numpy, scipy.integrate"], check=True)
+
+        row("thud, whole process", "python, imports of NumPy and SciPy alone",
+            medians(executable, interpreter, 15), "required: below 50 ms")  # fmt: skip
+
+    row("thud.solve", "SciPy solve_ivp, DOP853",
+        medians(thud.solve, scipy_drop, 51), "required: below 2 ms")  # fmt: skip
+    bands = thud.get_bands()
+    transforms = [
+        ZoomFFT(len(contact), [lower, upper], 64, fs=RATE)
+        for lower, upper in zip(bands.lower, bands.upper, strict=True)
+    ]
+    exact = medians(
+        lambda: thud.force_exposure_levels(contact, RATE), lambda: numpy_levels(contact), 101
+    )
+    row("levels, exact, five octaves", "NumPy rfft, 1 s", exact)
+    zoom = medians(
+        lambda: thud.force_exposure_levels(contact, RATE),
+        lambda: zoom_levels(contact, transforms),
+        101,
+    )
+    row("levels, exact, five octaves", "SciPy ZoomFFT, 64 lines per band", zoom)
+    bins = medians(
+        lambda: thud.force_exposure_levels(contact, RATE, method="fft"),
+        lambda: numpy_levels(contact),
+        101,
+    )
+    row("levels, fft, five octaves", "NumPy rfft, 1 s", bins)
+
+
+main()
