@@ -12,7 +12,19 @@ import importlib
 from typing import TYPE_CHECKING
 
 from thud._library import version
-from thud.case import Ball, Case, Drop, Levels, Limits, Model, Sampling, read_case, write_case
+from thud.case import (
+    Ball,
+    Case,
+    Drop,
+    HollowSphere,
+    HuntCrossley,
+    Levels,
+    Limits,
+    MeasuredModes,
+    Sampling,
+    read_case,
+    write_case,
+)
 from thud.errors import InputError, NumericalError, ThudError
 from thud.impact import Impact, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
@@ -29,11 +41,13 @@ __all__ = [
     "Conformity",
     "Criterion",
     "Drop",
+    "HollowSphere",
+    "HuntCrossley",
     "Impact",
     "InputError",
     "Levels",
     "Limits",
-    "Model",
+    "MeasuredModes",
     "NumericalError",
     "Sampling",
     "ThudError",

@@ -6,7 +6,7 @@ import dataclasses
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import f90nml
 import numpy as np
@@ -15,6 +15,7 @@ from thud._library import call, door, text
 from thud.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
     from typing import Self
 
 
@@ -69,19 +70,73 @@ class Drop:
 
 
 @dataclass(frozen=True)
-class Model:
-    """The source model.
+class HollowSphere:
+    """Options of the paper's analytical model.
 
     Attributes
     ----------
-    name : str
-        ``"hollow_sphere"``, the analytical model of the paper.
     momentum_flux : str
         ``"momentum_balance"``, ``"retarding"``, ``"conservative"`` or ``"none"``.
     """
 
-    name: str = "hollow_sphere"
+    name: ClassVar[str] = "hollow_sphere"
     momentum_flux: str = "momentum_balance"
+
+
+@dataclass(frozen=True)
+class MeasuredModes:
+    """Options of the model of measured modes (after Park et al. 2010), one entry per mode.
+
+    Attributes
+    ----------
+    frequency : sequence of float
+        Natural frequencies of the ball on the floor, Hz.
+    damping_ratio : sequence of float
+        Damping ratios.
+    effective_mass : sequence of float
+        Effective masses, kg.
+    allow_mass_mismatch : bool
+        The masses need not add up to that of the ball.
+    """
+
+    name: ClassVar[str] = "measured_modes"
+    frequency: Sequence[float] = ()
+    damping_ratio: Sequence[float] = ()
+    effective_mass: Sequence[float] = ()
+    allow_mass_mismatch: bool = False
+
+
+@dataclass(frozen=True)
+class HuntCrossley:
+    """Options of the lumped source; exactly one of stiffness and contact time is above 0.
+
+    Attributes
+    ----------
+    stiffness : float
+        Stiffness, N/m^exponent; 0: from `contact_time`.
+    contact_time : float
+        Wanted contact time, s; 0: from `stiffness`.
+    exponent : float
+        Exponent of the deflection; 3/2 is Hertz's.
+    damping : float
+        Damping, s/m; 0: from `restitution`.
+    restitution : float
+        Wanted coefficient of restitution; 0: from `damping`.
+    """
+
+    name: ClassVar[str] = "hunt_crossley"
+    stiffness: float = 0.0
+    contact_time: float = 0.0
+    exponent: float = 1.5
+    damping: float = 0.0
+    restitution: float = 0.0
+
+
+ModelOptions = HollowSphere | MeasuredModes | HuntCrossley
+
+MODELS: dict[str, type[ModelOptions]] = {
+    kind.name: kind for kind in (HollowSphere, MeasuredModes, HuntCrossley)
+}
 
 
 @dataclass(frozen=True)
@@ -137,20 +192,22 @@ class Limits:
 
 @dataclass(frozen=True)
 class Case:
-    """Everything that one run needs, one attribute per namelist group.
+    """Everything that one run needs.
 
     Attributes
     ----------
     name : str
         Name of the case, also of its output directory.
-    ball, drop, model, sampling, levels, limits
-        The namelist groups.
+    model : HollowSphere, MeasuredModes or HuntCrossley
+        The source model, by its options.
+    ball, drop, sampling, levels, limits
+        The other namelist groups.
     """
 
     name: str = "python"
     ball: Ball = field(default_factory=Ball)
     drop: Drop = field(default_factory=Drop)
-    model: Model = field(default_factory=Model)
+    model: ModelOptions = field(default_factory=HollowSphere)
     sampling: Sampling = field(default_factory=Sampling)
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
@@ -161,12 +218,16 @@ class Case:
         Raises
         ------
         InputError
-            Where a value is neither a number nor text.
+            Where a value is neither a number nor text, nor a list of numbers where one is due.
         """
-        namelist = f90nml.Namelist({"case": {"name": self.name}})
-        for group in _GROUPS:
-            values = vars(getattr(self, group))
-            namelist[group] = {key: _plain(group, key, value) for key, value in values.items()}
+        groups = {group: getattr(self, group) for group in _GROUPS}
+        groups[self.model.name] = self.model
+        namelist = f90nml.Namelist(
+            {"case": {"name": self.name}, "model": {"name": self.model.name}}
+        )
+        for group, options in groups.items():
+            values = {key: _plain(group, key, value) for key, value in vars(options).items()}
+            namelist[group] = {key: value for key, value in values.items() if value != []}
         return namelist
 
     @classmethod
@@ -175,27 +236,71 @@ class Case:
         groups = {
             group: kind(**namelist[group]) for group, kind in _GROUPS.items() if group in namelist
         }
-        return cls(name=namelist.get("case", {}).get("name", cls.name), **groups)
+        model = namelist.get("model", {}).get("name", HollowSphere.name)
+        options = dict(namelist.get(model, {}))
+        for key, default in MODELS[model]().__dict__.items():
+            if isinstance(default, tuple) and key in options:
+                entries = options[key]
+                options[key] = tuple(entries) if isinstance(entries, list) else (entries,)
+        return cls(
+            name=namelist.get("case", {}).get("name", cls.name),
+            model=MODELS[model](**options),
+            **groups,
+        )
 
 
 _GROUPS: dict[str, type[Any]] = {
     "ball": Ball,
     "drop": Drop,
-    "model": Model,
     "sampling": Sampling,
     "levels": Levels,
     "limits": Limits,
 }
 
 
-def _plain(group: str, key: str, value: object) -> float | str:
+def new_model(name: str, options: dict[str, object]) -> ModelOptions:
+    """Return the options of a model by its name.
+
+    Raises
+    ------
+    InputError
+        Where the model or an option is not known; lists those that are.
+    """
+    if name not in MODELS:
+        message = f"&model: name = {name!r} is not allowed; allowed: {_listed(MODELS)}"
+        raise InputError(message)
+    known = [option.name for option in dataclasses.fields(MODELS[name])]
+    for option in options:
+        if option not in known:
+            message = f"&{name}: {option} is not a known key; allowed: {_listed(known)}"
+            raise InputError(message)
+    return MODELS[name](**options)  # type: ignore[arg-type]
+
+
+def _listed(words: Iterable[str]) -> str:
+    """Return words in quotes with commas between."""
+    return ", ".join(map(repr, words))
+
+
+def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
     """Return a value as f90nml knows it."""
-    if isinstance(value, np.generic) or (isinstance(value, np.ndarray) and value.ndim == 0):
-        value = value.item()
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple) and key in _LISTS:
+        return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
     if not isinstance(value, int | float | str):
         message = f"&{group}: {key} = {value!r} is not allowed; allowed: a number or text"
         raise InputError(message)
     return value
+
+
+# The keys that take lists of numbers.
+_LISTS = {
+    option.name
+    for kind in MODELS.values()
+    for option in dataclasses.fields(kind)
+    if option.default == ()
+}
 
 
 def case_text(case: Case) -> bytes:
@@ -255,12 +360,3 @@ def replace_file(path: Path, content: bytes) -> None:
         part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-def with_values(case: Case, **groups: dict[str, object]) -> Case:
-    """Return a case with some values changed: ``with_values(case, drop={"height": 0.1})``."""
-    changed = {
-        group: dataclasses.replace(getattr(case, group), **values)
-        for group, values in groups.items()
-    }
-    return dataclasses.replace(case, **changed)

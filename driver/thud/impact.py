@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._library import call, door, words
-from thud.case import Ball, Case, Drop, Model, Sampling, case_text
+from thud.case import Ball, Case, Drop, Sampling, case_text, new_model
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
 
@@ -145,15 +145,15 @@ class Impact:
         )
 
 
-def solve(  # noqa: PLR0913 - the keywords are the keys of three namelist groups
+def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     ball: Ball | None = None,
     drop: Drop | None = None,
     model: str = "hollow_sphere",
     *,
-    momentum_flux: str = Model.momentum_flux,
     sample_rate: float = Sampling.sample_rate,
     duration: float = Sampling.duration,
     substeps: int = Sampling.substeps,
+    **options: object,
 ) -> Impact:
     """Drop a ball on a rigid floor.
 
@@ -162,15 +162,17 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of three namelist groups
     ball, drop
         By default the rubber ball of the paper, from 1 m.
     model
-        ``"hollow_sphere"``, the analytical model of the paper.
-    momentum_flux
-        ``"momentum_balance"``, ``"retarding"``, ``"conservative"`` or ``"none"``.
+        ``"hollow_sphere"`` (the analytical model of the paper), ``"measured_modes"`` or
+        ``"hunt_crossley"``.
     sample_rate
         Samples per second, Hz.
     duration
         Length of the record, s; longer than the contact.
     substeps
         Integration steps per sampling interval.
+    **options
+        Options of the model, see `HollowSphere`, `MeasuredModes` and `HuntCrossley`; such as
+        ``momentum_flux="retarding"``.
 
     Returns
     -------
@@ -182,13 +184,13 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of three namelist groups
     InputError
         Names group, key, value and allowed range.
     NumericalError
-        Where the drop closes the shell or the steps are too coarse.
+        Where the drop leads out of the model or the steps are too coarse.
     """
     return solve_case(
         Case(
             ball=ball or Ball(),
             drop=drop or Drop(),
-            model=Model(model, momentum_flux),
+            model=new_model(model, options),
             sampling=Sampling(sample_rate, duration, substeps),
         )
     )

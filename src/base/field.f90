@@ -7,10 +7,24 @@ module thud_field
    implicit none (type, external)
    private
 
-   public :: check_fields, choice_field, field_type, integer_field, name_length, real_field, text_field
+   public :: check_fields, field_type, list_type, name_length
+
+   !> Most entries of a list.
+   integer, parameter :: list_length = 64
+
+   !> A list of numbers of any length up to `list_length`.
+   type :: list_type
+      !> Number of entries.
+      integer :: count = 0
+      !> The entries, the first `count` hold: [list_length].
+      real(wp) :: values(list_length) = 0.0_wp
+   end type list_type
 
    !> Length of text values such as the name of a model or a case.
    integer, parameter :: name_length = 128
+
+   !> What no entry of a list can be.
+   real(wp), parameter :: unset = -huge(1.0_wp)
 
    !> Description of one key and a pointer to the variable behind it.
    type :: field_type
@@ -26,6 +40,10 @@ module thud_field
       real(wp), pointer :: real_value => null()
       !> The integer variable that is described, else null.
       integer, pointer :: integer_value => null()
+      !> The logical variable that is described, else null.
+      logical, pointer :: logical_value => null()
+      !> The list that is described, else null.
+      type(list_type), pointer :: list_value => null()
       !> The text variable that is described, else null.
       character(len=name_length), pointer :: text_value => null()
       !> Lower bound of the allowed range.
@@ -44,95 +62,10 @@ module thud_field
       procedure :: get_text
       procedure :: get_allowed
       procedure, private :: complain
+      procedure, private :: contains => contains_value
    end type field_type
 
 contains
-
-   !> Describes a real key.
-   function real_field(group, key, variable, unit, meaning, lower, upper, lower_open, upper_open) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
-      character(len=*), intent(in) :: key
-      !> The variable behind the key.
-      real(wp), intent(in), target :: variable
-      !> SI unit, empty for a pure number.
-      character(len=*), intent(in) :: unit
-      !> What the value is.
-      character(len=*), intent(in) :: meaning
-      !> Lower bound of the allowed range.
-      real(wp), intent(in) :: lower
-      !> Upper bound of the allowed range.
-      real(wp), intent(in) :: upper
-      !> The lower bound itself is not allowed (default: it is).
-      logical, intent(in), optional :: lower_open
-      !> The upper bound itself is not allowed (default: it is).
-      logical, intent(in), optional :: upper_open
-      !> The description.
-      type(field_type) :: field
-
-      field = field_type(group=group, key=key, unit=unit, meaning=meaning, lower=lower, upper=upper)
-      field%real_value => variable
-      if (present(lower_open)) field%lower_open = lower_open
-      if (present(upper_open)) field%upper_open = upper_open
-   end function real_field
-
-   !> Describes an integer key.
-   function integer_field(group, key, variable, meaning, lower, upper) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
-      character(len=*), intent(in) :: key
-      !> The variable behind the key.
-      integer, intent(in), target :: variable
-      !> What the value is.
-      character(len=*), intent(in) :: meaning
-      !> Smallest allowed value.
-      integer, intent(in) :: lower
-      !> Largest allowed value.
-      integer, intent(in) :: upper
-      !> The description.
-      type(field_type) :: field
-
-      field = field_type(group=group, key=key, meaning=meaning, lower=real(lower, wp), upper=real(upper, wp))
-      field%integer_value => variable
-   end function integer_field
-
-   !> Describes a key with free text.
-   function text_field(group, key, variable, meaning) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
-      character(len=*), intent(in) :: key
-      !> The variable behind the key.
-      character(len=name_length), intent(in), target :: variable
-      !> What the value is.
-      character(len=*), intent(in) :: meaning
-      !> The description.
-      type(field_type) :: field
-
-      field = field_type(group=group, key=key, meaning=meaning)
-      field%text_value => variable
-   end function text_field
-
-   !> Describes a key that takes one of several words.
-   function choice_field(group, key, variable, meaning, choices) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
-      character(len=*), intent(in) :: key
-      !> The variable behind the key.
-      character(len=name_length), intent(in), target :: variable
-      !> What the value is.
-      character(len=*), intent(in) :: meaning
-      !> The allowed words: [n_choice].
-      character(len=*), intent(in) :: choices(:)
-      !> The description.
-      type(field_type) :: field
-
-      field = text_field(group, key, variable, meaning)
-      allocate (field%choices, source=[character(len=24) :: choices])
-   end function choice_field
 
    !> First complaint of a list of fields, if any.
    subroutine check_fields(fields, error)
@@ -160,9 +93,12 @@ contains
       character(len=128) :: message
       character(len=:), allocatable :: line, wanted
       integer :: status, whole
-      real(wp) :: number
+      logical :: flag
+      real(wp) :: number, list(list_length + 1)
       namelist /real_group/ number
+      namelist /list_group/ list
       namelist /integer_group/ whole
+      namelist /logical_group/ flag
       namelist /text_group/ word
 
       ! The run-time library's own namelist reader decides what a value is.
@@ -171,14 +107,26 @@ contains
          line = '&real_group number = '//text//' /'
          read (line, nml=real_group, iostat=status, iomsg=message)
          if (status == 0) self%real_value = number
+      else if (associated(self%list_value)) then
+         wanted = 'a list of up to '//to_text(list_length)//' numbers'
+         line = '&list_group list = '//text//' /'
+         list = unset
+         read (line, nml=list_group, iostat=status, iomsg=message)
+         if (status == 0) call set_list(list, self%list_value, status)
       else if (associated(self%integer_value)) then
          wanted = 'a whole number'
          line = '&integer_group whole = '//text//' /'
          read (line, nml=integer_group, iostat=status, iomsg=message)
          if (status == 0) self%integer_value = whole
+      else if (associated(self%logical_value)) then
+         wanted = '.true. or .false.'
+         line = '&logical_group flag = '//text//' /'
+         read (line, nml=logical_group, iostat=status, iomsg=message)
+         if (status == 0) self%logical_value = flag
       else
          wanted = 'text in quotes'
          line = '&text_group word = '//text//' /'
+         word = ''
          status = merge(0, 1, scan(text(1:1), '''"') == 1 .and. len(text) <= name_length)
          if (status == 0) read (line, nml=text_group, iostat=status, iomsg=message)
          if (status == 0) self%text_value = word
@@ -187,6 +135,24 @@ contains
       if (status /= 0) error = self%complain(text, 'is not '//wanted)
    end subroutine set_from_text
 
+   !> Takes over the entries that were read.
+   subroutine set_list(entries, list, status)
+      !> The entries, those that were not given hold `unset`: [list_length + 1].
+      real(wp), intent(in) :: entries(:)
+      !> The list.
+      type(list_type), intent(inout) :: list
+      !> Not 0 where there are too many entries or gaps between them.
+      integer, intent(out) :: status
+      logical :: given(size(entries))
+
+      ! Asked so that a NaN counts as given; the check of the range refuses it later.
+      given = .not. entries <= unset
+      status = merge(0, 1, all(given(:count(given))) .and. count(given) <= list_length)
+      if (status /= 0) return
+      list%count = count(given)
+      list%values(:list%count) = entries(:list%count)
+   end subroutine set_list
+
    !> Complains about a value outside the allowed range, NaN included.
    subroutine check(self, error)
       !> The field.
@@ -194,26 +160,35 @@ contains
       !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
-      real(wp) :: value
       logical :: inside
 
-      if (associated(self%text_value)) then
-         if (.not. allocated(self%choices)) return
+      inside = .true.
+      if (allocated(self%choices)) then
          inside = any(self%choices == self%text_value)
-      else
-         if (associated(self%real_value)) then
-            value = self%real_value
-         else
-            value = real(self%integer_value, wp)
-         end if
-         ! Asked so that NaN is never inside.
-         inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
-            .and. (value < self%upper .or. (.not. self%upper_open .and. value <= self%upper))
+      else if (associated(self%real_value)) then
+         inside = self%contains(self%real_value)
+      else if (associated(self%list_value)) then
+         inside = all(self%contains(self%list_value%values(:self%list_value%count)))
+      else if (associated(self%integer_value)) then
+         inside = self%contains(real(self%integer_value, wp))
       end if
       if (inside) return
       call self%get_text(text)
       error = self%complain(text, 'is not allowed')
    end subroutine check
+
+   !> Whether a value lies in the allowed range; NaN never does.
+   elemental function contains_value(self, value) result(inside)
+      !> The field.
+      class(field_type), intent(in) :: self
+      !> The value.
+      real(wp), intent(in) :: value
+      !> It lies in the range.
+      logical :: inside
+
+      inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
+         .and. (value < self%upper .or. (.not. self%upper_open .and. value <= self%upper))
+   end function contains_value
 
    !> Error that names group, key, value and allowed range.
    function complain(self, value, what) result(error)
@@ -238,11 +213,20 @@ contains
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
       character(len=:), allocatable, intent(out) :: text
+      integer :: i
 
       if (associated(self%real_value)) then
          text = to_text(self%real_value)
+      else if (associated(self%list_value)) then
+         text = ''
+         do i = 1, self%list_value%count
+            if (i > 1) text = text//', '
+            text = text//to_text(self%list_value%values(i))
+         end do
       else if (associated(self%integer_value)) then
          text = to_text(self%integer_value)
+      else if (associated(self%logical_value)) then
+         text = to_text(self%logical_value)
       else
          text = quoted(self%text_value)
       end if
@@ -259,6 +243,8 @@ contains
          text = join_quoted(self%choices)
       else if (associated(self%text_value)) then
          text = 'text in quotes, up to '//to_text(name_length)//' characters'
+      else if (associated(self%logical_value)) then
+         text = '.true., .false.'
       else
          text = to_text(self%lower)
          call drop_idle_decimal(text)

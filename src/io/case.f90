@@ -4,20 +4,18 @@ module thud_case
    use thud_constants, only: version
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: check_fields, choice_field, field_type, name_length, text_field
+   use thud_field, only: check_fields, field_type, name_length
    use thud_force_exposure, only: level_methods
-   use thud_hollow_sphere, only: get_hollow_sphere_fields, hollow_sphere_type
    use thud_namelist_text, only: group_type, parse_groups
+   use thud_new_field, only: choice_field, text_field
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
+   use thud_source_model, only: check_model, get_model_fields, model_names, model_options_type
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
    public :: case_type, describe_keys, get_case_text, get_fields, read_case
-
-   !> Source models that can be asked for.
-   character(len=24), parameter :: model_names(1) = [character(len=24) :: 'hollow_sphere']
 
    !> Groups that every file must hold.
    character(len=24), parameter :: required_groups(3) = [character(len=24) :: 'ball', 'drop', 'model']
@@ -32,8 +30,8 @@ module thud_case
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
       character(len=name_length) :: model = 'hollow_sphere'
-      !> Options of the model `hollow_sphere`.
-      type(hollow_sphere_type) :: hollow_sphere
+      !> Options of every model; those of the chosen one count.
+      type(model_options_type) :: options
       !> Sampling of the record.
       type(sampling_type) :: sampling
       !> Method of the levels.
@@ -60,7 +58,7 @@ contains
          get_ball_fields(case%ball), &
          get_drop_fields(case%drop), &
          choice_field('model', 'name', case%model, 'source model', model_names), &
-         get_hollow_sphere_fields(case%hollow_sphere), &
+         get_model_fields(case%options), &
          get_sampling_fields(case%sampling), &
          choice_field('levels', 'method', case%level_method, 'method of the levels', level_methods), &
          choice_field('levels', 'bands', case%bands, 'bands of levels.csv', &
@@ -69,6 +67,20 @@ contains
          [character(len=8) :: 'elastic', 'floor']), &
          choice_field('limits', 'source', case%source, 'source whose limits apply', source_names)]
    end function get_fields
+
+   !> The keys without those of the models that are not asked for.
+   function get_active_fields(case) result(fields)
+      !> The case that the fields read and set.
+      type(case_type), intent(in), target :: case
+      !> The keys: [n_field].
+      type(field_type), allocatable :: fields(:)
+      logical, allocatable :: active(:)
+      integer :: i
+
+      allocate (fields, source=get_fields(case))
+      active = [(fields(i)%group == case%model .or. .not. any(model_names == fields(i)%group), i=1, size(fields))]
+      fields = pack(fields, active)
+   end function get_active_fields
 
    !> Case from the text of a namelist file, complete and inside all ranges.
    subroutine read_case(text, default_name, case, error)
@@ -95,12 +107,33 @@ contains
          if (allocated(error)) return
       end do
       ! Anew, because some ranges depend on other values.
-      call check_fields(get_fields(case), error)
+      call check_fields(get_active_fields(case), error)
       if (allocated(error)) return
       call check_sampling(case%sampling, error)
       if (allocated(error)) return
+      call check_options(groups, case, error)
+      if (allocated(error)) return
       call check_name(case%name, error)
    end subroutine read_case
+
+   !> Complains about options of models that are not asked for, and about those that do not fit.
+   subroutine check_options(groups, case, error)
+      !> Groups of the file: [n_group].
+      type(group_type), intent(in) :: groups(:)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 1, size(groups)
+         if (groups(i)%name == case%model .or. .not. any(model_names == groups(i)%name)) cycle
+         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
+            //' does nothing with &model: name = '//quoted(case%model)//'; allowed: &'//trim(case%model))
+         return
+      end do
+      call check_model(case%model, case%options, case%ball, error)
+   end subroutine check_options
 
    !> Complains about groups that are missing, unknown or given twice.
    subroutine check_groups(groups, fields, error)
@@ -205,23 +238,24 @@ contains
       type(field_type), allocatable :: fields(:)
       integer :: i
 
-      allocate (fields, source=get_fields(case))
+      allocate (fields, source=get_active_fields(case))
       text = '! thud '//version//': the full input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
-         call open_group(fields, i, text)
+         if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
          call fields(i)%get_text(value)
          text = text//'   '//fields(i)%key//' = '//value
          if (fields(i)%unit /= '') text = text//' ! '//trim(fields(i)%unit)
          text = text//newline
-         if (closes_group(fields, i)) text = text//'/'//newline
+         if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//'/'//newline
       end do
    end function get_case_text
 
-   !> Every key with its default, allowed range and meaning, as a commented namelist file.
+   !> Every key with its default, allowed range and meaning, as a commented namelist file. Groups
+   !> of models other than the default one stand behind `!`.
    function describe_keys() result(text)
       !> The description; a valid input file.
       character(len=:), allocatable :: text
-      character(len=:), allocatable :: allowed, value
+      character(len=:), allocatable :: allowed, mark, value
       type(case_type), target :: case
       type(field_type), allocatable :: fields(:)
       integer :: i
@@ -230,37 +264,15 @@ contains
       allocate (fields, source=get_fields(case))
       text = '! Every key of an input file with its default value. SI units.'//newline
       do i = 1, size(fields)
-         call open_group(fields, i, text)
+         mark = ''
+         if (any(model_names == fields(i)%group) .and. fields(i)%group /= case%model) mark = '! '
          call fields(i)%get_allowed(allowed)
          call fields(i)%get_text(value)
-         text = text//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline &
-            //'   '//trim(fields(i)%key)//' = '//value//newline
-         if (closes_group(fields, i)) text = text//'/'//newline
+         if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//mark//'&'//trim(fields(i)%group)//newline
+         text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline &
+            //mark//'   '//trim(fields(i)%key)//' = '//value//newline
+         if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
       end do
    end function describe_keys
-
-   !> Adds the opening line where a field is the first of its group.
-   pure subroutine open_group(fields, i, text)
-      !> All fields: [n_field].
-      type(field_type), intent(in) :: fields(:)
-      !> Number of the field.
-      integer, intent(in) :: i
-      !> The text so far.
-      character(len=:), allocatable, intent(inout) :: text
-
-      if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
-   end subroutine open_group
-
-   !> Whether a field is the last of its group.
-   pure function closes_group(fields, i) result(last)
-      !> All fields: [n_field].
-      type(field_type), intent(in) :: fields(:)
-      !> Number of the field.
-      integer, intent(in) :: i
-      !> No later field has the same group.
-      logical :: last
-
-      last = .not. any(fields(i + 1:)%group == fields(i)%group)
-   end function closes_group
 
 end module thud_case

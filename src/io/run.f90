@@ -2,15 +2,15 @@
 module thud_run
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count
    use thud_case, only: case_type, get_case_text, read_case
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type
    use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, write_files
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
-   use thud_hollow_sphere, only: solve_hollow_sphere
    use thud_kinds, only: wp
    use thud_report, only: get_force_csv, get_levels_csv, get_summary, get_table
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
+   use thud_source_model, only: solve_model
    implicit none (type, external)
    private
 
@@ -90,7 +90,7 @@ contains
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine load_case
 
-   !> Force history of a case. A new source model is one line here.
+   !> Force history of a case.
    subroutine solve_case(case, history, error)
       !> The case.
       type(case_type), intent(in) :: case
@@ -99,13 +99,7 @@ contains
       !> The model failed.
       type(error_type), allocatable, intent(out) :: error
 
-      select case (case%model)
-      case ('hollow_sphere')
-         call solve_hollow_sphere(case%ball, case%drop, case%hollow_sphere, case%sampling, history, error)
-      case default
-         ! Reading a case has refused all other names.
-         error = input_error('&model: name = '//trim(case%model)//' has no solver')
-      end select
+      call solve_model(trim(case%model), case%options, case%ball, case%drop, case%sampling, history, error)
    end subroutine solve_case
 
    !> Levels and criteria of a force history.

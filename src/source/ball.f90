@@ -1,8 +1,9 @@
 !> The ball: geometry, mass, material and the gas in it.
 module thud_ball
    use thud_constants, only: pi
-   use thud_field, only: field_type, real_field
+   use thud_field, only: field_type
    use thud_kinds, only: wp
+   use thud_new_field, only: real_field
    implicit none (type, external)
    private
 

@@ -1,7 +1,8 @@
 !> The drop: from what height, in what gravity.
 module thud_drop
-   use thud_field, only: field_type, real_field
+   use thud_field, only: field_type
    use thud_kinds, only: wp
+   use thud_new_field, only: real_field
    implicit none (type, external)
    private
 

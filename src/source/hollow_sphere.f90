@@ -3,13 +3,14 @@
 module thud_hollow_sphere
    use thud_ball, only: ball_type
    use thud_constants, only: pi
-   use thud_drop, only: drop_type, get_impact_velocity
-   use thud_error, only: error_type, input_error, numerical_error
-   use thud_field, only: choice_field, field_type, name_length
-   use thud_force_history, only: force_history_type, new_force_history
+   use thud_drop, only: drop_type
+   use thud_error, only: error_type, numerical_error
+   use thud_field, only: field_type, name_length
+   use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
-   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   use thud_new_field, only: choice_field
+   use thud_sampling, only: sampling_type
    use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
@@ -33,22 +34,12 @@ module thud_hollow_sphere
    !> Factor s of the flux term in restitution, for each choice.
    real(wp), parameter :: restitution_weight(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
-   !> Residual of the balances of impulse and energy above which a result is refused. At the
-   !> default step the residual is about 1e-10.
-   real(wp), parameter :: most_residual = 1.0e-6_wp
-
-   !> Places of the quantities in the state.
-   integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4, n_state = 4
-
-   !> Equation of motion of the shell (paper eq. 3) for one phase of the impact. The state is
-   !> deflection, velocity, impulse given to the floor, and energy lost.
-   type, extends(ode_type) :: shell_type
+   !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
+   type, extends(lumped_type) :: shell_type
       !> Outer radius R, m.
       real(wp) :: radius = 0.0_wp
       !> Deflection at which the flat cap meets the opposite wall and the cavity is closed, m.
       real(wp) :: closing_deflection = 0.0_wp
-      !> Mass M, kg.
-      real(wp) :: mass = 0.0_wp
       !> Stiffness k of the shell, N/m.
       real(wp) :: stiffness = 0.0_wp
       !> Absolute pressure of the gas in the undeformed ball, Pa.
@@ -59,20 +50,25 @@ module thud_hollow_sphere
       real(wp) :: heat_capacity_ratio = 0.0_wp
       !> Factor s of the flux term in this phase.
       real(wp) :: flux_weight = 0.0_wp
+      !> Factor s of the flux term after the turning point.
+      real(wp) :: next_flux_weight = 0.0_wp
    contains
       procedure :: get_derivative
+      procedure :: get_parts
+      procedure :: begin_restitution
+      procedure :: get_failure
    end type shell_type
 
 contains
 
-   !> Keys and allowed values of this model in the group `&model`.
+   !> Keys and allowed values of the group `&hollow_sphere`.
    function get_hollow_sphere_fields(options) result(fields)
       !> The options that the fields read and set.
       type(hollow_sphere_type), intent(in), target :: options
       !> One field per component: [1].
       type(field_type) :: fields(1)
 
-      fields = [choice_field('model', 'momentum_flux', options%momentum_flux, &
+      fields = [choice_field('hollow_sphere', 'momentum_flux', options%momentum_flux, &
          'momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_hollow_sphere_fields
 
@@ -185,6 +181,48 @@ contains
       end associate
    end subroutine get_derivative
 
+   !> Shell, gas and flux force of one instant.
+   pure subroutine get_parts(self, state, parts, elastic_force)
+      !> The shell in its present phase.
+      class(shell_type), intent(in) :: self
+      !> State, see `thud_lumped`: [4].
+      real(wp), intent(in) :: state(:)
+      !> F_B, F_G and the flux of momentum into the floor, N: [3].
+      real(wp), intent(out) :: parts(:)
+      !> F_B + F_G (paper eq. 1), N.
+      real(wp), intent(out) :: elastic_force
+
+      parts = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
+         (1 - self%flux_weight)*self%mass/(2*self%radius)*state(at_velocity)**2]
+      elastic_force = parts(1) + parts(2)
+   end subroutine get_parts
+
+   !> Takes the flux term of the restitution phase.
+   pure subroutine begin_restitution(self)
+      !> The shell.
+      class(shell_type), intent(inout) :: self
+
+      self%flux_weight = self%next_flux_weight
+   end subroutine begin_restitution
+
+   !> Error of a drop that closes the shell.
+   function get_failure(self, drop, time, state) result(error)
+      !> The shell.
+      class(shell_type), intent(in) :: self
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Time since first touch, s.
+      real(wp), intent(in) :: time
+      !> Last valid state: [4].
+      real(wp), intent(in) :: state(:)
+      !> The error.
+      type(error_type) :: error
+
+      error = numerical_error('&drop: height = '//to_text(drop%height)//' m closes the shell: ' &
+         //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*state(at_deflection), 2) &
+         //' mm; allowed: less than the height of the cavity, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
+   end function get_failure
+
    !> Force history of one drop.
    subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error)
       !> The ball.
@@ -200,152 +238,13 @@ contains
       !> The shell closes, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
       type(shell_type) :: shell
-      real(wp) :: state(n_state)
-      real(wp) :: time, step
-      integer :: choice, i, j, n_sample
-      logical :: compressing, released
+      integer :: choice
 
       choice = findloc(flux_choices, options%momentum_flux, dim=1)
-      n_sample = get_sample_count(sampling)
       shell = new_shell(ball, compression_weight(choice))
-      history = new_force_history(sampling%sample_rate, n_sample, &
-         [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'])
-      history%impact_velocity = get_impact_velocity(drop)
-      state = [0.0_wp, history%impact_velocity, 0.0_wp, 0.0_wp]
-      step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
-      compressing = .true.
-      released = .false.
-      call record_sample(shell, state, 1, history)
-      do i = 2, n_sample
-         do j = 1, sampling%substeps
-            time = real((i - 2)*sampling%substeps + j - 1, wp)*step
-            call advance(time + step)
-            if (allocated(error) .or. released) exit
-         end do
-         if (allocated(error)) return
-         if (released) exit
-         call record_sample(shell, state, i, history)
-      end do
-      if (.not. released) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration) &
-            //' s ends while the ball is still in contact; allowed: longer than the contact')
-         return
-      end if
-      history%contact_time = time
-      call finish(shell, state, history, error)
-
-   contains
-
-      !> Moves time and state on to the given time; stops short where the phase changes.
-      subroutine advance(end_time)
-         !> Time at the end of the step, s.
-         real(wp), intent(in) :: end_time
-         real(wp) :: new_state(n_state)
-         real(wp) :: length
-         logical :: valid
-         integer :: component
-
-         do
-            length = end_time - time
-            call rk4_step(shell, time, state, length, new_state, valid)
-            if (.not. valid) then
-               length = longest_valid(shell, time, state, length)
-               call rk4_step(shell, time, state, length, new_state, valid)
-               error = closing_error(drop, time + length, new_state(at_deflection), shell%closing_deflection)
-               return
-            end if
-            ! Compression ends with the velocity, restitution with the deflection.
-            component = merge(at_velocity, at_deflection, compressing)
-            if (new_state(component) > 0.0_wp) then
-               time = end_time
-               state = new_state
-               return
-            end if
-            length = locate_zero(shell, time, state, length, component)
-            call rk4_step(shell, time, state, length, new_state, valid)
-            time = time + length
-            state = new_state
-            state(component) = 0.0_wp
-            released = .not. compressing
-            if (released) return
-            compressing = .false.
-            shell%flux_weight = restitution_weight(choice)
-            history%max_deflection = state(at_deflection)
-            history%peak_force = shell%stiffness*state(at_deflection) + get_gas_force(shell, state(at_deflection))
-         end do
-      end subroutine advance
-
+      shell%next_flux_weight = restitution_weight(choice)
+      call solve_lumped(shell, drop, sampling, [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'], &
+         history, error)
    end subroutine solve_hollow_sphere
-
-   !> Writes motion and forces of one instant into the history.
-   pure subroutine record_sample(shell, state, i, history)
-      !> The shell in its present phase.
-      type(shell_type), intent(in) :: shell
-      !> State at the sample: [4].
-      real(wp), intent(in) :: state(:)
-      !> Number of the sample.
-      integer, intent(in) :: i
-      !> The history.
-      type(force_history_type), intent(inout) :: history
-
-      history%deflection(i) = state(at_deflection)
-      history%velocity(i) = state(at_velocity)
-      history%part(i, 1) = shell%stiffness*state(at_deflection)
-      history%part(i, 2) = get_gas_force(shell, state(at_deflection))
-      history%part(i, 3) = (1 - shell%flux_weight)*shell%mass/(2*shell%radius)*state(at_velocity)**2
-      ! The flux sets in with a jump at first touch; a sample of a jump is the mean of its two sides.
-      if (i == 1) history%part(i, 3) = history%part(i, 3)/2
-      history%elastic_force(i) = history%part(i, 1) + history%part(i, 2)
-      history%floor_force(i) = history%elastic_force(i) + history%part(i, 3)
-   end subroutine record_sample
-
-   !> Scalars of the impact from the state at release, and the check of the balances.
-   subroutine finish(shell, state, history, error)
-      !> The shell.
-      type(shell_type), intent(in) :: shell
-      !> State at release: [4].
-      real(wp), intent(in) :: state(:)
-      !> The history; its samples are complete.
-      type(force_history_type), intent(inout) :: history
-      !> A balance does not close.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: energy, momentum
-
-      ! At release the whole ball moves again: momentum and energy are those of its full mass.
-      associate (v0 => history%impact_velocity, velocity => state(at_velocity))
-         history%restitution = -velocity/v0
-         momentum = shell%mass*(v0 - velocity)
-         energy = shell%mass/2*v0**2
-         history%impulse = state(at_impulse)
-         history%impulse_residual = abs(history%impulse - momentum)/momentum
-         history%energy_residual = abs(shell%mass/2*velocity**2 + state(at_loss) - energy)/energy
-      end associate
-      history%peak_force = max(history%peak_force, maxval(history%elastic_force))
-      history%peak_floor_force = max(history%peak_force, maxval(history%floor_force))
-      ! Asked so that NaN fails too.
-      if (.not. max(history%impulse_residual, history%energy_residual) <= most_residual) then
-         error = numerical_error('&sampling: substeps is too low: the balance of impulse misses by ' &
-            //to_text(history%impulse_residual)//' and that of energy by '//to_text(history%energy_residual) &
-            //'; allowed: up to '//to_text(most_residual))
-      end if
-   end subroutine finish
-
-   !> Error of a drop that closes the shell.
-   function closing_error(drop, time, deflection, closing_deflection) result(error)
-      !> The drop.
-      type(drop_type), intent(in) :: drop
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
-      !> Deflection at this time, m.
-      real(wp), intent(in) :: deflection
-      !> Deflection that closes the cavity, m.
-      real(wp), intent(in) :: closing_deflection
-      !> The error.
-      type(error_type) :: error
-
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m closes the shell: ' &
-         //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*deflection, 2) &
-         //' mm; allowed: less than the height of the cavity, '//fixed(1.0e3_wp*closing_deflection, 2)//' mm')
-   end function closing_error
 
 end module thud_hollow_sphere

@@ -1,8 +1,9 @@
 !> How a force is sampled in time: rate, length of the record, steps per sample.
 module thud_sampling
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, integer_field, real_field
+   use thud_field, only: field_type
    use thud_kinds, only: wp
+   use thud_new_field, only: integer_field, real_field
    use thud_text, only: to_text
    implicit none (type, external)
    private

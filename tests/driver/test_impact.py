@@ -88,7 +88,8 @@ def test_threads_do_not_disturb_each_other() -> None:
     ("arguments", "words"),
     [
         ({"model": "cube"}, r"&model: name = 'cube' is not allowed; allowed: 'hollow_sphere'"),
-        ({"momentum_flux": "some"}, r"&model: momentum_flux = 'some' .* 'momentum_balance'"),
+        ({"momentum_flux": "some"}, r"&hollow_sphere: momentum_flux = 'some' .* 'momentum_bal"),
+        ({"stiffness": 1.0}, r"&hollow_sphere: stiffness is not a known key; allowed: 'momentum"),
         ({"sample_rate": 0.0}, r"&sampling: sample_rate = 0.0"),
         ({"duration": 0.01}, r"&sampling: duration = 0.01 s ends while"),
         ({"substeps": 0}, r"&sampling: substeps = 0 is not allowed; allowed: 1 <= substeps"),

@@ -1,0 +1,235 @@
+!> A lumped source on a spring with damping that grows with the deflection (Hunt and Crossley
+!> 1975; paper, reference [6]): for the tyre, and as a baseline.
+module thud_hunt_crossley
+   use thud_ball, only: ball_type
+   use thud_drop, only: drop_type, get_impact_velocity
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   use thud_new_field, only: real_field
+   use thud_rk4, only: locate_zero, rk4_step
+   use thud_sampling, only: sampling_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: check_hunt_crossley, get_damping, get_hunt_crossley_fields, get_stiffness, hunt_crossley_type
+   public :: solve_hunt_crossley
+
+   !> Options of the model. Of stiffness and contact time one is given, of damping and
+   !> restitution at most one; 0 means not given.
+   type :: hunt_crossley_type
+      !> Stiffness k, N/m^exponent.
+      real(wp) :: stiffness = 0.0_wp
+      !> Wanted contact time, s.
+      real(wp) :: contact_time = 0.0_wp
+      !> Exponent n of the deflection; 3/2 is Hertz's.
+      real(wp) :: exponent = 1.5_wp
+      !> Damping alpha, s/m.
+      real(wp) :: damping = 0.0_wp
+      !> Wanted coefficient of restitution.
+      real(wp) :: restitution = 0.0_wp
+   end type hunt_crossley_type
+
+   !> Equation of motion M z'' = -F with F = k d^n (1 + 3/2 alpha d').
+   type, extends(lumped_type) :: spring_type
+      !> Stiffness, N/m^exponent.
+      real(wp) :: stiffness = 1.0_wp
+      !> Exponent of the deflection.
+      real(wp) :: exponent = 1.5_wp
+      !> Damping, s/m.
+      real(wp) :: damping = 0.0_wp
+   contains
+      procedure :: get_derivative
+      procedure :: get_parts
+   end type spring_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&hunt_crossley`.
+   function get_hunt_crossley_fields(options) result(fields)
+      !> The options that the fields read and set.
+      type(hunt_crossley_type), intent(in), target :: options
+      !> One field per component: [5].
+      type(field_type), allocatable :: fields(:)
+      character(len=*), parameter :: group = 'hunt_crossley'
+
+      fields = [ &
+         real_field(group, 'stiffness', options%stiffness, '', &
+         'stiffness, N/m^exponent; 0: from contact_time', 0.0_wp, 1.0e15_wp), &
+         real_field(group, 'contact_time', options%contact_time, 's', &
+         'wanted contact time; 0: from stiffness', 0.0_wp, 10.0_wp), &
+         real_field(group, 'exponent', options%exponent, '', 'exponent of the deflection', 1.0_wp, 5.0_wp), &
+         real_field(group, 'damping', options%damping, 's/m', 'damping alpha; 0: from restitution', 0.0_wp, 1.0e6_wp), &
+         real_field(group, 'restitution', options%restitution, '', &
+         'wanted coefficient of restitution; 0: from damping', 0.0_wp, 1.0_wp)]
+   end function get_hunt_crossley_fields
+
+   !> Complains about values that are missing or contradict each other.
+   subroutine check_hunt_crossley(options, error)
+      !> The options, each inside its own range.
+      type(hunt_crossley_type), intent(in) :: options
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (options%stiffness > 0.0_wp .eqv. options%contact_time > 0.0_wp) then
+         error = input_error('&hunt_crossley: stiffness = '//to_text(options%stiffness)//' with contact_time = ' &
+            //to_text(options%contact_time)//' s is not allowed; allowed: exactly one of them above 0')
+      else if (options%damping > 0.0_wp .and. options%restitution > 0.0_wp) then
+         error = input_error('&hunt_crossley: damping = '//to_text(options%damping)//' s/m with restitution = ' &
+            //to_text(options%restitution)//' is not allowed; allowed: at most one of them above 0')
+      else if (options%restitution > 0.0_wp .and. options%restitution < 0.01_wp) then
+         error = input_error('&hunt_crossley: restitution = '//to_text(options%restitution) &
+            //' is not allowed; allowed: 0 (not given) or 0.01 <= restitution <= 1')
+      end if
+   end subroutine check_hunt_crossley
+
+   !> Right-hand side of the equation of motion.
+   pure subroutine get_derivative(self, time, state, rate, valid)
+      !> The spring.
+      class(spring_type), intent(in) :: self
+      !> Time since first touch, s; the equation does not depend on it.
+      real(wp), intent(in) :: time
+      !> State, see `thud_lumped`: [4].
+      real(wp), intent(in) :: state(:)
+      !> Derivative of the state: [4].
+      real(wp), intent(out) :: rate(:)
+      !> Always true.
+      logical, intent(out) :: valid
+      real(wp) :: parts(2)
+      real(wp) :: force
+
+      valid = time >= 0.0_wp
+      call self%get_parts(state, parts, force)
+      rate(at_deflection) = state(at_velocity)
+      rate(at_velocity) = -force/self%mass
+      rate(at_impulse) = force
+      rate(at_loss) = parts(2)*state(at_velocity)
+   end subroutine get_derivative
+
+   !> Spring and damping force of one instant.
+   pure subroutine get_parts(self, state, parts, elastic_force)
+      !> The spring.
+      class(spring_type), intent(in) :: self
+      !> State, see `thud_lumped`: [4].
+      real(wp), intent(in) :: state(:)
+      !> k d^n and k d^n * 3/2 alpha d', N: [2].
+      real(wp), intent(out) :: parts(:)
+      !> Their sum: without flux of momentum it is the whole force, N.
+      real(wp), intent(out) :: elastic_force
+
+      parts(1) = self%stiffness*max(state(at_deflection), 0.0_wp)**self%exponent
+      parts(2) = 1.5_wp*self%damping*state(at_velocity)*parts(1)
+      elastic_force = sum(parts)
+   end subroutine get_parts
+
+   !> Damping alpha that gives a coefficient of restitution, s/m.
+   !>
+   !> With x = 3/2 alpha v0 the balance of energy over both phases is
+   !> x - ln(1 + x) + e x + ln(1 - e x) = 0, for any exponent.
+   pure function get_damping(restitution, impact_velocity) result(damping)
+      !> Coefficient of restitution e, above 0.
+      real(wp), intent(in) :: restitution
+      !> Velocity at first touch, m/s.
+      real(wp), intent(in) :: impact_velocity
+      !> alpha, s/m.
+      real(wp) :: damping
+      real(wp) :: left, right, middle
+
+      damping = 0.0_wp
+      if (restitution >= 1.0_wp) return
+      ! The root other than zero: the function is positive before it and falls without bound to 1/e.
+      left = 0.0_wp
+      right = 1/restitution
+      do
+         middle = (left + right)/2
+         if (.not. (middle > left .and. middle < right)) exit
+         if (balance(middle) > 0.0_wp) then
+            left = middle
+         else
+            right = middle
+         end if
+      end do
+      damping = middle/(1.5_wp*impact_velocity)
+
+   contains
+
+      !> Energy of the rebound that is missing, in units of M (v0/x)^2.
+      pure function balance(x) result(missing)
+         !> 3/2 alpha v0.
+         real(wp), intent(in) :: x
+         !> Zero where the balance holds.
+         real(wp) :: missing
+
+         missing = x - log(1 + x) + restitution*x + log(1 - restitution*x)
+      end function balance
+
+   end function get_damping
+
+   !> Stiffness that gives a contact time, N/m^exponent.
+   !>
+   !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation holds no k: one
+   !> contact in these units gives the ratio of contact time to D/v0.
+   pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
+      !> Wanted contact time, s.
+      real(wp), intent(in) :: contact_time
+      !> Exponent n of the deflection.
+      real(wp), intent(in) :: exponent
+      !> Damping alpha, s/m.
+      real(wp), intent(in) :: damping
+      !> Mass, kg.
+      real(wp), intent(in) :: mass
+      !> Velocity at first touch, m/s.
+      real(wp), intent(in) :: impact_velocity
+      !> k, N/m^exponent.
+      real(wp) :: stiffness
+      real(wp), parameter :: step = 1.0e-3_wp
+      type(spring_type) :: spring
+      real(wp) :: state(4)
+      real(wp) :: next(4)
+      real(wp) :: time, length
+      logical :: valid
+
+      spring = spring_type(mass=1.0_wp, exponent=exponent, damping=damping*impact_velocity)
+      state = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
+      time = 0.0_wp
+      do
+         call rk4_step(spring, time, state, step, next, valid)
+         if (next(at_deflection) <= 0.0_wp) exit
+         state = next
+         time = time + step
+      end do
+      time = time + locate_zero(spring, time, state, step, at_deflection)
+      length = contact_time*impact_velocity/time
+      stiffness = mass*impact_velocity**2/length**(exponent + 1)
+   end function get_stiffness
+
+   !> Force history of one drop.
+   subroutine solve_hunt_crossley(ball, drop, options, sampling, history, error)
+      !> The source, of which only the mass counts.
+      type(ball_type), intent(in) :: ball
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Stiffness and damping.
+      type(hunt_crossley_type), intent(in) :: options
+      !> Sampling rate, length of the record, substeps.
+      type(sampling_type), intent(in) :: sampling
+      !> Force and motion from first touch on.
+      type(force_history_type), intent(out) :: history
+      !> The contact outlasts the record, or the steps are too coarse.
+      type(error_type), allocatable, intent(out) :: error
+      type(spring_type) :: spring
+      real(wp) :: v0
+
+      v0 = get_impact_velocity(drop)
+      spring = spring_type(ball%mass, options%stiffness, options%exponent, options%damping)
+      if (options%restitution > 0.0_wp) spring%damping = get_damping(options%restitution, v0)
+      if (options%contact_time > 0.0_wp) then
+         spring%stiffness = get_stiffness(options%contact_time, spring%exponent, spring%damping, spring%mass, v0)
+      end if
+      call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error)
+   end subroutine solve_hunt_crossley
+
+end module thud_hunt_crossley

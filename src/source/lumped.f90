@@ -1,0 +1,217 @@
+!> Impact of a source with one degree of freedom: marches from first touch over the turning point
+!> to release, samples the forces, and checks the balances of impulse and energy.
+module thud_lumped
+   use thud_drop, only: drop_type, get_impact_velocity
+   use thud_error, only: error_type, input_error, numerical_error
+   use thud_force_history, only: force_history_type, new_force_history
+   use thud_kinds, only: wp
+   use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
+   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_text, only: fixed, to_text
+   implicit none (type, external)
+   private
+
+   public :: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+
+   !> Places of the quantities in the state: deflection (m), velocity (m/s), impulse given to the
+   !> floor (N s), energy lost (J).
+   integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4, n_state = 4
+
+   !> Residual of the balances of impulse and energy above which a result is refused. At the
+   !> default step the paper's case has 1e-12.
+   real(wp), parameter :: most_residual = 1.0e-6_wp
+
+   !> Equation of motion of the source; its state is laid out as above.
+   type, abstract, extends(ode_type) :: lumped_type
+      !> Mass that moves before and after the contact, kg.
+      real(wp) :: mass = 0.0_wp
+   contains
+      procedure(get_parts_interface), deferred :: get_parts
+      procedure :: begin_restitution
+      procedure :: get_failure
+   end type lumped_type
+
+   abstract interface
+      !> Parts of the force at one instant.
+      pure subroutine get_parts_interface(self, state, parts, elastic_force)
+         import :: lumped_type, wp
+         implicit none (type, external)
+         !> The source.
+         class(lumped_type), intent(in) :: self
+         !> State: [4].
+         real(wp), intent(in) :: state(:)
+         !> Parts of the force on the floor, N: [n_part].
+         real(wp), intent(out) :: parts(:)
+         !> Elastic force, N.
+         real(wp), intent(out) :: elastic_force
+      end subroutine get_parts_interface
+   end interface
+
+contains
+
+   !> Called at the turning point; sources whose equation changes there override it.
+   pure subroutine begin_restitution(self)
+      !> The source.
+      class(lumped_type), intent(inout) :: self
+
+      self%mass = abs(self%mass)
+   end subroutine begin_restitution
+
+   !> Error of a state outside the domain of the equation; sources that have such states override
+   !> it.
+   function get_failure(self, drop, time, state) result(error)
+      !> The source.
+      class(lumped_type), intent(in) :: self
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Time since first touch, s.
+      real(wp), intent(in) :: time
+      !> Last valid state: [4].
+      real(wp), intent(in) :: state(:)
+      !> The error.
+      type(error_type) :: error
+
+      error = numerical_error('&drop: height = '//to_text(drop%height)//' m leads out of the model of a source of ' &
+         //to_text(self%mass)//' kg: '//fixed(1.0e3_wp*time, 3)//' ms after first touch the deflection is ' &
+         //to_text(state(at_deflection))//' m; allowed: lower drops')
+   end function get_failure
+
+   !> Force history of one drop.
+   subroutine solve_lumped(source, drop, sampling, part_name, history, error)
+      !> The source in its compression phase.
+      class(lumped_type), intent(inout) :: source
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Sampling rate, length of the record, substeps.
+      type(sampling_type), intent(in) :: sampling
+      !> Names of the parts of the force: [n_part].
+      character(len=*), intent(in) :: part_name(:)
+      !> Force and motion from first touch on.
+      type(force_history_type), intent(out) :: history
+      !> The equation fails, the contact outlasts the record, or the steps are too coarse.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: state(n_state)
+      real(wp) :: time, step
+      integer :: i, j, n_sample
+      logical :: compressing, released
+
+      n_sample = get_sample_count(sampling)
+      history = new_force_history(sampling%sample_rate, n_sample, part_name)
+      history%impact_velocity = get_impact_velocity(drop)
+      state = [0.0_wp, history%impact_velocity, 0.0_wp, 0.0_wp]
+      step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
+      compressing = .true.
+      released = .false.
+      call record_sample(source, state, 1, history)
+      do i = 2, n_sample
+         do j = 1, sampling%substeps
+            time = real((i - 2)*sampling%substeps + j - 1, wp)*step
+            call advance(time + step)
+            if (allocated(error) .or. released) exit
+         end do
+         if (allocated(error)) return
+         if (released) exit
+         call record_sample(source, state, i, history)
+      end do
+      if (.not. released) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration) &
+            //' s ends while the source is still in contact; allowed: longer than the contact')
+         return
+      end if
+      history%contact_time = time
+      call finish(source%mass, state, history, error)
+
+   contains
+
+      !> Moves time and state on to the given time; stops short where the phase changes.
+      subroutine advance(end_time)
+         !> Time at the end of the step, s.
+         real(wp), intent(in) :: end_time
+         real(wp) :: new_state(n_state)
+         real(wp) :: parts(size(part_name))
+         real(wp) :: length
+         logical :: valid
+         integer :: component
+
+         do
+            length = end_time - time
+            call rk4_step(source, time, state, length, new_state, valid)
+            if (.not. valid) then
+               length = longest_valid(source, time, state, length)
+               call rk4_step(source, time, state, length, new_state, valid)
+               error = source%get_failure(drop, time + length, new_state)
+               return
+            end if
+            ! Compression ends with the velocity, restitution with the deflection.
+            component = merge(at_velocity, at_deflection, compressing)
+            if (new_state(component) > 0.0_wp) then
+               time = end_time
+               state = new_state
+               return
+            end if
+            length = locate_zero(source, time, state, length, component)
+            call rk4_step(source, time, state, length, new_state, valid)
+            time = time + length
+            state = new_state
+            state(component) = 0.0_wp
+            released = .not. compressing
+            if (released) return
+            compressing = .false.
+            call source%begin_restitution()
+            history%max_deflection = state(at_deflection)
+            call source%get_parts(state, parts, history%peak_force)
+         end do
+      end subroutine advance
+
+   end subroutine solve_lumped
+
+   !> Writes motion and forces of one instant into the history.
+   pure subroutine record_sample(source, state, i, history)
+      !> The source in its present phase.
+      class(lumped_type), intent(in) :: source
+      !> State at the sample: [4].
+      real(wp), intent(in) :: state(:)
+      !> Number of the sample.
+      integer, intent(in) :: i
+      !> The history.
+      type(force_history_type), intent(inout) :: history
+
+      history%deflection(i) = state(at_deflection)
+      history%velocity(i) = state(at_velocity)
+      call source%get_parts(state, history%part(i, :), history%elastic_force(i))
+      ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
+      if (i == 1) history%part(i, :) = history%part(i, :)/2
+      history%floor_force(i) = sum(history%part(i, :))
+   end subroutine record_sample
+
+   !> Scalars of the impact from the state at release, and the check of the balances.
+   subroutine finish(mass, state, history, error)
+      !> Mass that moves again after release, kg.
+      real(wp), intent(in) :: mass
+      !> State at release: [4].
+      real(wp), intent(in) :: state(:)
+      !> The history; its samples are complete.
+      type(force_history_type), intent(inout) :: history
+      !> A balance does not close.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: energy, momentum
+
+      associate (v0 => history%impact_velocity, velocity => state(at_velocity))
+         history%restitution = -velocity/v0
+         momentum = mass*(v0 - velocity)
+         energy = mass/2*v0**2
+         history%impulse = state(at_impulse)
+         history%impulse_residual = abs(history%impulse - momentum)/momentum
+         history%energy_residual = abs(mass/2*velocity**2 + state(at_loss) - energy)/energy
+      end associate
+      history%peak_force = max(history%peak_force, maxval(history%elastic_force))
+      history%peak_floor_force = max(history%peak_force, maxval(history%floor_force))
+      ! Asked so that NaN fails too.
+      if (.not. max(history%impulse_residual, history%energy_residual) <= most_residual) then
+         error = numerical_error('&sampling: substeps is too low: the balance of impulse misses by ' &
+            //to_text(history%impulse_residual)//' and that of energy by '//to_text(history%energy_residual) &
+            //'; allowed: up to '//to_text(most_residual))
+      end if
+   end subroutine finish
+
+end module thud_lumped

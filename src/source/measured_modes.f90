@@ -1,0 +1,238 @@
+!> Source described by measured modes of the ball standing on the floor (after Park et al. 2010;
+!> paper, sections 1 and 4.1): each mode is an oscillator on the floor started with the impact
+!> velocity, and the contact lasts until the sum of their forces first returns to zero.
+module thud_measured_modes
+   use thud_ball, only: ball_type
+   use thud_drop, only: drop_type, get_impact_velocity
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, list_type
+   use thud_force_history, only: force_history_type, new_force_history
+   use thud_kinds, only: wp
+   use thud_constants, only: pi
+   use thud_new_field, only: list_field, logical_field
+   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_text, only: fixed, to_text
+   implicit none (type, external)
+   private
+
+   public :: check_measured_modes, get_measured_modes_fields, measured_modes_type, solve_measured_modes
+
+   !> Part by which the effective masses may miss the mass of the ball: their printed digits.
+   real(wp), parameter :: mass_tolerance = 1.0e-3_wp
+
+   !> Options of the model: one entry per mode in each list.
+   type :: measured_modes_type
+      !> Natural frequencies, Hz.
+      type(list_type) :: frequency
+      !> Damping ratios.
+      type(list_type) :: damping_ratio
+      !> Effective masses, kg.
+      type(list_type) :: effective_mass
+      !> The masses need not add up to that of the ball.
+      logical :: allow_mass_mismatch = .false.
+   end type measured_modes_type
+
+   !> Motion and force of one mode in closed form.
+   type :: mode_type
+      !> Effective mass, kg.
+      real(wp) :: mass
+      !> Angular frequency without damping, rad/s.
+      real(wp) :: omega
+      !> Damping ratio.
+      real(wp) :: zeta
+      !> Angular frequency with damping, rad/s.
+      real(wp) :: omega_damped
+   end type mode_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&measured_modes`.
+   function get_measured_modes_fields(options) result(fields)
+      !> The options that the fields read and set.
+      type(measured_modes_type), intent(in), target :: options
+      !> One field per component: [4].
+      type(field_type), allocatable :: fields(:)
+      character(len=*), parameter :: group = 'measured_modes'
+
+      fields = [ &
+         list_field(group, 'frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
+         0.0_wp, 1.0e6_wp, lower_open=.true.), &
+         list_field(group, 'damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
+         0.0_wp, 1.0_wp, upper_open=.true.), &
+         list_field(group, 'effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
+         0.0_wp, 1.0e6_wp, lower_open=.true.), &
+         logical_field(group, 'allow_mass_mismatch', options%allow_mass_mismatch, &
+         'effective masses need not add up to the mass of the ball')]
+   end function get_measured_modes_fields
+
+   !> Complains about lists that do not fit each other or the ball.
+   subroutine check_measured_modes(options, ball, error)
+      !> The options, each inside its own range.
+      type(measured_modes_type), intent(in) :: options
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: total
+
+      associate (n => options%frequency%count)
+         if (n == 0) then
+            error = input_error('&measured_modes: frequency has no value; allowed: one frequency per mode, Hz')
+         else if (options%damping_ratio%count /= n .or. options%effective_mass%count /= n) then
+            error = input_error('&measured_modes: frequency has '//to_text(n)//' values, damping_ratio ' &
+               //to_text(options%damping_ratio%count)//' and effective_mass '//to_text(options%effective_mass%count) &
+               //'; allowed: as many of each')
+         else
+            total = sum(options%effective_mass%values(:n))
+            if (abs(total - ball%mass) > mass_tolerance*ball%mass .and. .not. options%allow_mass_mismatch) then
+               error = input_error('&measured_modes: effective_mass adds up to '//to_text(total) &
+                  //' kg; allowed: the mass of the ball, '//to_text(ball%mass)//' kg, or allow_mass_mismatch = .true.')
+            end if
+         end if
+      end associate
+   end subroutine check_measured_modes
+
+   !> Force history of one drop.
+   subroutine solve_measured_modes(drop, options, sampling, history, error)
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> The modes.
+      type(measured_modes_type), intent(in) :: options
+      !> Sampling rate and length of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Force and motion from first touch on.
+      type(force_history_type), intent(out) :: history
+      !> The contact outlasts the record.
+      type(error_type), allocatable, intent(out) :: error
+      type(mode_type) :: modes(options%frequency%count)
+      real(wp) :: step, time, force, deflection, velocity, v0
+      integer :: i, n_sample
+
+      modes = new_mode(options%frequency%values(:size(modes)), options%damping_ratio%values(:size(modes)), &
+         options%effective_mass%values(:size(modes)))
+      v0 = get_impact_velocity(drop)
+      n_sample = get_sample_count(sampling)
+      step = 1/sampling%sample_rate
+      history = new_force_history(sampling%sample_rate, n_sample, ['modal_force'])
+      history%impact_velocity = v0
+      do i = 1, n_sample
+         time = (i - 1)*step
+         call get_motion(modes, v0, time, deflection, velocity, force)
+         if (i > 1 .and. force <= 0.0_wp) exit
+         history%deflection(i) = deflection
+         history%velocity(i) = velocity
+         history%part(i, 1) = force
+      end do
+      if (i > n_sample) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends after '//fixed(1.0e3_wp*time, 1) &
+            //' ms of contact; allowed: longer than the contact')
+         return
+      end if
+      ! Dashpots begin with a jump; a sample of a jump is the mean of its two sides.
+      history%part(1, 1) = history%part(1, 1)/2
+      history%elastic_force = history%part(:, 1)
+      history%floor_force = history%part(:, 1)
+      call finish(modes, release_time(modes, v0, time - step, time), history)
+   end subroutine solve_measured_modes
+
+   !> One mode from its measured numbers.
+   elemental function new_mode(frequency, damping_ratio, mass) result(mode)
+      !> Natural frequency, Hz.
+      real(wp), intent(in) :: frequency
+      !> Damping ratio.
+      real(wp), intent(in) :: damping_ratio
+      !> Effective mass, kg.
+      real(wp), intent(in) :: mass
+      !> The mode.
+      type(mode_type) :: mode
+
+      mode%mass = mass
+      mode%omega = 2*pi*frequency
+      mode%zeta = damping_ratio
+      mode%omega_damped = mode%omega*sqrt(1 - damping_ratio**2)
+   end function new_mode
+
+   !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t),
+   !> F = sum M_n (w^2 d_n + 2 zeta w d_n').
+   pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force)
+      !> The modes: [n_mode].
+      type(mode_type), intent(in) :: modes(:)
+      !> Velocity at first touch, m/s.
+      real(wp), intent(in) :: impact_velocity
+      !> Time since first touch, s.
+      real(wp), intent(in) :: time
+      !> Deflection of the centre of mass, m.
+      real(wp), intent(out) :: deflection
+      !> Its velocity, m/s.
+      real(wp), intent(out) :: velocity
+      !> Force on the floor, N.
+      real(wp), intent(out) :: force
+      real(wp), dimension(size(modes)) :: d, v, decay, sine
+
+      associate (m => modes%mass, w => modes%omega, zeta => modes%zeta, wd => modes%omega_damped)
+         decay = impact_velocity*exp(-zeta*w*time)
+         sine = sin(wd*time)
+         d = decay*sine/wd
+         v = decay*(cos(wd*time) - zeta*w/wd*sine)
+         deflection = sum(m*d)/sum(m)
+         velocity = sum(m*v)/sum(m)
+         force = sum(m*(w**2*d + 2*zeta*w*v))
+      end associate
+   end subroutine get_motion
+
+   !> Time at which the force first falls to zero, to rounding, by bisection.
+   pure function release_time(modes, impact_velocity, before, after) result(time)
+      !> The modes: [n_mode].
+      type(mode_type), intent(in) :: modes(:)
+      !> Velocity at first touch, m/s.
+      real(wp), intent(in) :: impact_velocity
+      !> A time at which the force is positive, s.
+      real(wp), intent(in) :: before
+      !> The next sample, at which it is not, s.
+      real(wp), intent(in) :: after
+      !> Time of release, s.
+      real(wp) :: time
+      real(wp) :: left, right, deflection, velocity, force
+
+      left = before
+      right = after
+      do
+         time = (left + right)/2
+         if (.not. (time > left .and. time < right)) exit
+         call get_motion(modes, impact_velocity, time, deflection, velocity, force)
+         if (force > 0.0_wp) then
+            left = time
+         else
+            right = time
+         end if
+      end do
+   end function release_time
+
+   !> Scalars of the impact. The equation of each mode makes the impulse the change of momentum;
+   !> quadrature of the force checks it.
+   pure subroutine finish(modes, contact_time, history)
+      !> The modes: [n_mode].
+      type(mode_type), intent(in) :: modes(:)
+      !> Time of release, s.
+      real(wp), intent(in) :: contact_time
+      !> The history; its samples are complete.
+      type(force_history_type), intent(inout) :: history
+      integer, parameter :: n_interval = 4096
+      real(wp) :: deflection, velocity, force, integral
+      integer :: i
+
+      integral = 0.0_wp
+      do i = 0, n_interval
+         call get_motion(modes, history%impact_velocity, contact_time*i/n_interval, deflection, velocity, force)
+         integral = integral + force*merge(1, merge(4, 2, mod(i, 2) == 1), mod(i, n_interval) == 0)
+         history%peak_force = max(history%peak_force, force)
+         history%max_deflection = max(history%max_deflection, deflection)
+      end do
+      history%contact_time = contact_time
+      history%restitution = -velocity/history%impact_velocity
+      history%impulse = sum(modes%mass)*(history%impact_velocity - velocity)
+      history%impulse_residual = abs(integral*contact_time/(3*n_interval) - history%impulse)/history%impulse
+      history%peak_floor_force = history%peak_force
+   end subroutine finish
+
+end module thud_measured_modes
