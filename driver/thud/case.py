@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+import errno
 import os
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, get_args
 
 import f90nml
 import numpy as np
@@ -16,6 +17,7 @@ from thud.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from types import UnionType
     from typing import Self
 
 
@@ -221,10 +223,12 @@ class Case:
             Where a value is neither a number nor text, nor a list of numbers where one is due.
         """
         groups = {group: getattr(self, group) for group in _GROUPS}
+        for group, kind in _GROUPS.items():
+            require_kind(group, groups[group], kind)
+        require_kind("model", self.model, ModelOptions)
         groups[self.model.name] = self.model
-        namelist = f90nml.Namelist(
-            {"case": {"name": self.name}, "model": {"name": self.model.name}}
-        )
+        name = _plain("case", "name", self.name)
+        namelist = f90nml.Namelist({"case": {"name": name}, "model": {"name": self.model.name}})
         for group, options in groups.items():
             values = {key: _plain(group, key, value) for key, value in vars(options).items()}
             namelist[group] = {key: value for key, value in values.items() if value != []}
@@ -258,6 +262,16 @@ _GROUPS: dict[str, type[Any]] = {
 }
 
 
+def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
+    """Complain about an argument of another kind."""
+    if not isinstance(value, kind):
+        expected = getattr(kind, "__name__", None) or " or ".join(
+            k.__name__ for k in get_args(kind)
+        )
+        message = f"{name} = {value!r} is not allowed; allowed: an object of {expected}"
+        raise InputError(message)
+
+
 def new_model(name: str, options: dict[str, object]) -> ModelOptions:
     """Return the options of a model by its name.
 
@@ -288,11 +302,16 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
         value = value.tolist()
     if isinstance(value, list | tuple) and key in _LISTS:
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
-    if not isinstance(value, int | float | str):
-        message = f"&{group}: {key} = {value!r} is not allowed; allowed: a number or text"
+    known = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
+    if not known or (isinstance(value, int) and abs(value) > _LARGEST):
+        shown = "a very large number" if isinstance(value, int) else repr(value)
+        message = f"&{group}: {key} = {shown} is not allowed; allowed: a number or plain text"
         raise InputError(message)
-    return value
+    return value  # type: ignore[return-value]
 
+
+# No key takes a larger number, and Python would not print it.
+_LARGEST = 10**300
 
 # The keys that take lists of numbers.
 _LISTS = {
@@ -349,14 +368,29 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
     """
     content = case_text(case)
     call(door.count_samples, content)
-    replace_file(Path(path), content)
+    replace_file(path, content)
 
 
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a file under another name, then give it its own: nobody sees half a file."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file under another name, then give it its own: nobody sees half a file.
+
+    Raises
+    ------
+    OSError
+        With the path that was asked for, where it cannot be written.
+    """
+    target = Path(path)
     try:
-        part.write_bytes(content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+        part = target.with_name(f".{target.name}.{os.getpid()}.part")
+        try:
+            part.write_bytes(content)
+            part.replace(target)
+        finally:
+            part.unlink(missing_ok=True)
+    except ValueError as error:  # a path that no file system can hold
+        message = f"{path!r} is not allowed; allowed: the path of a file"
+        raise InputError(message) from error
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error

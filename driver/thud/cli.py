@@ -44,13 +44,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # argparse leaves with 2 for bad usage, which is a numerical failure here.
         return thud.InputError.exit_code if stop.code else 0
     try:
-        return int(options.command(options))
+        code = int(options.command(options))
+        sys.stdout.flush()
     except KeyboardInterrupt:
         print("thud-driver: interrupted; what was finished is kept", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:
+    except OSError as error:
+        # A screen that is full or closed; what Python still wants to write goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"thud-driver: {_sentence(error)}", file=sys.stderr)
         return thud.InputError.exit_code
+    return code
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -114,13 +118,17 @@ def _run(options: argparse.Namespace) -> int:
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
     """Run one case as the executable does, then draw it; return whether it conforms."""
+    if options.output is not None and not options.output.strip():
+        message = "--output has no value; allowed: a directory"
+        raise thud.InputError(message)
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, thud.read_case(path).name)  # noqa: PTH118 - may be ""
     directory, table, remark, conforming = call(door.run, os.fsencode(path), os.fsencode(output))
     if text(remark):
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
-    folder = Path(os.fsdecode(directory.rstrip()))
+    # The library pads its answer with blanks; a directory of the user's may end with them.
+    folder = Path(output or os.fsdecode(directory.rstrip()))
     if not options.no_figures:
         impact = thud.solve_case(thud.read_case(path))
         name = impact.case.name.replace("_", " ")
@@ -175,5 +183,10 @@ def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool
 def _sentence(error: Exception) -> str:
     """Return an error as one sentence."""
     if isinstance(error, OSError):
-        return f"{error.filename}: {error.strerror}; allowed: a place that you may write to"
+        place = error.filename or "standard output"
+        return f"{place}: {error.strerror}; allowed: a place that you may write to"
     return str(error)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._library import call, door, words
-from thud.case import Ball, Case, Drop, Sampling, case_text, new_model
+from thud.case import Ball, Case, Drop, Sampling, case_text, new_model, require_kind
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
 
@@ -188,8 +188,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     """
     return solve_case(
         Case(
-            ball=ball or Ball(),
-            drop=drop or Drop(),
+            ball=Ball() if ball is None else ball,
+            drop=Drop() if drop is None else drop,
             model=new_model(model, options),
             sampling=Sampling(sample_rate, duration, substeps),
         )
@@ -198,6 +198,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
 
 def solve_case(case: Case) -> Impact:
     """Compute the impact of a case; see `solve`."""
+    require_kind("case", case, Case)
     content = case_text(case)
     (n_sample,) = call(door.count_samples, content)
     deflection, velocity, part, elastic, floor, part_names, scalars = call(

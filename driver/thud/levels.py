@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 BANDWIDTHS = ("octave", "third")
+_MOST_PEAKS = 2**31
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def get_bands(bands: str = "octave") -> Bands:
     InputError
         Where `bands` is something else.
     """
-    if bands not in BANDWIDTHS:
+    if not isinstance(bands, str) or bands not in BANDWIDTHS:
         message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
         raise InputError(message)
     n_band, *columns = door.get_bands(bands)
@@ -116,7 +117,7 @@ def force_exposure_levels(
     force : array_like, shape (n_sample,)
         Force, N.
     sample_rate
-        Samples per second, Hz; more than twice the highest band edge.
+        Samples per second, Hz; at least twice the highest band edge.
     bands
         ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
     method
@@ -138,7 +139,7 @@ def force_exposure_levels(
     count = len(get_bands(bands).nominal)
     record = _record(force)
     rate = _number("sample_rate", sample_rate)
-    (levels,) = call(door.force_exposure, record, rate, bands, str(method), count)
+    (levels,) = call(door.force_exposure, record, rate, bands, _word(method), count)
     result: NDArray[np.float64] = levels
     return result
 
@@ -151,7 +152,11 @@ def peak_count(force: ArrayLike) -> int:
     force : array_like, shape (n_sample,)
         Force, N, that starts and ends at zero.
     """
-    return int(door.count_peaks(_record(force)))
+    record = _record(force)
+    if not np.isfinite(record).all():
+        message = "force holds a value that is not finite; allowed: real numbers, N"
+        raise InputError(message)
+    return int(door.count_peaks(record))
 
 
 def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
@@ -187,12 +192,22 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     InputError
         Where the source is not known or `levels` does not hold five numbers.
     """
-    octaves = np.asarray(levels, dtype=float)
+    octaves = _record(levels, "levels")
     if octaves.shape != (5,):
         message = f"levels have the shape {octaves.shape}; allowed: (5,), the octaves 31.5 to 500"
         raise InputError(message)
+    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MOST_PEAKS:
+        message = f"peaks = {peaks!r} is not allowed; allowed: 0 <= peaks < {_MOST_PEAKS}, whole"
+        raise InputError(message)
+    numbers = {
+        "contact_time": contact_time,
+        "restitution": restitution,
+        "mass": mass,
+        "drop_height": drop_height,
+    }
+    time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
     names, units, value, lower, upper, met = call(
-        door.judge, source, octaves, contact_time, restitution, peaks, mass, drop_height
+        door.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height
     )
     rows = zip(words(names), words(units), value, lower, upper, met, strict=True)
     return Conformity(
@@ -201,23 +216,35 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     )
 
 
-def _record(force: ArrayLike) -> NDArray[np.float64]:
-    """Return a force as the library takes it."""
+def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
+    """Return a record as the library takes it."""
     try:
-        record = np.ascontiguousarray(force, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        message = "force is not an array of numbers; allowed: one dimension of real numbers, N"
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # rows of different length
+        message = f"{name} is not an array of numbers; allowed: one dimension of real numbers"
         raise InputError(message) from error
-    if np.ndim(force) != 1 or np.iscomplexobj(force):
-        message = f"force has {np.ndim(force)} dimensions; allowed: one, of real numbers, N"
+    if array.ndim != 1:
+        message = f"{name} has {array.ndim} dimensions; allowed: one, of real numbers"
         raise InputError(message)
-    return record
+    if array.size and array.dtype.kind not in "iuf":
+        message = f"{name} is not an array of real numbers; allowed: one dimension of them"
+        raise InputError(message)
+    if np.ma.is_masked(values):
+        message = f"{name} has masked entries; allowed: numbers only"
+        raise InputError(message)
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def _number(name: str, value: object) -> float:
     """Return a number as a float."""
     try:
         return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError) as error:
-        message = f"{name} = {value!r} is not a number"
+    except (OverflowError, TypeError, ValueError) as error:
+        shown = "a very large number" if isinstance(error, OverflowError) else repr(value)
+        message = f"{name} = {shown} is not a number; allowed: real numbers"
         raise InputError(message) from error
+
+
+def _word(value: object) -> bytes:
+    """Return a word for the library, which knows those of ASCII only."""
+    return str(value).encode("ascii", "replace")

@@ -6,6 +6,8 @@ Every function returns a matplotlib figure as wide as a column of a journal page
 from __future__ import annotations
 
 import io
+from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -13,18 +15,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from thud.case import replace_file
+from thud.case import replace_file, require_kind
 from thud.errors import InputError
-from thud.impact import FORCES
+from thud.impact import FORCES, Impact
 from thud.levels import get_bands, judge
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
+    import os
+    from collections.abc import Iterator
 
     from matplotlib.axes import Axes
-
-    from thud.impact import Impact
 
 # Okabe and Ito's colours, told apart with any colour vision; line styles tell them apart in print.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -32,6 +32,7 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 WIDTH = 3.5
 SIZE = 8
+FORMATS = ("pdf", "png", "svg")
 
 
 def _axes(height: float) -> tuple[Figure, Axes]:
@@ -67,8 +68,10 @@ def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") 
     axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
     axes.set_ylim(bottom=0)
     axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
-    axes.set_ylabel("Blocked force, kN", fontsize=SIZE)
-    axes.legend(fontsize=SIZE, frameon=False)
+    axes.set_ylabel(
+        f"{force.capitalize()} force, kN" if force else "Blocked force, kN", fontsize=SIZE
+    )
+    _add_legend(axes, impacts)
     return figure
 
 
@@ -108,19 +111,34 @@ def levels(
     axes.set_xlim(-0.6, 4.6)
     axes.set_xlabel("Octave band, Hz", fontsize=SIZE)
     axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
-    axes.legend(fontsize=SIZE, frameon=False)
+    _add_legend(axes, impacts)
     return figure
 
 
 def _curves(impacts: Mapping[str, Impact], force: str | None) -> Iterator[tuple[str, Impact, str]]:
     """Yield name, impact and kind of force of each curve."""
+    if not isinstance(impacts, Mapping) or not impacts:
+        message = "impacts are not given; allowed: a mapping of names to impacts, at least one"
+        raise InputError(message)
     for name, impact in impacts.items():
+        require_kind(name, impact, Impact)
         if force:
-            yield name, impact, force
+            yield _literal(name), impact, force
         else:
             prefix = f"{name}, " if len(impacts) > 1 else ""
             for kind in FORCES:
-                yield f"{prefix}{kind} force", impact, kind
+                yield _literal(f"{prefix}{kind} force"), impact, kind
+
+
+def _literal(label: str) -> str:
+    """Return a label in which matplotlib finds no formula."""
+    return label.replace("$", r"\$")
+
+
+def _add_legend(axes: Axes, impacts: Mapping[str, Impact]) -> None:
+    """Add the legend; a single impact gives it its name."""
+    title = _literal(next(iter(impacts))) if len(impacts) == 1 else None
+    axes.legend(fontsize=SIZE, frameon=False, title=title, title_fontsize=SIZE)
 
 
 def _style(i: int) -> dict[str, Any]:
@@ -145,10 +163,12 @@ def _draw_tolerance(axes: Axes, source: str) -> None:
             label=f"Tolerance, {source.replace('_', ' ')}" if place == 0 else None,
         )
         nominal = (octave.lower + octave.upper) / 2
-        axes.plot([place - 0.4, place + 0.4], [nominal, nominal], color="0.45", linewidth=0.8)
+        label = "Nominal" if place == 0 else None
+        line = [place - 0.4, place + 0.4]
+        axes.plot(line, [nominal, nominal], color="0.45", linewidth=0.8, label=label)
 
 
-def save(figure: Figure, path: Path) -> None:
+def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Save a figure in the format of the path's ending, completely or not at all.
 
     Parameters
@@ -161,14 +181,13 @@ def save(figure: Figure, path: Path) -> None:
     Raises
     ------
     InputError
-        Where the ending names no format that matplotlib writes.
+        Where the ending is not one of png, svg and pdf.
     OSError
         Where the file cannot be written.
     """
-    known = figure.canvas.get_supported_filetypes()
-    kind = path.suffix[1:].lower()
-    if kind not in known:
-        message = f"{path}: ending {kind!r} is not known; allowed: {', '.join(sorted(known))}"
+    kind = Path(path).suffix[1:].lower()
+    if kind not in FORMATS:
+        message = f"{path}: ending {kind!r} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
     content = io.BytesIO()
     # Without a date and with names that do not change, the same figure gives the same bytes.

@@ -23,6 +23,9 @@ module thud_field
    !> Length of text values such as the name of a model or a case.
    integer, parameter :: name_length = 128
 
+   !> Most allowed texts of one key.
+   integer, parameter :: most_choices = 12
+
    !> What no entry of a list can be.
    real(wp), parameter :: unset = -huge(1.0_wp)
 
@@ -54,8 +57,11 @@ module thud_field
       logical :: lower_open = .false.
       !> The upper bound itself is not allowed.
       logical :: upper_open = .false.
-      !> Allowed texts, empty for free text: [n_choice].
-      character(len=24), allocatable :: choices(:)
+      !> Number of allowed texts; 0 for free text.
+      integer :: n_choice = 0
+      !> Allowed texts, the first `n_choice` hold; of fixed size, because compilers lose allocatable
+      !> components of array constructors: [most_choices].
+      character(len=24) :: choices(most_choices) = ''
    contains
       procedure :: set_from_text
       procedure :: check
@@ -89,12 +95,13 @@ contains
       character(len=*), intent(in) :: text
       !> The text is not a value of the wanted type.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length) :: word
+      character(len=2*name_length) :: word
       character(len=128) :: message
       character(len=:), allocatable :: line, wanted
       integer :: status, whole
       logical :: flag
-      real(wp) :: number, list(list_length + 1)
+      real(wp) :: list(list_length + 1)
+      real(wp) :: number
       namelist /real_group/ number
       namelist /list_group/ list
       namelist /integer_group/ whole
@@ -102,38 +109,56 @@ contains
       namelist /text_group/ word
 
       ! The run-time library's own namelist reader decides what a value is.
+      status = 1
       if (associated(self%real_value)) then
          wanted = 'a number'
          line = '&real_group number = '//text//' /'
-         read (line, nml=real_group, iostat=status, iomsg=message)
+         if (is_plain(text, repeats=.false.)) read (line, nml=real_group, iostat=status, iomsg=message)
          if (status == 0) self%real_value = number
       else if (associated(self%list_value)) then
          wanted = 'a list of up to '//to_text(list_length)//' numbers'
          line = '&list_group list = '//text//' /'
          list = unset
-         read (line, nml=list_group, iostat=status, iomsg=message)
+         if (is_plain(text, repeats=.true.)) read (line, nml=list_group, iostat=status, iomsg=message)
          if (status == 0) call set_list(list, self%list_value, status)
       else if (associated(self%integer_value)) then
          wanted = 'a whole number'
          line = '&integer_group whole = '//text//' /'
-         read (line, nml=integer_group, iostat=status, iomsg=message)
+         if (index(text, '*') == 0) read (line, nml=integer_group, iostat=status, iomsg=message)
          if (status == 0) self%integer_value = whole
       else if (associated(self%logical_value)) then
          wanted = '.true. or .false.'
          line = '&logical_group flag = '//text//' /'
-         read (line, nml=logical_group, iostat=status, iomsg=message)
+         if (index(text, '*') == 0) read (line, nml=logical_group, iostat=status, iomsg=message)
          if (status == 0) self%logical_value = flag
       else
-         wanted = 'text in quotes'
+         wanted = 'short text in quotes'
          line = '&text_group word = '//text//' /'
          word = ''
-         status = merge(0, 1, scan(text(1:1), '''"') == 1 .and. len(text) <= name_length)
-         if (status == 0) read (line, nml=text_group, iostat=status, iomsg=message)
-         if (status == 0) self%text_value = word
-         if (allocated(self%choices)) self%text_value = lower_case(self%text_value)
+         if (scan(text(1:1), '''"') == 1) read (line, nml=text_group, iostat=status, iomsg=message)
+         if (status == 0) status = merge(0, 1, len_trim(word) <= name_length)
+         if (status == 0) self%text_value = word(:name_length)
+         if (status == 0 .and. self%n_choice > 0) self%text_value = lower_case(self%text_value)
       end if
       if (status /= 0) error = self%complain(text, 'is not '//wanted)
    end subroutine set_from_text
+
+   !> Whether numbers are written in the usual way. A namelist may also hold null values (`1*`) and
+   !> exponents without a letter (`1+3` for 1000): nobody means them.
+   pure function is_plain(text, repeats) result(plain)
+      !> What stood behind the equals sign.
+      character(len=*), intent(in) :: text
+      !> `3*0.1` is allowed.
+      logical, intent(in) :: repeats
+      !> The text is plain.
+      logical :: plain
+      integer :: i
+
+      plain = scan(text, 'qQ') == 0 .and. (repeats .or. index(text, '*') == 0)
+      do i = 2, len(text)
+         if (scan(text(i:i), '+-') > 0) plain = plain .and. scan(text(i - 1:i - 1), ' ,*eEdD') > 0
+      end do
+   end function is_plain
 
    !> Takes over the entries that were read.
    subroutine set_list(entries, list, status)
@@ -163,8 +188,8 @@ contains
       logical :: inside
 
       inside = .true.
-      if (allocated(self%choices)) then
-         inside = any(self%choices == self%text_value)
+      if (self%n_choice > 0) then
+         inside = any(self%choices(:self%n_choice) == self%text_value)
       else if (associated(self%real_value)) then
          inside = self%contains(self%real_value)
       else if (associated(self%list_value)) then
@@ -239,8 +264,8 @@ contains
       !> The range with its unit, or the list of allowed words.
       character(len=:), allocatable, intent(out) :: text
 
-      if (allocated(self%choices)) then
-         text = join_quoted(self%choices)
+      if (self%n_choice > 0) then
+         text = join_quoted(self%choices(:self%n_choice))
       else if (associated(self%text_value)) then
          text = 'text in quotes, up to '//to_text(name_length)//' characters'
       else if (associated(self%logical_value)) then

@@ -137,7 +137,8 @@ contains
       type(field_type) :: field
 
       field = text_field(group, key, variable, meaning)
-      allocate (field%choices, source=[character(len=24) :: choices])
+      field%n_choice = size(choices)
+      field%choices(:size(choices)) = choices
    end function choice_field
 
 end module thud_new_field

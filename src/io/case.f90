@@ -1,7 +1,6 @@
 !> A case: everything that one run needs, as the namelist file gives it.
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
-   use thud_constants, only: version
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
@@ -207,10 +206,15 @@ contains
       logical :: usable
       integer :: i
 
-      usable = name /= '' .and. name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/') == 0 &
+      usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/') == 0 &
          .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
-      if (.not. usable) error = input_error('&case: name = '//quoted(name) &
-         //" is not allowed; allowed: a name for a directory, without '/', up to "//to_text(name_length)//' characters')
+      if (name == '') then
+         error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
+            //' characters, without it the name of the file')
+      else if (.not. usable) then
+         error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory, ' &
+            //"without '/', of up to "//to_text(name_length)//' characters')
+      end if
    end subroutine check_name
 
    !> Each text once, in order.
@@ -239,7 +243,7 @@ contains
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
-      text = '! thud '//version//': the full input of case '//trim(case%name)//', SI units'//newline
+      text = '! thud: the full input of case '//trim(case%name)//', SI units'//newline
       do i = 1, size(fields)
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
          call fields(i)%get_text(value)

@@ -3,7 +3,7 @@ module thud_command_line
    use thud_case, only: describe_keys
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
-   use thud_posix, only: ignore_size_signal, print_text, standard_error, standard_output
+   use thud_posix, only: ignore_signals, print_text, standard_error, standard_output
    use thud_run, only: outcome_type, run_case
    use thud_text, only: newline, quoted
    implicit none (type, external)
@@ -39,7 +39,7 @@ contains
       type(error_type), allocatable :: error
 
       exit_code = 0
-      call ignore_size_signal()
+      call ignore_signals()
       call parse_arguments(request, error)
       if (allocated(error)) then
          call say(standard_error, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)

@@ -2,20 +2,21 @@
 module thud_file
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
-   use thud_posix, only: directory_exists, get_process_id, is_empty_directory, make_directory, remove_file, rename_file
+   use thud_posix, only: directory_exists, is_empty_directory, lock_directory, lock_type, make_directory, remove_file, &
+      rename_file, unlock_directory
    use thud_text, only: newline, to_text
    implicit none (type, external)
    private
 
-   public :: check_owner, get_file_stem, read_text_file, text_file_type, write_files
+   public :: check_owner, get_file_stem, read_text_file, remove_parts, text_file_type, write_files
 
    !> Size of the largest input file that is read, bytes.
-   integer(int64), parameter :: largest_input = 1048576_int64
+   integer(int64), parameter :: largest_input = 65536_int64
 
    !> A file to be written.
    type :: text_file_type
       !> Name without directory.
-      character(len=:), allocatable :: name
+      character(len=32) :: name = ''
       !> All of its text.
       character(len=:), allocatable :: content
    end type text_file_type
@@ -42,22 +43,23 @@ contains
       else if (directory_exists(path)) then
          error = input_error('this is a directory; allowed: the path of a namelist file')
       else
+         inquire (file=path, size=bytes)
+         if (bytes > largest_input .or. bytes < 1) then
+            ! Pipes and devices have no size; to open one could take for ever.
+            error = input_error('the file is '//trim(merge('empty or not a regular file', 'too large                  ', &
+               bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(largest_input))//' bytes')
+            return
+         end if
          open (newunit=unit, file=path, status='old', action='read', access='stream', form='unformatted', &
             iostat=status, iomsg=message)
          if (status /= 0) then
             error = input_error('the file cannot be read ('//trim(message)//'); allowed: a readable namelist file')
             return
          end if
-         inquire (unit=unit, size=bytes)
-         if (bytes > largest_input .or. bytes < 1) then
-            error = input_error('the file is '//trim(merge('empty    ', 'too large', bytes < 1)) &
-               //'; allowed: a namelist file of 1 to '//to_text(int(largest_input))//' bytes')
-         else
-            allocate (character(len=bytes) :: text)
-            read (unit, iostat=status, iomsg=message) text
-            if (status /= 0) error = input_error('the file cannot be read ('//trim(message) &
-               //'); allowed: a readable namelist file')
-         end if
+         allocate (character(len=bytes) :: text)
+         read (unit, iostat=status, iomsg=message) text
+         if (status /= 0) error = input_error('the file cannot be read ('//trim(message) &
+            //'); allowed: a readable namelist file')
          close (unit)
       end if
    end subroutine read_text_file
@@ -105,6 +107,9 @@ contains
    end subroutine check_owner
 
    !> Writes a set of files into a directory, which is made where it is missing.
+   !>
+   !> The directory is locked meanwhile; a process that dies leaves no lock and nothing but files
+   !> named `.<name>.part`, which the next one replaces.
    subroutine write_files(directory, files, error)
       !> The directory.
       character(len=*), intent(in) :: directory
@@ -112,7 +117,7 @@ contains
       type(text_file_type), intent(in) :: files(:)
       !> A file could not be written; then none of them was, and older ones are as they were.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: ending
+      type(lock_type) :: lock
       logical :: done, was_there
       integer :: i
 
@@ -122,27 +127,40 @@ contains
          error = input_error('--output '//directory//' cannot be made; allowed: a directory that you may write to')
          return
       end if
-      ! Under other names first: after the last one only renaming is left to do.
-      ending = '.'//to_text(get_process_id())//'.part'
+      call lock_directory(directory, lock)
       do i = 1, size(files)
-         call write_text_file(directory//'/.'//files(i)%name//ending, files(i)%content, error)
+         if (directory_exists(directory//'/'//trim(files(i)%name))) then
+            error = input_error('--output '//directory//': '//trim(files(i)%name)//' is a directory; allowed: a file of this name')
+         else
+            call write_text_file(directory//'/.'//trim(files(i)%name)//'.part', files(i)%content, error)
+         end if
          if (allocated(error)) exit
       end do
+      ! Only renaming is left to do.
       if (.not. allocated(error)) then
          do i = 1, size(files)
-            call rename_file(directory//'/.'//files(i)%name//ending, directory//'/'//files(i)%name, done)
-            if (done) cycle
-            error = input_error('--output '//directory//': '//files(i)%name//' cannot be replaced; ' &
+            call rename_file(directory//'/.'//trim(files(i)%name)//'.part', directory//'/'//trim(files(i)%name), done)
+            if (.not. done) error = input_error('--output '//directory//': '//trim(files(i)%name)//' cannot be replaced; ' &
                //'allowed: a directory that you may write to')
-            exit
          end do
       end if
-      if (.not. allocated(error)) return
-      do i = 1, size(files)
-         call remove_file(directory//'/.'//files(i)%name//ending)
-      end do
-      if (.not. was_there) call remove_file(directory)
+      if (allocated(error)) call remove_parts(directory, files%name)
+      call unlock_directory(lock)
+      if (allocated(error) .and. .not. was_there) call remove_file(directory)
    end subroutine write_files
+
+   !> Removes what a process that died while writing has left.
+   subroutine remove_parts(directory, names)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Names of the files: [n_file].
+      character(len=*), intent(in) :: names(:)
+      integer :: i
+
+      do i = 1, size(names)
+         call remove_file(directory//'/.'//trim(names(i))//'.part')
+      end do
+   end subroutine remove_parts
 
    !> Writes one file.
    subroutine write_text_file(path, content, error)

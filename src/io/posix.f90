@@ -1,21 +1,37 @@
 !> The few calls of the operating system that Fortran lacks (POSIX.1-2008).
 module thud_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_null_char, c_null_ptr, c_ptr, c_size_t
    implicit none (type, external)
    private
 
-   public :: directory_exists, get_process_id, ignore_size_signal, is_empty_directory, make_directory, print_text
-   public :: remove_file, rename_file, standard_error, standard_output
+   public :: directory_exists, ignore_signals, is_empty_directory, lock_directory, lock_type, make_directory, print_text
+   public :: remove_file, rename_file, standard_error, standard_output, unlock_directory
 
    !> Descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
 
+   !> A lock on a directory; the system drops it with the process.
+   type :: lock_type
+      private
+      !> The open directory, null where there is no lock.
+      type(c_ptr) :: directory = c_null_ptr
+   end type lock_type
+
    interface
-      function c_getpid() bind(c, name='getpid') result(process)
+      function c_dirfd(directory) bind(c, name='dirfd') result(descriptor)
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: directory
+         integer(c_int) :: descriptor
+      end function c_dirfd
+
+      function c_flock(descriptor, operation) bind(c, name='flock') result(status)
          import :: c_int
          implicit none (type, external)
-         integer(c_int) :: process
-      end function c_getpid
+         integer(c_int), value :: descriptor
+         integer(c_int), value :: operation
+         integer(c_int) :: status
+      end function c_flock
 
       function c_mkdir(path, mode) bind(c, name='mkdir') result(status)
          import :: c_char, c_int
@@ -100,24 +116,44 @@ contains
       end do
    end subroutine print_text
 
-   !> Makes a file that grows beyond the limit of the process an error of its write and not the
-   !> end of the process.
-   subroutine ignore_size_signal()
-      integer(c_int), parameter :: sigxfsz = 25
+   !> Makes two signals errors of the write that causes them and not the end of the process: a file
+   !> that grows beyond the limit of the process, and a pipe that nobody reads.
+   subroutine ignore_signals()
+      integer(c_int), parameter :: sigpipe = 13, sigxfsz = 25
       integer(c_intptr_t), parameter :: ignore = 1
       integer(c_intptr_t) :: old_handler
 
       old_handler = c_signal(sigxfsz, ignore)
+      old_handler = c_signal(sigpipe, ignore)
       if (old_handler < 0) return
-   end subroutine ignore_size_signal
+   end subroutine ignore_signals
 
-   !> Number of this process, for the names of temporary files.
-   function get_process_id() result(process)
-      !> Process number.
-      integer :: process
+   !> Waits for and takes the lock on a directory. File systems without locks go without.
+   subroutine lock_directory(path, lock)
+      !> Path of the directory.
+      character(len=*), intent(in) :: path
+      !> The lock.
+      type(lock_type), intent(out) :: lock
+      integer(c_int), parameter :: exclusive = 2
+      integer(c_int) :: status
 
-      process = int(c_getpid())
-   end function get_process_id
+      lock%directory = c_opendir(path//c_null_char)
+      if (.not. c_associated(lock%directory)) return
+      status = c_flock(c_dirfd(lock%directory), exclusive)
+      if (status /= 0) call unlock_directory(lock)
+   end subroutine lock_directory
+
+   !> Gives a lock back.
+   subroutine unlock_directory(lock)
+      !> The lock.
+      type(lock_type), intent(inout) :: lock
+      integer(c_int) :: status
+
+      if (.not. c_associated(lock%directory)) return
+      status = c_closedir(lock%directory)
+      lock%directory = c_null_ptr
+      if (status /= 0) return
+   end subroutine unlock_directory
 
    !> Whether a directory of that name is there.
    function directory_exists(path) result(there)

@@ -3,10 +3,12 @@ module thud_run
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count
    use thud_case, only: case_type, get_case_text, read_case
    use thud_error, only: error_type
-   use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, write_files
+   use thud_file, only: check_owner, get_file_stem, read_text_file, remove_parts, text_file_type, &
+      write_files
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_posix, only: remove_file
    use thud_report, only: get_force_csv, get_levels_csv, get_summary, get_table
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
@@ -15,6 +17,14 @@ module thud_run
    private
 
    public :: load_case, outcome_type, run_case, solve_case
+
+   !> Files of a run.
+   character(len=13), parameter :: file_names(4) = [character(len=13) :: &
+      'force.csv', 'levels.csv', 'summary.nml', 'effective.nml']
+
+   !> Figures that the driver may have added; they show the results that they were drawn from.
+   character(len=10), parameter :: figure_names(4) = [character(len=10) :: &
+      'force.png', 'force.svg', 'levels.png', 'levels.svg']
 
    !> What a run leaves for its caller.
    type :: outcome_type
@@ -46,14 +56,16 @@ contains
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: elastic_level(:), floor_level(:)
       character(len=:), allocatable :: input
+      type(text_file_type) :: files(size(file_names))
       logical :: differs
-      integer :: first
+      integer :: first, i
 
       call load_case(path, case, error)
       if (allocated(error)) return
       input = get_case_text(case)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
+      call remove_parts(outcome%directory, file_names)
       call check_owner(outcome%directory, 'effective.nml', input, differs, error)
       if (.not. allocated(error)) call solve_case(case, history, error)
       if (.not. allocated(error)) call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
@@ -62,15 +74,22 @@ contains
          outcome%table = get_table(case, history, elastic_level, floor_level, criteria)
          ! The octaves come first and serve the verdict also where only thirds are asked for.
          first = merge(octave_count, 0, case%bands == 'third') + 1
-         call write_files(outcome%directory, [ &
-            text_file_type('force.csv', get_force_csv(history)), &
-            text_file_type('levels.csv', get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), &
-            criteria, trim(case%level_force))), &
-            text_file_type('summary.nml', get_summary(case, history, criteria)), &
-            text_file_type('effective.nml', input)], error)
+         files%name = file_names
+         files(1)%content = get_force_csv(history)
+         files(2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
+            trim(case%level_force))
+         files(3)%content = get_summary(case, history, criteria)
+         files(4)%content = input
+         call write_files(outcome%directory, files, error)
+      end if
+      if (.not. allocated(error)) then
          outcome%remark = ''
-         if (differs) outcome%remark = path//': replaces the results of another input of the same name in ' &
-            //outcome%directory
+         if (differs) then
+            outcome%remark = path//': replaces the results of another input of the same name in '//outcome%directory
+            do i = 1, size(figure_names)
+               call remove_file(outcome%directory//'/'//trim(figure_names(i)))
+            end do
+         end if
       end if
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
@@ -119,7 +138,8 @@ contains
       !> A level cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
-      real(wp), allocatable :: force(:)
+      real(wp) :: levels(octave_count)
+      integer :: n_peak
 
       bands = get_octaves()
       if (case%bands /= 'octave') bands = [get_octaves(), get_thirds()]
@@ -133,14 +153,14 @@ contains
       call get_source_limits(case%source, limits, error)
       if (allocated(error)) return
       if (case%level_force == 'elastic') then
-         force = history%elastic_force
-         criteria = get_criteria(limits, elastic_level(:octave_count), history%contact_time, history%restitution, &
-            get_peak_count(force), case%ball%mass, case%drop%height)
+         levels = elastic_level(:octave_count)
+         n_peak = get_peak_count(history%elastic_force)
       else
-         force = history%floor_force
-         criteria = get_criteria(limits, floor_level(:octave_count), history%contact_time, history%restitution, &
-            get_peak_count(force), case%ball%mass, case%drop%height)
+         levels = floor_level(:octave_count)
+         n_peak = get_peak_count(history%floor_force)
       end if
+      criteria = get_criteria(limits, levels, history%contact_time, history%restitution, n_peak, case%ball%mass, &
+         case%drop%height)
    end subroutine judge_case
 
 end module thud_run

@@ -60,6 +60,9 @@ contains
          call check_measured_modes(options%measured_modes, ball, error)
       case ('hunt_crossley')
          call check_hunt_crossley(options%hunt_crossley, error)
+      case default
+         ! Its options cannot contradict each other.
+         return
       end select
    end subroutine check_model
 

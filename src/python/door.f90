@@ -8,7 +8,7 @@ module thud_door
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count, third_count
    use thud_case, only: case_type, describe_keys, get_case_text, read_case
    use thud_constants, only: program_version => version
-   use thud_error, only: error_type
+   use thud_error, only: error_type, input_error
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
@@ -120,6 +120,9 @@ contains
       part_names = ''
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call solve_case(case, history, error)
+      if (.not. allocated(error)) then
+         if (size(history%deflection) /= n_sample) error = input_error('n_sample is not that of count_samples')
+      end if
       call tell(error, status, message)
       if (status /= 0) return
       deflection = history%deflection

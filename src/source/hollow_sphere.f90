@@ -4,14 +4,14 @@ module thud_hollow_sphere
    use thud_ball, only: ball_type
    use thud_constants, only: pi
    use thud_drop, only: drop_type
-   use thud_error, only: error_type, numerical_error
+   use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, name_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_error, lumped_type, solve_lumped
    use thud_new_field, only: choice_field
    use thud_sampling, only: sampling_type
-   use thud_text, only: fixed, to_text
+   use thud_text, only: fixed, join_quoted, quoted, to_text
    implicit none (type, external)
    private
 
@@ -218,6 +218,11 @@ contains
       !> The error.
       type(error_type) :: error
 
+      ! A state far outside was not reached by the shell but by too long a step.
+      if (.not. abs(state(at_deflection)/self%closing_deflection - 0.5_wp) < 0.52_wp) then
+         error = coarse_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
+         return
+      end if
       error = numerical_error('&drop: height = '//to_text(drop%height)//' m closes the shell: ' &
          //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*state(at_deflection), 2) &
          //' mm; allowed: less than the height of the cavity, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
@@ -241,6 +246,11 @@ contains
       integer :: choice
 
       choice = findloc(flux_choices, options%momentum_flux, dim=1)
+      if (choice == 0) then
+         error = input_error('&hollow_sphere: momentum_flux = '//quoted(options%momentum_flux)//' is not allowed; allowed: ' &
+            //join_quoted(flux_choices))
+         return
+      end if
       shell = new_shell(ball, compression_weight(choice))
       shell%next_flux_weight = restitution_weight(choice)
       call solve_lumped(shell, drop, sampling, [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'], &

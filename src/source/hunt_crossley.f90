@@ -62,7 +62,7 @@ contains
          real_field(group, 'contact_time', options%contact_time, 's', &
          'wanted contact time; 0: from stiffness', 0.0_wp, 10.0_wp), &
          real_field(group, 'exponent', options%exponent, '', 'exponent of the deflection', 1.0_wp, 5.0_wp), &
-         real_field(group, 'damping', options%damping, 's/m', 'damping alpha; 0: from restitution', 0.0_wp, 1.0e6_wp), &
+         real_field(group, 'damping', options%damping, 's/m', 'damping alpha; 0: from restitution', 0.0_wp, 1.0e2_wp), &
          real_field(group, 'restitution', options%restitution, '', &
          'wanted coefficient of restitution; 0: from damping', 0.0_wp, 1.0_wp)]
    end function get_hunt_crossley_fields
@@ -163,8 +163,24 @@ contains
          !> Zero where the balance holds.
          real(wp) :: missing
 
-         missing = x - log(1 + x) + restitution*x + log(1 - restitution*x)
+         missing = excess(x) - excess(-restitution*x)
       end function balance
+
+      !> x - ln(1 + x), also for small x.
+      pure function excess(x) result(value)
+         !> Argument above -1.
+         real(wp), intent(in) :: x
+         !> The value.
+         real(wp) :: value
+         integer :: k
+
+         if (abs(x) > 0.03_wp) then
+            value = x - log(1 + x)
+         else
+            ! Ten terms of the series leave 0.03**12.
+            value = sum([((-x)**k/k, k=2, 11)])
+         end if
+      end function excess
 
    end function get_damping
 
@@ -183,24 +199,29 @@ contains
       real(wp), intent(in) :: mass
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> k, N/m^exponent.
+      !> k, N/m^exponent; 0 where the damping is too high for a rebound.
       real(wp) :: stiffness
       real(wp), parameter :: step = 1.0e-3_wp
+      integer, parameter :: most_steps = 1000000
       type(spring_type) :: spring
       real(wp) :: state(4)
       real(wp) :: next(4)
       real(wp) :: time, length
+      integer :: i
       logical :: valid
 
       spring = spring_type(mass=1.0_wp, exponent=exponent, damping=damping*impact_velocity)
       state = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
       time = 0.0_wp
-      do
+      do i = 1, most_steps
          call rk4_step(spring, time, state, step, next, valid)
-         if (next(at_deflection) <= 0.0_wp) exit
+         ! Asked so that NaN ends the march too.
+         if (.not. next(at_deflection) > 0.0_wp) exit
          state = next
          time = time + step
       end do
+      stiffness = 0.0_wp
+      if (.not. next(at_deflection) <= 0.0_wp) return
       time = time + locate_zero(spring, time, state, step, at_deflection)
       length = contact_time*impact_velocity/time
       stiffness = mass*impact_velocity**2/length**(exponent + 1)
@@ -228,6 +249,11 @@ contains
       if (options%restitution > 0.0_wp) spring%damping = get_damping(options%restitution, v0)
       if (options%contact_time > 0.0_wp) then
          spring%stiffness = get_stiffness(options%contact_time, spring%exponent, spring%damping, spring%mass, v0)
+         if (.not. spring%stiffness > 0.0_wp) then
+            error = input_error('&hunt_crossley: damping = '//to_text(spring%damping)//' s/m at '//to_text(v0) &
+               //' m/s gives no contact time; allowed: lower damping')
+            return
+         end if
       end if
       call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error)
    end subroutine solve_hunt_crossley

@@ -11,7 +11,7 @@ module thud_lumped
    implicit none (type, external)
    private
 
-   public :: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
+   public :: at_deflection, at_impulse, at_loss, at_velocity, coarse_error, lumped_type, solve_lumped
 
    !> Places of the quantities in the state: deflection (m), velocity (m/s), impulse given to the
    !> floor (N s), energy lost (J).
@@ -20,6 +20,9 @@ module thud_lumped
    !> Residual of the balances of impulse and energy above which a result is refused. At the
    !> default step the paper's case has 1e-12.
    real(wp), parameter :: most_residual = 1.0e-6_wp
+
+   !> Samples that a contact needs to be more than a few spikes.
+   real(wp), parameter :: least_samples = 8.0_wp
 
    !> Equation of motion of the source; its state is laid out as above.
    type, abstract, extends(ode_type) :: lumped_type
@@ -119,6 +122,11 @@ contains
          return
       end if
       history%contact_time = time
+      if (time*sampling%sample_rate < least_samples) then
+         error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the contact of ' &
+            //to_text(time)//' s too few samples; allowed: from '//to_text(least_samples/time)//' Hz')
+         return
+      end if
       call finish(source%mass, state, history, error)
 
    contains
@@ -179,6 +187,7 @@ contains
       history%deflection(i) = state(at_deflection)
       history%velocity(i) = state(at_velocity)
       call source%get_parts(state, history%part(i, :), history%elastic_force(i))
+      history%peak_floor_force = max(history%peak_floor_force, sum(history%part(i, :)))
       ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
       if (i == 1) history%part(i, :) = history%part(i, :)/2
       history%floor_force(i) = sum(history%part(i, :))
@@ -205,13 +214,23 @@ contains
          history%energy_residual = abs(mass/2*velocity**2 + state(at_loss) - energy)/energy
       end associate
       history%peak_force = max(history%peak_force, maxval(history%elastic_force))
-      history%peak_floor_force = max(history%peak_force, maxval(history%floor_force))
+      history%peak_floor_force = max(history%peak_force, history%peak_floor_force)
       ! Asked so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= most_residual) then
-         error = numerical_error('&sampling: substeps is too low: the balance of impulse misses by ' &
-            //to_text(history%impulse_residual)//' and that of energy by '//to_text(history%energy_residual) &
-            //'; allowed: up to '//to_text(most_residual))
+         error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
+            //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(most_residual))
       end if
    end subroutine finish
+
+   !> Error of steps that are too long for the source.
+   pure function coarse_error(finding) result(error)
+      !> What tells it.
+      character(len=*), intent(in) :: finding
+      !> The error.
+      type(error_type) :: error
+
+      error = numerical_error('&sampling: substeps is too low for this source: '//finding &
+         //'; allowed: more substeps, or a source of lower stiffness over mass')
+   end function coarse_error
 
 end module thud_lumped

@@ -3,12 +3,12 @@
 !> velocity, and the contact lasts until the sum of their forces first returns to zero.
 module thud_measured_modes
    use thud_ball, only: ball_type
+   use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
-   use thud_error, only: error_type, input_error
+   use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
    use thud_force_history, only: force_history_type, new_force_history
    use thud_kinds, only: wp
-   use thud_constants, only: pi
    use thud_new_field, only: list_field, logical_field
    use thud_sampling, only: get_sample_count, sampling_type
    use thud_text, only: fixed, to_text
@@ -19,6 +19,10 @@ module thud_measured_modes
 
    !> Part by which the effective masses may miss the mass of the ball: their printed digits.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
+
+   !> Residual of the balances of impulse and energy above which a result is refused; the
+   !> quadrature that checks them has 1e-10.
+   real(wp), parameter :: most_residual = 1.0e-6_wp
 
    !> Options of the model: one entry per mode in each list.
    type :: measured_modes_type
@@ -106,7 +110,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(mode_type) :: modes(options%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
-      integer :: i, n_sample
+      integer :: i, j, n_sample, substeps
+      logical :: released
 
       modes = new_mode(options%frequency%values(:size(modes)), options%damping_ratio%values(:size(modes)), &
          options%effective_mass%values(:size(modes)))
@@ -115,24 +120,37 @@ contains
       step = 1/sampling%sample_rate
       history = new_force_history(sampling%sample_rate, n_sample, ['modal_force'])
       history%impact_velocity = v0
-      do i = 1, n_sample
+      ! The first zero is not to be missed: sixteen looks at the shortest period.
+      substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
+      released = .false.
+      march: do i = 1, n_sample
          time = (i - 1)*step
-         call get_motion(modes, v0, time, deflection, velocity, force)
-         if (i > 1 .and. force <= 0.0_wp) exit
-         history%deflection(i) = deflection
-         history%velocity(i) = velocity
-         history%part(i, 1) = force
-      end do
-      if (i > n_sample) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends after '//fixed(1.0e3_wp*time, 1) &
-            //' ms of contact; allowed: longer than the contact')
+         call get_motion(modes, v0, time, history%deflection(i), history%velocity(i), history%part(i, 1))
+         do j = 1, substeps
+            time = (i - 1 + real(j, wp)/substeps)*step
+            call get_motion(modes, v0, time, deflection, velocity, force)
+            released = force <= 0.0_wp
+            if (released) exit march
+         end do
+      end do march
+      if (.not. released) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends after ' &
+            //fixed(1.0e3_wp*time, 1)//' ms of contact; allowed: longer than the contact')
          return
       end if
       ! Dashpots begin with a jump; a sample of a jump is the mean of its two sides.
       history%part(1, 1) = history%part(1, 1)/2
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
-      call finish(modes, release_time(modes, v0, time - step, time), history)
+      call finish(modes, release_time(modes, v0, time - step/substeps, time), history)
+      if (history%restitution < 0.0_wp) then
+         error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
+            //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
+      else if (.not. max(history%impulse_residual, history%energy_residual) <= most_residual) then
+         error = numerical_error('&measured_modes: the balance of impulse misses by ' &
+            //to_text(history%impulse_residual)//' and that of energy by '//to_text(history%energy_residual) &
+            //'; allowed: up to '//to_text(most_residual))
+      end if
    end subroutine solve_measured_modes
 
    !> One mode from its measured numbers.
@@ -154,7 +172,7 @@ contains
 
    !> Sum of all modes at one time: d_n = (v0/w_d) exp(-zeta w t) sin(w_d t),
    !> F = sum M_n (w^2 d_n + 2 zeta w d_n').
-   pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force)
+   pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force, power, stored)
       !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s.
@@ -167,6 +185,10 @@ contains
       real(wp), intent(out) :: velocity
       !> Force on the floor, N.
       real(wp), intent(out) :: force
+      !> Power of the dashpots, W.
+      real(wp), intent(out), optional :: power
+      !> Kinetic and elastic energy, J.
+      real(wp), intent(out), optional :: stored
       real(wp), dimension(size(modes)) :: d, v, decay, sine
 
       associate (m => modes%mass, w => modes%omega, zeta => modes%zeta, wd => modes%omega_damped)
@@ -177,6 +199,8 @@ contains
          deflection = sum(m*d)/sum(m)
          velocity = sum(m*v)/sum(m)
          force = sum(m*(w**2*d + 2*zeta*w*v))
+         if (present(power)) power = sum(2*m*zeta*w*v**2)
+         if (present(stored)) stored = sum(m*(v**2 + (w*d)**2))/2
       end associate
    end subroutine get_motion
 
@@ -217,21 +241,28 @@ contains
       real(wp), intent(in) :: contact_time
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
-      integer, parameter :: n_interval = 4096
-      real(wp) :: deflection, velocity, force, integral
-      integer :: i
+      real(wp) :: deflection, velocity, force, impulse, loss, energy, power, stored, weight
+      integer :: i, n_interval
 
-      integral = 0.0_wp
+      ! Simpson's rule with 64 intervals in the shortest period.
+      n_interval = max(4096, 2*ceiling(32*contact_time*maxval(modes%omega)/(2*pi)))
+      impulse = 0.0_wp
+      loss = 0.0_wp
       do i = 0, n_interval
-         call get_motion(modes, history%impact_velocity, contact_time*i/n_interval, deflection, velocity, force)
-         integral = integral + force*merge(1, merge(4, 2, mod(i, 2) == 1), mod(i, n_interval) == 0)
+         call get_motion(modes, history%impact_velocity, contact_time*i/n_interval, deflection, velocity, force, power, &
+            stored)
+         weight = contact_time/(3*n_interval)*merge(1, merge(4, 2, mod(i, 2) == 1), mod(i, n_interval) == 0)
+         impulse = impulse + weight*force
+         loss = loss + weight*power
          history%peak_force = max(history%peak_force, force)
          history%max_deflection = max(history%max_deflection, deflection)
       end do
       history%contact_time = contact_time
       history%restitution = -velocity/history%impact_velocity
       history%impulse = sum(modes%mass)*(history%impact_velocity - velocity)
-      history%impulse_residual = abs(integral*contact_time/(3*n_interval) - history%impulse)/history%impulse
+      history%impulse_residual = abs(impulse - history%impulse)/history%impulse
+      energy = sum(modes%mass)/2*history%impact_velocity**2
+      history%energy_residual = abs(stored + loss - energy)/energy
       history%peak_floor_force = history%peak_force
    end subroutine finish
 

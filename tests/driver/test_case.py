@@ -51,15 +51,28 @@ def test_invalid_case_is_not_written(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="nowhere"):
+def test_failed_write_leaves_nothing_behind(tmp_path: Path) -> None:
+    path = tmp_path / "case.nml"
+    path.mkdir()
+    with pytest.raises(OSError, match=r"case\.nml"):
+        thud.write_case(thud.Case(), path)
+    with pytest.raises(OSError, match=r"nowhere/case\.nml"):
         thud.write_case(thud.Case(), tmp_path / "nowhere/case.nml")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["case.nml"]
+    with pytest.raises(thud.InputError, match="allowed: the path of a file"):
+        thud.write_case(thud.Case(), "a\0b")
 
 
 @pytest.mark.parametrize("value", [None, [1.0], 1j, {}, b"2"], ids=repr)
 def test_values_of_other_types_are_refused(value: object) -> None:
     with pytest.raises(thud.InputError, match=r"&ball: mass = .* allowed"):
         thud.solve(thud.Ball(mass=value))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\0b"], ids=repr)
+def test_names_are_plain_text(name: str) -> None:
+    with pytest.raises(thud.InputError, match=r"&case: name = .* is not allowed"):
+        thud.solve_case(thud.Case(name=name))
 
 
 def test_errors_of_a_file_name_the_file(case_file: Callable[..., Path]) -> None:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import subprocess
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -14,7 +16,6 @@ from thud import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     CaseFile = Callable[..., Path]
 
@@ -128,6 +129,33 @@ def test_figures_that_cannot_be_saved_are_told(
     (tmp_path / "file").write_text("")
     assert cli.main(["figures", "-q", "-o", "file/drawn"]) == 1
     assert "allowed: a place that you may write to" in capsys.readouterr().err
+
+
+def test_empty_output_is_told(case_file: CaseFile, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["run", "-q", "-o", " ", str(case_file(MINIMAL))]) == 1
+    assert "--output has no value" in capsys.readouterr().err
+
+
+def test_figure_that_cannot_be_replaced_is_named(
+    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    case = str(case_file(MINIMAL))
+    assert cli.main(["run", "-q", case]) == 0
+    (tmp_path / "outputs/case/force.png").unlink()
+    (tmp_path / "outputs/case/force.png").mkdir()
+    assert cli.main(["run", "-q", case]) == 1
+    assert "outputs/case/force.png: Is a directory; allowed: " in capsys.readouterr().err
+
+
+def test_full_screen_is_an_error_without_a_traceback(case_file: CaseFile, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "thud.cli", "run", "--no-figures", str(case_file(MINIMAL))]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False
+        )
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+    assert "standard output: No space left on device" in done.stderr
 
 
 def test_interruption_is_not_a_traceback(

@@ -41,9 +41,9 @@ def test_every_input_runs_and_agrees_with_the_driver(run: Run, tmp_path: Path, p
     # The same library: not one bit may differ.
     assert np.array_equal(columns["elastic_force_N"], impact.elastic_force)
     assert np.array_equal(columns["floor_force_N"], impact.floor_force)
-    assert np.array_equal(columns["shell_force_N"], impact.shell_force)
-    assert np.array_equal(columns["gas_force_N"], impact.gas_force)
-    assert np.array_equal(columns["flux_force_N"], impact.flux_force)
+    assert impact.parts
+    for name, part in impact.parts.items():
+        assert np.array_equal(columns[f"{name}_N"], part)
     assert np.array_equal(columns["deflection_m"], impact.deflection)
     assert np.array_equal(columns["velocity_m_per_s"], impact.velocity)
     assert np.array_equal(columns["time_s"], impact.time)
@@ -170,6 +170,11 @@ BAD_CASES = {
     ),
     "unknown model": ("&ball / &drop / &model name = 'cube' /", "allowed: 'hollow_sphere'"),
     "empty file": ("", "the file is empty"),
+    "null value": ("&ball mass = 1* / &drop / &model /", "&ball: mass = 1* is not a number"),
+    "bare exponent": ("&ball / &drop height = 1+3 / &model /", "&drop: height = 1+3 is not a num"),
+    "long name": (f"&case name = '{'x' * 129}' / {MINIMAL}", "is not short text in quotes"),
+    "foreign options": (f"{MINIMAL}&hunt_crossley /", "&hunt_crossley in line 4 does nothing"),
+    "huge file": ("! " + 70000 * "x", "the file is too large"),
     "binary file": ("\x7fELF\x00\x01", "line 1"),
     "text": ("Dear Sir or Madam,", "line 1 stands outside a group"),
 }
@@ -231,6 +236,60 @@ def test_directory_that_cannot_be_made_is_told(run: Run, case_file: CaseFile, pl
     assert result.returncode == 1
     assert f"--output {place}" in result.stderr
     assert "; allowed: " in result.stderr
+
+
+def test_stale_figures_do_not_stand_beside_new_results(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    run(case_file(MINIMAL))
+    figure = tmp_path / "outputs/case/force.png"
+    figure.write_text("drawn from the old results")
+    run(case_file(MINIMAL))
+    assert figure.exists()
+    run(case_file("&ball mass = 2.4 / &drop / &model /"))
+    assert not figure.exists()
+
+
+def test_killed_run_does_not_lock_its_directory(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    left = tmp_path / "outputs/case/.force.csv.part"
+    left.parent.mkdir(parents=True)
+    left.write_text("half a fi")
+    assert run(case_file(MINIMAL)).returncode == 0
+    assert sorted(path.name for path in left.parent.iterdir()) == FILES
+
+
+def test_runs_into_one_directory_do_not_mix(
+    executable: str, case_file: CaseFile, tmp_path: Path
+) -> None:
+    for height in ("1.0", "0.3"):
+        (tmp_path / height).mkdir()
+        case_file(f"&ball / &drop height = {height} / &model /", f"{height}/case.nml")
+    for _ in range(20):
+        running = [
+            subprocess.Popen([executable, f"{height}/case.nml", "-q", "-o", "o"], cwd=tmp_path)
+            for height in ("1.0", "0.3")
+        ]
+        assert [process.wait() for process in running] == [0, 0]
+        height = f90nml.read(tmp_path / "o/effective.nml")["drop"]["height"]
+        summary = f90nml.read(tmp_path / "o/summary.nml")
+        assert summary["verdict"]["value"][-1] == height
+
+
+def test_pipe_as_input_is_told(run: Run, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    result = run("pipe")
+    assert result.returncode == 1
+    assert "pipe: the file is empty or not a regular file" in result.stderr
+
+
+def test_closed_pipe_is_an_error_without_a_crash(executable: str, tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    result = subprocess.run([executable, "--keys"], stdout=writer, cwd=tmp_path, check=False)
+    os.close(writer)
+    assert result.returncode == 1
 
 
 def test_full_disk_leaves_nothing(run: Run, case_file: CaseFile, tmp_path: Path) -> None:

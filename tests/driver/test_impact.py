@@ -47,7 +47,9 @@ def test_impulse_changes_the_momentum() -> None:
     ball = thud.Ball(mass=2.4)
     impact = thud.solve(ball, thud.Drop(0.5))
     momentum = ball.mass * impact.impact_velocity * (1 + impact.restitution)
-    assert impact.impulse == pytest.approx(momentum, rel=1e-6)
+    # The sum of the samples misses half of the last, partial interval: slope times its square.
+    assert impact.floor_force.sum() / 44100 == pytest.approx(momentum, abs=1e-4)
+    assert impact.impulse == pytest.approx(momentum, rel=1e-12)
 
 
 def test_paper_s_ball_does_not_conform() -> None:
@@ -74,10 +76,14 @@ def test_low_drop_is_not_the_standard_s() -> None:
 
 
 def test_threads_do_not_disturb_each_other() -> None:
-    heights = np.linspace(0.1, 2.0, 40)
+    # Some fail: errors are made of text, which compilers do not always keep apart.
+    heights = np.concatenate([np.linspace(0.1, 2.0, 40), np.linspace(-2, 0, 40), [1e3, 2e3] * 20])
 
-    def levels(height: float) -> list[float]:
-        impact = thud.solve(drop=thud.Drop(float(height)))
+    def levels(height: float) -> list[float] | str:
+        try:
+            impact = thud.solve(drop=thud.Drop(float(height)))
+        except thud.ThudError as error:
+            return str(error)
         return [*impact.levels(), *impact.levels("third", "fft", "floor")]
 
     with ThreadPoolExecutor(8) as pool:
@@ -95,8 +101,12 @@ def test_threads_do_not_disturb_each_other() -> None:
         ({"substeps": 0}, r"&sampling: substeps = 0 is not allowed; allowed: 1 <= substeps"),
         ({"ball": thud.Ball(poisson_ratio=0.7)}, r"&ball: poisson_ratio = 0.7"),
         ({"drop": thud.Drop(height=-1.0)}, r"&drop: height = -1.0"),
+        ({"ball": 1}, r"ball = 1 is not allowed; allowed: an object of Ball"),
+        ({"ball": {}}, r"ball = {} is not allowed; allowed: an object of Ball"),
+        ({"drop": 0.0}, r"drop = 0.0 is not allowed; allowed: an object of Drop"),
+        ({"ball": thud.Ball(mass=10**5000)}, r"&ball: mass = a very large number"),
+        ({"ball": thud.Ball(youngs_modulus=7e10)}, r"&sampling: sample_rate = .* too few samples"),
     ],
-    ids=str,
 )
 def test_bad_arguments_are_told(arguments: dict[str, object], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
@@ -107,7 +117,7 @@ def test_numerical_failures_are_told() -> None:
     with pytest.raises(thud.NumericalError, match=r"&drop: height = 1000.0 m closes the shell"):
         thud.solve(drop=thud.Drop(1000.0))
     with pytest.raises(thud.NumericalError, match=r"&sampling: substeps is too low"):
-        thud.solve(thud.Ball(youngs_modulus=7e10))
+        thud.solve(thud.Ball(youngs_modulus=1e10))
 
 
 def test_unknown_force_is_told() -> None:

@@ -32,14 +32,22 @@ def test_anything_like_an_array_is_a_record() -> None:
 @pytest.mark.parametrize(
     ("record", "options", "words"),
     [
-        ([], {}, "no samples"),
+        ([], {}, "0 samples; allowed: 1 to"),
         ([0.0, 0.0], {}, "zero throughout"),
         ([1.0, np.nan], {}, "not finite, first at sample 2"),
         ([1.0, np.inf], {}, "not finite"),
         ([[1.0]], {}, "2 dimensions"),
         (1.0, {}, "0 dimensions"),
         ([1j, 2j], {}, "real numbers"),
-        (["a"], {}, "not an array of numbers"),
+        (["a"], {}, "not an array of real numbers"),
+        ([[1.0], [2.0, 3.0]], {}, "not an array of numbers"),
+        ([None, 1.0], {}, "not an array of real numbers"),
+        ([10**400], {}, "not an array of real numbers"),
+        (np.ma.masked_greater([1.0, 2.0], 1.5), {}, "masked entries"),
+        ([1e-160] * 10, {}, "zero throughout, or next to it"),
+        (PULSE, {"sample_rate": 10**400}, "sample_rate = a very large number is not a number"),
+        (PULSE, {"bands": np.array(["octave", "third"])}, "bands = array"),
+        (PULSE, {"method": "é\ud800"}, "is not known"),
         (None, {}, "force"),
         ([1e200], {}, "too large"),
         (PULSE, {"sample_rate": 1000.0}, "sample_rate = 1000.0 Hz is not allowed"),
@@ -48,9 +56,7 @@ def test_anything_like_an_array_is_a_record() -> None:
         (PULSE, {"bands": "fifth"}, "bands = 'fifth' is not known; allowed: 'octave', 'third'"),
         (PULSE, {"method": "guess"}, "'guess' is not known; allowed: 'exact', 'fft'"),
     ],
-    ids=str,
 )
-@pytest.mark.filterwarnings("ignore::numpy.exceptions.ComplexWarning")
 def test_useless_records_are_told(record: object, options: dict[str, object], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.force_exposure_levels(record, **{"sample_rate": 44100.0, **options})  # type: ignore[arg-type]
@@ -70,6 +76,18 @@ def test_verdict_needs_five_levels() -> None:
         thud.judge([1, 2, 3, 4], 0.02, 0.8, 1, 2.5, 1.0)
     with pytest.raises(thud.InputError, match="'rubber_ball', 'tyre'"):
         thud.judge([1, 2, 3, 4, 5], 0.02, 0.8, 1, 2.5, 1.0, source="hammer")
+
+
+@pytest.mark.parametrize("peaks", [1.9, -1, None, "x", np.nan, 2**32 + 1], ids=repr)
+def test_peaks_are_counted_in_whole_numbers(peaks: object) -> None:
+    with pytest.raises(thud.InputError, match=r"peaks = .* is not allowed; allowed: 0 <= peaks"):
+        thud.judge([39, 31, 23, 17, 12.5], 0.02, 0.8, peaks, 2.5, 1.0)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("value", [[0.02, 3], 1j, "soon", None, 10**400], ids=type)
+def test_criteria_are_single_numbers(value: object) -> None:
+    with pytest.raises(thud.InputError, match=r"contact_time = .* is not a number"):
+        thud.judge([39, 31, 23, 17, 12.5], value, 0.8, 1, 2.5, 1.0)  # type: ignore[arg-type]
 
 
 def test_nominal_tyre_conforms() -> None:

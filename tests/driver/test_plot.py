@@ -38,6 +38,18 @@ def test_levels_show_the_tolerance_band(source: str) -> None:
     np.testing.assert_array_equal(curves["floor force"], impact.levels(force="floor"))
 
 
+def test_useless_impacts_are_told() -> None:
+    for impacts in ({}, [], thud.solve()):
+        with pytest.raises(thud.InputError, match="allowed: a mapping of names to impacts"):
+            thud.plot.force_history(impacts)  # type: ignore[arg-type]
+    with pytest.raises(thud.InputError, match="allowed: an object of Impact"):
+        thud.plot.levels({"ball": 1})  # type: ignore[dict-item]
+
+
+def test_names_are_no_formulas(tmp_path: Path) -> None:
+    thud.plot.save(thud.plot.levels({"$x^{$": thud.solve()}), f"{tmp_path}/levels.png")
+
+
 def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     figure = thud.plot.levels({"a": thud.solve(), "b": thud.solve(drop=thud.Drop(0.1))}, "floor")
     assert figure.get_figwidth() == pytest.approx(3.5)

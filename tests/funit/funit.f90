@@ -5,7 +5,7 @@ module funit
    private
 
    public :: SourceLocation, anyExceptions, finish_tests, run_test
-   public :: assertEqual, assertFalse, assertGreaterThan, assertLessThan, assertLessThanOrEqual, assertTrue
+   public :: assertEqual, assertFalse, assertGreaterThan, assertLessThan, assertTrue
 
    !> Place of an assert.
    type :: SourceLocation
@@ -36,10 +36,6 @@ module funit
       module procedure :: greater_integer
       module procedure :: greater_real
    end interface assertGreaterThan
-
-   interface assertLessThanOrEqual
-      module procedure :: less_or_equal_real
-   end interface assertLessThanOrEqual
 
    abstract interface
       !> A test.
@@ -215,13 +211,5 @@ contains
 
       call less_real(b, a, message, location)
    end subroutine greater_real
-
-   subroutine less_or_equal_real(a, b, message, location)
-      real(real64), intent(in) :: a, b
-      character(len=*), intent(in), optional :: message
-      type(SourceLocation), intent(in), optional :: location
-
-      call check(a <= b, 'expected '//text_of(a)//' <= '//text_of(b), message, location)
-   end subroutine less_or_equal_real
 
 end module funit

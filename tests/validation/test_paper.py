@@ -1,8 +1,8 @@
 """The paper's case and the reference values that an independent code found for it.
 
 The reference (DOP853 at a relative tolerance of 1e-11) gives 20.426 ms, 1574 N, 29.02 mm and
-e = 0.889 for a drop of 1 m; the tolerances are its rounding. The paper's own 20.8 ms is no test:
-the rounding of its input data covers it, see below.
+e = 0.889 for a drop of 1 m; the tolerances are those that the project asks for. The
+paper's own 20.8 ms is no test: the rounding of its input data covers it, see below.
 """
 
 from __future__ import annotations

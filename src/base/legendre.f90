@@ -1,0 +1,60 @@
+!> Legendre polynomials and Gauss-Legendre quadrature.
+module thud_legendre
+   use thud_constants, only: pi
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: get_gauss_legendre, get_legendre
+
+contains
+
+   !> Legendre polynomials P_0 to P_degree and their first two derivatives at one place.
+   pure subroutine get_legendre(x, value, first, second)
+      !> Place in [-1, 1].
+      real(wp), intent(in) :: x
+      !> P_j(x): [0:degree].
+      real(wp), intent(out) :: value(0:)
+      !> P_j'(x): [0:degree].
+      real(wp), intent(out) :: first(0:)
+      !> P_j''(x): [0:degree].
+      real(wp), intent(out) :: second(0:)
+      integer :: j
+
+      value(0) = 1.0_wp
+      first(0) = 0.0_wp
+      second(0) = 0.0_wp
+      if (ubound(value, 1) == 0) return
+      value(1) = x
+      first(1) = 1.0_wp
+      second(1) = 0.0_wp
+      do j = 2, ubound(value, 1)
+         value(j) = ((2*j - 1)*x*value(j - 1) - (j - 1)*value(j - 2))/j
+         ! P_j' = P_(j-2)' + (2j - 1) P_(j-1), and its derivative: exact at the ends too.
+         first(j) = first(j - 2) + (2*j - 1)*value(j - 1)
+         second(j) = second(j - 2) + (2*j - 1)*first(j - 1)
+      end do
+   end subroutine get_legendre
+
+   !> Nodes and weights of Gauss-Legendre quadrature on [-1, 1], by Newton's iteration.
+   pure subroutine get_gauss_legendre(node, weight)
+      !> Nodes, ascending: [n].
+      real(wp), intent(out) :: node(:)
+      !> Weights: [n].
+      real(wp), intent(out) :: weight(:)
+      real(wp), dimension(0:size(node)) :: value, first, second
+      integer :: i, iteration, n
+
+      n = size(node)
+      do i = 1, n
+         node(i) = -cos(pi*(i - 0.25_wp)/(n + 0.5_wp))
+         do iteration = 1, 8
+            call get_legendre(node(i), value, first, second)
+            node(i) = node(i) - value(n)/first(n)
+         end do
+         call get_legendre(node(i), value, first, second)
+         weight(i) = 2/((1 - node(i)**2)*first(n)**2)
+      end do
+   end subroutine get_gauss_legendre
+
+end module thud_legendre

@@ -1,0 +1,313 @@
+!> Axisymmetric modes of a free hollow sphere without twist: displacements U(r) P_n(cos t) along
+!> the radius and V(r) dP_n/dt along the meridian, t the angle from the pole.
+!>
+!> Galerkin's method with Legendre polynomials in r; all integrals over the sphere are exact. With
+!> W = r div u the meridional displacement is V = (r U' + 2 U - W)/(n (n + 1)): the unknowns are U
+!> and W, incompressible material (nu = 1/2) is W = 0, and nearly incompressible material does not
+!> lock. Strain energy and kinetic energy become sums of Gram matrices that do not depend on n.
+module thud_sphere_modes
+   use thud_ball, only: ball_type, get_density
+   use thud_constants, only: pi
+   use thud_kinds, only: wp
+   use thud_lapack, only: dposv, dsygv
+   use thud_legendre, only: get_gauss_legendre, get_legendre
+   implicit none (type, external)
+   private
+
+   public :: basis_type, family_type, get_family, get_static_family, new_basis
+
+   !> What is left to rounding of the exact zero of the rigid mode, over the largest eigenvalue.
+   real(wp), parameter :: rigid_threshold = 1.0e-9_wp
+
+   !> Gram matrices of the basis, the same for every harmonic.
+   type :: basis_type
+      !> Outer radius, m.
+      real(wp) :: outer_radius
+      !> Inner radius, m.
+      real(wp) :: inner_radius
+      !> Density, kg/m3.
+      real(wp) :: density
+      !> Shear modulus, Pa.
+      real(wp) :: shear_modulus
+      !> First Lame constant, Pa; not used for incompressible material.
+      real(wp) :: lame = 0.0_wp
+      !> The material is incompressible: W = 0.
+      logical :: incompressible
+      !> Stiffness of the enclosed gas against its change of volume, Pa/m3.
+      real(wp) :: gas_stiffness
+      !> Radii of the quadrature, m: [n_node].
+      real(wp), allocatable :: radius(:)
+      !> Weights of the quadrature, m: [n_node].
+      real(wp), allocatable :: weight(:)
+      !> Polynomials and two derivatives at the radii: [n_node, degree + 1, 3].
+      real(wp), allocatable :: polynomial(:, :, :)
+      !> Polynomials and two derivatives at the outer and at the inner radius: [2, degree + 1, 3].
+      real(wp), allocatable :: at_end(:, :, :)
+      !> Terms of energies by their power of n (n + 1), see `new_basis`: [n, n, 5] with n up to
+      !> 2 (degree + 1).
+      real(wp), allocatable :: gram(:, :, :)
+   end type basis_type
+
+   !> Modes of one harmonic as the contact sees them.
+   type :: family_type
+      !> Harmonic n.
+      integer :: harmonic = 0
+      !> Angular frequencies, ascending, without the rigid mode, rad/s: [n_mode].
+      real(wp), allocatable :: omega(:)
+      !> U and V at the outer surface of modes of unit modal mass, 1/sqrt(kg): [2, n_mode].
+      real(wp), allocatable :: surface(:, :)
+      !> Static displacements of the surface by what the modes leave out, U and V by unit
+      !> generalised forces on U and V, m/N: [2, 2].
+      real(wp) :: flexibility(2, 2) = 0.0_wp
+   end type family_type
+
+contains
+
+   !> Basis for all harmonics up to a highest one.
+   function new_basis(ball, highest_harmonic, with_gas) result(basis)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Highest harmonic that will be asked for.
+      integer, intent(in) :: highest_harmonic
+      !> The enclosed gas resists changes of its volume.
+      logical, intent(in) :: with_gas
+      !> The basis.
+      type(basis_type) :: basis
+      real(wp), allocatable :: node(:), u(:, :), u_slope(:, :), d(:, :), e(:, :), w(:, :)
+      integer :: degree, n, i, power
+
+      basis%outer_radius = ball%outer_radius
+      basis%inner_radius = ball%outer_radius - ball%wall_thickness
+      basis%density = get_density(ball)
+      basis%shear_modulus = ball%youngs_modulus/(2*(1 + ball%poisson_ratio))
+      basis%incompressible = .not. ball%poisson_ratio < 0.5_wp
+      if (.not. basis%incompressible) then
+         basis%lame = 2*basis%shear_modulus*ball%poisson_ratio/(1 - 2*ball%poisson_ratio)
+      end if
+      basis%gas_stiffness = 0.0_wp
+      if (with_gas) basis%gas_stiffness = ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
+         /(4.0_wp/3.0_wp*pi*basis%inner_radius**3)
+
+      degree = get_degree(basis, highest_harmonic)
+      n = degree + 1
+      allocate (node(degree + 6), basis%weight(degree + 6))
+      call get_gauss_legendre(node, basis%weight)
+      basis%radius = (basis%outer_radius + basis%inner_radius + ball%wall_thickness*node)/2
+      basis%weight = basis%weight*ball%wall_thickness/2
+      allocate (basis%polynomial(size(node), n, 3), basis%at_end(2, n, 3))
+      do i = 1, size(node)
+         call get_legendre(node(i), basis%polynomial(i, :, 1), basis%polynomial(i, :, 2), basis%polynomial(i, :, 3))
+      end do
+      call get_legendre(1.0_wp, basis%at_end(1, :, 1), basis%at_end(1, :, 2), basis%at_end(1, :, 3))
+      call get_legendre(-1.0_wp, basis%at_end(2, :, 1), basis%at_end(2, :, 2), basis%at_end(2, :, 3))
+      do i = 2, 3
+         basis%polynomial(:, :, i) = basis%polynomial(:, :, i)*(2/ball%wall_thickness)**(i - 1)
+         basis%at_end(:, :, i) = basis%at_end(:, :, i)*(2/ball%wall_thickness)**(i - 1)
+      end do
+
+      ! Columns for U, then for W: U, r U', D = n (n + 1) V, E = n (n + 1) (r V' - V), W.
+      associate (r => spread(basis%radius, 2, n), p => basis%polynomial, zero => 0*basis%polynomial(:, :, 1))
+         u = reshape([p(:, :, 1), zero], [size(node), 2*n])
+         u_slope = reshape([r*p(:, :, 2), zero], [size(node), 2*n])
+         d = reshape([r*p(:, :, 2) + 2*p(:, :, 1), -p(:, :, 1)], [size(node), 2*n])
+         e = reshape([r*(3*p(:, :, 2) + r*p(:, :, 3)) - r*p(:, :, 2) - 2*p(:, :, 1), &
+            p(:, :, 1) - r*p(:, :, 2)], [size(node), 2*n])
+         w = reshape([zero, p(:, :, 1)], [size(node), 2*n])
+      end associate
+      ! With L = n (n + 1) the strain energy of r^2 e:e is
+      ! (rU')^2 + 2U^2 - 2UD + (1 - 1/L) D^2 + (L U^2 + 2 U E + E^2/L)/2.
+      allocate (basis%gram(2*n, 2*n, 5))
+      associate (mu2 => 2*basis%shear_modulus)
+         basis%gram(:, :, 1) = mu2*(product_of(u_slope, u_slope) + 2*product_of(u, u) - mixed(u, d) + product_of(d, d) &
+            + mixed(u, e)/2) + basis%lame*product_of(w, w)
+         basis%gram(:, :, 2) = mu2*product_of(u, u)/2
+         basis%gram(:, :, 3) = mu2*(product_of(e, e)/2 - product_of(d, d))
+      end associate
+      associate (r => spread(basis%radius, 2, 2*n))
+         basis%gram(:, :, 4) = basis%density*product_of(r*u, r*u)
+         basis%gram(:, :, 5) = basis%density*product_of(r*d, r*d)
+      end associate
+      do power = 1, 5
+         basis%gram(:, :, power) = (basis%gram(:, :, power) + transpose(basis%gram(:, :, power)))/2
+      end do
+
+   contains
+
+      !> Integrals over the wall of products of columns.
+      function product_of(a, b) result(matrix)
+         !> Values at the radii: [n_node, n].
+         real(wp), intent(in) :: a(:, :)
+         !> Values at the radii: [n_node, n].
+         real(wp), intent(in) :: b(:, :)
+         !> The integrals: [n, n].
+         real(wp) :: matrix(size(a, 2), size(b, 2))
+
+         matrix = matmul(transpose(a), spread(basis%weight, 2, size(b, 2))*b)
+      end function product_of
+
+      !> `product_of` both ways.
+      function mixed(a, b) result(matrix)
+         !> Values at the radii: [n_node, n].
+         real(wp), intent(in) :: a(:, :)
+         !> Values at the radii: [n_node, n].
+         real(wp), intent(in) :: b(:, :)
+         !> The integrals: [n, n].
+         real(wp) :: matrix(size(a, 2), size(a, 2))
+
+         matrix = product_of(a, b) + product_of(b, a)
+      end function mixed
+
+   end function new_basis
+
+   !> Degree of the polynomials that resolve a harmonic: its modes fall off like r^n, which takes
+   !> a degree in proportion to the root of the exponent; the tests hold it against higher ones.
+   pure function get_degree(basis, harmonic) result(degree)
+      !> The basis, its radii set.
+      type(basis_type), intent(in) :: basis
+      !> The harmonic.
+      integer, intent(in) :: harmonic
+      !> Degree.
+      integer :: degree
+
+      degree = 10 + ceiling(2.4_wp*sqrt(harmonic*log(basis%outer_radius/basis%inner_radius)))
+   end function get_degree
+
+   !> The lowest modes of one harmonic, and the flexibility of all others.
+   subroutine get_family(basis, harmonic, most_modes, family, failed)
+      !> The basis.
+      type(basis_type), intent(in) :: basis
+      !> Harmonic n.
+      integer, intent(in) :: harmonic
+      !> Number of modes to keep; fewer where the basis has fewer.
+      integer, intent(in) :: most_modes
+      !> The modes.
+      type(family_type), intent(out) :: family
+      !> The eigenproblem could not be solved.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), square(:), work(:)
+      integer :: n, info, first, last, k
+
+      family%harmonic = harmonic
+      call assemble(basis, harmonic, stiffness, mass, surface)
+      n = size(stiffness, 1)
+      allocate (square(n), work(34*n))
+      call dsygv(1, 'V', 'L', n, stiffness, n, mass, n, square, work, size(work), info)
+      failed = info /= 0
+      if (failed) return
+      first = count(square < rigid_threshold*square(n)) + 1
+      if (harmonic /= 1) first = 1
+      last = min(first + most_modes - 1, n)
+      family%omega = sqrt(square(first:last))
+      surface = matmul(surface, stiffness)
+      family%surface = surface(:, first:last)
+      do k = max(last, first - 1) + 1, n
+         family%flexibility = family%flexibility + outer(surface(:, k))/square(k)
+      end do
+   end subroutine get_family
+
+   !> Flexibility of a whole harmonic, without its modes.
+   subroutine get_static_family(basis, harmonic, family, failed)
+      !> The basis.
+      type(basis_type), intent(in) :: basis
+      !> Harmonic n, at least 2.
+      integer, intent(in) :: harmonic
+      !> The flexibility; no modes.
+      type(family_type), intent(out) :: family
+      !> The stiffness is singular.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: stiffness(:, :), mass(:, :), surface(:, :), solution(:, :)
+      integer :: n, info
+
+      family%harmonic = harmonic
+      allocate (family%omega(0), family%surface(2, 0))
+      call assemble(basis, harmonic, stiffness, mass, surface)
+      n = size(stiffness, 1)
+      solution = transpose(surface)
+      call dposv('L', n, 2, stiffness, n, solution, n, info)
+      failed = info /= 0
+      family%flexibility = matmul(surface, solution)
+   end subroutine get_static_family
+
+   !> Stiffness, mass and surface displacements of one harmonic in the basis.
+   subroutine assemble(basis, harmonic, stiffness, mass, surface)
+      !> The basis.
+      type(basis_type), intent(in) :: basis
+      !> Harmonic n.
+      integer, intent(in) :: harmonic
+      !> Stiffness matrix, N/m: [n, n].
+      real(wp), allocatable, intent(out) :: stiffness(:, :)
+      !> Mass matrix, kg: [n, n].
+      real(wp), allocatable, intent(out) :: mass(:, :)
+      !> U and V at the outer surface: [2, n].
+      real(wp), allocatable, intent(out) :: surface(:, :)
+      real(wp) :: l, area
+      integer, allocatable :: used(:)
+      integer :: n, i
+
+      ! Integral of P_n^2 over the unit sphere.
+      area = 4*pi/(2*harmonic + 1)
+      if (harmonic == 0) then
+         call assemble_breathing(basis, stiffness, mass, surface)
+         return
+      end if
+      l = real(harmonic*(harmonic + 1), wp)
+      n = get_degree(basis, harmonic) + 1
+      associate (stride => size(basis%gram, 1)/2)
+         allocate (used(merge(n, 2*n, basis%incompressible)))
+         used(:n) = [(i, i=1, n)]
+         used(n + 1:) = [(stride + i, i=1, size(used) - n)]
+      end associate
+      stiffness = area*(basis%gram(used, used, 1) + l*basis%gram(used, used, 2) + basis%gram(used, used, 3)/l)
+      mass = area*(basis%gram(used, used, 4) + basis%gram(used, used, 5)/l)
+      allocate (surface(2, size(used)), source=0.0_wp)
+      associate (p => basis%at_end(1, :n, :))
+         surface(1, :n) = p(:, 1)
+         surface(2, :n) = (basis%outer_radius*p(:, 2) + 2*p(:, 1))/l
+         if (.not. basis%incompressible) surface(2, n + 1:) = -p(:, 1)/l
+      end associate
+   end subroutine assemble
+
+   !> The same for n = 0, where U = S/r^2 with S a polynomial, a constant if incompressible.
+   subroutine assemble_breathing(basis, stiffness, mass, surface)
+      !> The basis.
+      type(basis_type), intent(in) :: basis
+      !> Stiffness matrix, N/m: [n, n].
+      real(wp), allocatable, intent(out) :: stiffness(:, :)
+      !> Mass matrix, kg: [n, n].
+      real(wp), allocatable, intent(out) :: mass(:, :)
+      !> U at the outer surface, V = 0: [2, n].
+      real(wp), allocatable, intent(out) :: surface(:, :)
+      real(wp), allocatable :: u(:, :), u_slope(:, :), divergence(:, :), inner(:)
+      real(wp) :: scale
+      integer :: n, m
+
+      n = 1
+      if (.not. basis%incompressible) n = get_degree(basis, 0) + 1
+      m = size(basis%radius)
+      allocate (u(m, n), u_slope(m, n), divergence(m, n), inner(n))
+      scale = basis%outer_radius**2
+      associate (r => spread(basis%radius, 2, n), weight => spread(basis%weight, 2, n))
+         u = scale*basis%polynomial(:, :n, 1)/r**2
+         divergence = scale*basis%polynomial(:, :n, 2)/r
+         u_slope = divergence - 2*u
+         stiffness = 4*pi*(2*basis%shear_modulus*(matmul(transpose(u_slope), weight*u_slope) &
+            + 2*matmul(transpose(u), weight*u)) + basis%lame*matmul(transpose(divergence), weight*divergence))
+         mass = 4*pi*basis%density*matmul(transpose(r*u), weight*r*u)
+      end associate
+      inner = scale*basis%at_end(2, :n, 1)/basis%inner_radius**2*4*pi*basis%inner_radius**2
+      stiffness = stiffness + basis%gas_stiffness*outer(inner)
+      allocate (surface(2, n), source=0.0_wp)
+      surface(1, :) = basis%at_end(1, :n, 1)
+   end subroutine assemble_breathing
+
+   !> Vector times its transpose.
+   pure function outer(vector) result(matrix)
+      !> The vector: [n].
+      real(wp), intent(in) :: vector(:)
+      !> The matrix: [n, n].
+      real(wp) :: matrix(size(vector), size(vector))
+
+      matrix = spread(vector, 2, size(vector))*spread(vector, 1, size(vector))
+   end function outer
+
+end module thud_sphere_modes
