@@ -272,7 +272,9 @@ contains
          if (any(model_names == fields(i)%group) .and. fields(i)%group /= case%model) mark = '! '
          call fields(i)%get_allowed(allowed)
          call fields(i)%get_text(value)
-         if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//mark//'&'//trim(fields(i)%group)//newline
+         if (.not. any(fields(:i - 1)%group == fields(i)%group)) then
+            text = text//newline//mark//'&'//trim(fields(i)%group)//newline
+         end if
          text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline &
             //mark//'   '//trim(fields(i)%key)//' = '//value//newline
          if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline

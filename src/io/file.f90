@@ -130,7 +130,8 @@ contains
       call lock_directory(directory, lock)
       do i = 1, size(files)
          if (directory_exists(directory//'/'//trim(files(i)%name))) then
-            error = input_error('--output '//directory//': '//trim(files(i)%name)//' is a directory; allowed: a file of this name')
+            error = input_error('--output '//directory//': '//trim(files(i)%name) &
+               //' is a directory; allowed: a file of this name')
          else
             call write_text_file(directory//'/.'//trim(files(i)%name)//'.part', files(i)%content, error)
          end if

@@ -247,8 +247,8 @@ contains
 
       choice = findloc(flux_choices, options%momentum_flux, dim=1)
       if (choice == 0) then
-         error = input_error('&hollow_sphere: momentum_flux = '//quoted(options%momentum_flux)//' is not allowed; allowed: ' &
-            //join_quoted(flux_choices))
+         error = input_error('&hollow_sphere: momentum_flux = '//quoted(options%momentum_flux) &
+            //' is not allowed; allowed: '//join_quoted(flux_choices))
          return
       end if
       shell = new_shell(ball, compression_weight(choice))
