@@ -9,6 +9,7 @@ module thud_source_model
    use thud_hunt_crossley, only: check_hunt_crossley, get_hunt_crossley_fields, hunt_crossley_type, solve_hunt_crossley
    use thud_measured_modes, only: check_measured_modes, get_measured_modes_fields, measured_modes_type, &
       solve_measured_modes
+   use thud_modal_ball, only: check_modal_ball, get_modal_ball_fields, modal_ball_type, solve_modal_ball
    use thud_sampling, only: sampling_type
    use thud_text, only: join_quoted, quoted
    implicit none (type, external)
@@ -17,13 +18,15 @@ module thud_source_model
    public :: check_model, get_model_fields, model_names, model_options_type, solve_model
 
    !> Names of the models; the options of each stand in the namelist group of its name.
-   character(len=24), parameter :: model_names(3) = [character(len=24) :: &
-      'hollow_sphere', 'measured_modes', 'hunt_crossley']
+   character(len=24), parameter :: model_names(4) = [character(len=24) :: &
+      'hollow_sphere', 'modal_ball', 'measured_modes', 'hunt_crossley']
 
    !> Options of every model.
    type :: model_options_type
       !> The paper's analytical model.
       type(hollow_sphere_type) :: hollow_sphere
+      !> The modes of the sphere.
+      type(modal_ball_type) :: modal_ball
       !> Measured modes.
       type(measured_modes_type) :: measured_modes
       !> Lumped source.
@@ -40,6 +43,7 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [get_hollow_sphere_fields(options%hollow_sphere), &
+         get_modal_ball_fields(options%modal_ball), &
          get_measured_modes_fields(options%measured_modes), &
          get_hunt_crossley_fields(options%hunt_crossley)]
    end function get_model_fields
@@ -56,6 +60,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       select case (model)
+      case ('modal_ball')
+         call check_modal_ball(options%modal_ball, error)
       case ('measured_modes')
          call check_measured_modes(options%measured_modes, ball, error)
       case ('hunt_crossley')
@@ -86,6 +92,8 @@ contains
       select case (model)
       case ('hollow_sphere')
          call solve_hollow_sphere(ball, drop, options%hollow_sphere, sampling, history, error)
+      case ('modal_ball')
+         call solve_modal_ball(ball, drop, options%modal_ball, sampling, history, error)
       case ('measured_modes')
          call solve_measured_modes(drop, options%measured_modes, sampling, history, error)
       case ('hunt_crossley')

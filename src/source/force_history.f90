@@ -26,6 +26,10 @@ module thud_force_history
       real(wp), allocatable :: elastic_force(:)
       !> Whole force on the floor, N: [n_sample].
       real(wp), allocatable :: floor_force(:)
+      !> Names, with units, of whatever else the model has to tell: [n_channel].
+      character(len=part_name_length), allocatable :: channel_name(:)
+      !> Its values: [n_sample, n_channel].
+      real(wp), allocatable :: channel(:, :)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Time from first touch to release, s.

@@ -1,0 +1,368 @@
+!> The improved analytical model that the paper asks for (section 5): the exact modes of the free
+!> hollow sphere, driven by unilateral contact with the floor. Geometry and material go in only.
+!>
+!> Modes up to a highest harmonic oscillate; all that is left out answers at once, by its static
+!> flexibility. Time steps are exact for each mode. In every step the impulses of the surface
+!> rings make the gaps complementary to the pressures: no ring penetrates, none pulls, and there
+!> is no penalty stiffness.
+module thud_modal_ball
+   use thud_ball, only: ball_type
+   use thud_constants, only: pi
+   use thud_drop, only: drop_type, get_impact_velocity
+   use thud_error, only: error_type, input_error, numerical_error
+   use thud_field, only: field_type, list_type, name_length
+   use thud_force_history, only: force_history_type, new_force_history
+   use thud_kinds, only: wp
+   use thud_lapack, only: dgemv
+   use thud_legendre, only: get_legendre
+   use thud_new_field, only: choice_field, integer_field, list_field, logical_field, real_field
+   use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
+   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: check_modal_ball, get_modal_ball_fields, modal_ball_type, solve_modal_ball
+
+   !> The ball has left the floor for good when nothing touched for this time, s. Its surface may
+   !> touch again while it swings back.
+   real(wp), parameter :: quiet_time = 2.0e-3_wp
+
+   !> Part of the energy at first touch that the steps may lose in contact.
+   real(wp), parameter :: most_energy_residual = 0.02_wp
+
+   !> Families whose energy is told apart in the output, from n = 0 on.
+   integer, parameter :: n_told = 6
+
+   !> Options of the model.
+   type :: modal_ball_type
+      !> Highest harmonic n whose modes oscillate.
+      integer :: harmonics = 32
+      !> Modes of each harmonic that oscillate.
+      integer :: radial_modes = 5
+      !> Highest harmonic whose static flexibility counts.
+      integer :: static_harmonics = 96
+      !> Rings of the lower half of the surface.
+      integer :: rings = 44
+      !> Loss factor: `constant`, or `rising` in proportion to frequency.
+      character(len=name_length) :: damping_law = 'constant'
+      !> Loss factor, twice the damping ratio.
+      real(wp) :: loss_factor = 0.1_wp
+      !> Frequency of this loss factor where it rises, Hz.
+      real(wp) :: loss_frequency = 74.0_wp
+      !> The gas in the cavity resists changes of its volume.
+      logical :: cavity_gas = .true.
+      !> Harmonics that answer statically instead of oscillating.
+      type(list_type) :: static_families
+   end type modal_ball_type
+
+   !> All oscillating modes and one step of each in closed form: q and v = q' go to
+   !> (qq q + qv v, vq q + vv v); an impulse p at the beginning adds -p (qv, vv).
+   type :: step_type
+      !> Angular frequencies, rad/s: [n_mode].
+      real(wp), allocatable :: omega(:)
+      !> Harmonic of each mode: [n_mode].
+      integer, allocatable :: harmonic(:)
+      !> Factors of one step: [n_mode] each.
+      real(wp), allocatable :: qq(:), qv(:), vq(:), vv(:)
+      !> Fall of each ring's height by unit amplitude: [n_mode, n_ring].
+      real(wp), allocatable :: fall(:, :)
+   end type step_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&modal_ball`.
+   function get_modal_ball_fields(options) result(fields)
+      !> The options that the fields read and set.
+      type(modal_ball_type), intent(in), target :: options
+      !> One field per component: [9].
+      type(field_type), allocatable :: fields(:)
+      character(len=*), parameter :: group = 'modal_ball'
+
+      fields = [ &
+         integer_field(group, 'harmonics', options%harmonics, 'highest harmonic whose modes oscillate', 2, 200), &
+         integer_field(group, 'radial_modes', options%radial_modes, 'modes of each harmonic that oscillate', 1, 20), &
+         integer_field(group, 'static_harmonics', options%static_harmonics, &
+         'highest harmonic whose static flexibility counts', 4, 400), &
+         integer_field(group, 'rings', options%rings, 'rings of the lower half of the surface', 2, 200), &
+         choice_field(group, 'damping_law', options%damping_law, 'loss factor against frequency', &
+         [character(len=8) :: 'constant', 'rising']), &
+         real_field(group, 'loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', 0.0_wp, 1.9_wp), &
+         real_field(group, 'loss_frequency', options%loss_frequency, 'Hz', 'frequency of a rising loss factor', &
+         0.1_wp, 1.0e5_wp), &
+         logical_field(group, 'cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
+         list_field(group, 'static_families', options%static_families, '', 'harmonics that answer statically', &
+         0.0_wp, 200.0_wp)]
+   end function get_modal_ball_fields
+
+   !> Complains about numbers of harmonics and rings that do not go together.
+   subroutine check_modal_ball(options, error)
+      !> The options, each inside its own range.
+      type(modal_ball_type), intent(in) :: options
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (options%static_harmonics < options%harmonics) then
+         error = input_error('&modal_ball: static_harmonics = '//to_text(options%static_harmonics) &
+            //' is not allowed; allowed: harmonics = '//to_text(options%harmonics)//' or more')
+      else if (2*options%rings > options%static_harmonics) then
+         error = input_error('&modal_ball: rings = '//to_text(options%rings)//' cannot be told apart by static_harmonics = ' &
+            //to_text(options%static_harmonics)//'; allowed: up to half of it')
+      else if (2*options%rings < options%harmonics) then
+         error = input_error('&modal_ball: harmonics = '//to_text(options%harmonics)//' is too high for rings = ' &
+            //to_text(options%rings)//'; allowed: up to twice the rings')
+      end if
+   end subroutine check_modal_ball
+
+   !> Force history of one drop.
+   subroutine solve_modal_ball(ball, drop, options, sampling, history, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Modes, rings and damping.
+      type(modal_ball_type), intent(in) :: options
+      !> Sampling rate, length of the record, substeps.
+      type(sampling_type), intent(in) :: sampling
+      !> Force and motion from first touch on; the force is the mean of each sampling interval.
+      type(force_history_type), intent(out) :: history
+      !> The modes cannot be computed, the contact outlasts the record, or the steps are too coarse.
+      type(error_type), allocatable, intent(out) :: error
+      type(step_type) :: step
+      type(ring_contact_type) :: contact
+      real(wp) :: interval
+      integer :: n_sample, i
+
+      n_sample = get_sample_count(sampling)
+      interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
+      history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
+      history%impact_velocity = get_impact_velocity(drop)
+      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_told - 1), &
+         'energy_rest_J']
+      allocate (history%channel(n_sample, n_told + 2), source=0.0_wp)
+      call prepare(ball, options, interval, step, contact, error)
+      if (allocated(error)) return
+      call march(ball, sampling, interval, step, contact, history, error)
+   end subroutine solve_modal_ball
+
+   !> Modes, their steps and the response of the rings.
+   subroutine prepare(ball, options, interval, step, contact, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Modes, rings and damping.
+      type(modal_ball_type), intent(in) :: options
+      !> Length of a step, s.
+      real(wp), intent(in) :: interval
+      !> The modes.
+      type(step_type), intent(out) :: step
+      !> The rings.
+      type(ring_contact_type), intent(out) :: contact
+      !> The modes cannot be computed, or the rings cannot be told apart.
+      type(error_type), allocatable, intent(out) :: error
+      type(basis_type) :: basis
+      type(family_type) :: family
+      real(wp) :: angle(options%rings)
+      real(wp) :: shape(options%rings, 2)
+      real(wp), allocatable :: response(:, :)
+      logical :: failed
+      integer :: n, i, kept, k
+
+      angle = [(pi/2*(i - 1)/(options%rings - 1), i=1, options%rings)]
+      basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
+      allocate (response(options%rings, options%rings), source=interval/ball%mass)
+      allocate (step%omega(0), step%harmonic(0), step%fall(0, options%rings))
+      failed = .false.
+      do n = 0, options%static_harmonics
+         if (n <= options%harmonics) then
+            kept = options%radial_modes
+            associate (static => options%static_families)
+               if (any(nint(static%values(:static%count)) == n)) kept = 0
+            end associate
+            call get_family(basis, n, kept, family, failed)
+         else
+            call get_static_family(basis, n, family, failed)
+         end if
+         if (failed) exit
+         shape = get_ring_shape(n, angle)
+         response = response + matmul(shape, matmul(family%flexibility, transpose(shape)))/interval
+         step%omega = [step%omega, family%omega]
+         step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
+         step%fall = reshape([transpose(step%fall), matmul(shape, family%surface)], [size(step%omega), options%rings], &
+            order=[2, 1])
+      end do
+      if (failed) then
+         error = numerical_error('&modal_ball: static_harmonics: the modes of harmonic '//to_text(n) &
+            //' cannot be computed; allowed: fewer harmonics, or a thinner wall')
+         return
+      end if
+      call set_factors(options, interval, step)
+      do i = 1, options%rings
+         response(:, i) = response(:, i) + matmul(step%qv*step%fall(:, i), step%fall)
+      end do
+      call new_ring_contact(response, contact, failed)
+      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
+         //' cannot be told apart; allowed: fewer rings, or more static_harmonics')
+   end subroutine prepare
+
+   !> Fall of the rings' height by unit displacements U and V of one harmonic.
+   pure function get_ring_shape(harmonic, angle) result(shape)
+      !> Harmonic n.
+      integer, intent(in) :: harmonic
+      !> Angles of the rings from the lowest point: [n_ring].
+      real(wp), intent(in) :: angle(:)
+      !> P_n cos t and -dP_n/dt sin t: [n_ring, 2].
+      real(wp) :: shape(size(angle), 2)
+      real(wp), dimension(0:harmonic) :: value, first, second
+      integer :: i
+
+      do i = 1, size(angle)
+         call get_legendre(cos(angle(i)), value, first, second)
+         shape(i, 1) = value(harmonic)*cos(angle(i))
+         shape(i, 2) = first(harmonic)*sin(angle(i))**2
+      end do
+   end function get_ring_shape
+
+   !> Factors of one exact step of every mode, also of overdamped ones.
+   pure subroutine set_factors(options, interval, step)
+      !> The damping.
+      type(modal_ball_type), intent(in) :: options
+      !> Length of a step, s.
+      real(wp), intent(in) :: interval
+      !> The modes.
+      type(step_type), intent(inout) :: step
+      real(wp), dimension(size(step%omega)) :: zeta, decay, root, c, s
+
+      zeta = options%loss_factor/2
+      if (options%damping_law == 'rising') zeta = zeta*step%omega/(2*pi*options%loss_frequency)
+      ! The one value without a limit from both sides in floating point is stepped around.
+      where (abs(zeta - 1) < 1.0e-6_wp) zeta = 1 + 1.0e-6_wp
+      decay = zeta*step%omega
+      root = step%omega*sqrt(abs(1 - zeta**2))
+      where (zeta < 1)
+         c = exp(-decay*interval)*cos(root*interval)
+         s = exp(-decay*interval)*sin(root*interval)/root
+      elsewhere
+         c = (exp((root - decay)*interval) + exp(-(root + decay)*interval))/2
+         s = (exp((root - decay)*interval) - exp(-(root + decay)*interval))/(2*root)
+      end where
+      step%qq = c + decay*s
+      step%qv = s
+      step%vq = -step%omega**2*s
+      step%vv = c - decay*s
+   end subroutine set_factors
+
+   !> Marches from first touch until the ball has left for good.
+   subroutine march(ball, sampling, interval, step, contact, history, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Length of a step, s.
+      real(wp), intent(in) :: interval
+      !> The modes.
+      type(step_type), intent(in) :: step
+      !> The rings.
+      type(ring_contact_type), intent(inout) :: contact
+      !> The history.
+      type(force_history_type), intent(inout) :: history
+      !> The contact outlasts the record, or energy is lost in contact.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(size(step%omega)) :: q, v, next_q, push
+      real(wp), dimension(size(step%fall, 2)) :: gap, height
+      real(wp) :: z, speed, impulse, loss, energy
+      integer :: i, j, n_step, last, n_mode, n_ring
+
+      n_mode = size(step%omega)
+      n_ring = size(step%fall, 2)
+      height = [(ball%outer_radius*cos(pi/2*(i - 1)/(n_ring - 1)), i=1, n_ring)]
+      q = 0.0_wp
+      v = 0.0_wp
+      z = ball%outer_radius
+      speed = -history%impact_velocity
+      loss = 0.0_wp
+      last = 0
+      n_step = 0
+      samples: do i = 1, size(history%floor_force)
+         call record_motion(ball, step, q, v, z, speed, i, history)
+         do j = 1, sampling%substeps
+            n_step = n_step + 1
+            energy = sum(v**2 + (step%omega*q)**2)/2
+            next_q = step%qq*q + step%qv*v
+            v = step%vq*q + step%vv*v
+            q = next_q
+            loss = loss + energy - sum(v**2 + (step%omega*q)**2)/2
+            z = z + interval*speed
+            gap = z - height
+            call dgemv('T', n_mode, n_ring, -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
+            call solve_contact(contact, gap, error)
+            if (allocated(error)) return
+            if (contact%last > 0) then
+               last = n_step
+               impulse = sum(contact%impulse(:contact%last))
+               push = 0.0_wp
+               call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, 0.0_wp, push, 1)
+               q = q - step%qv*push
+               v = v - step%vv*push
+               speed = speed + impulse/ball%mass
+               z = z + interval*impulse/ball%mass
+               history%impulse = history%impulse + impulse
+               history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
+               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius &
+                  *sin(pi/2*(contact%last - 1)/(n_ring - 1)))
+            end if
+            if (speed > 0.0_wp .and. (n_step - last)*interval > quiet_time) exit samples
+         end do
+      end do samples
+      if (i > size(history%floor_force)) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
+            //to_text(quiet_time)//' s after the last contact; allowed: longer than that')
+         return
+      end if
+      history%elastic_force = history%part(:, 1)
+      history%floor_force = history%part(:, 1)
+      history%contact_time = last*interval
+      history%peak_force = maxval(history%floor_force)
+      history%peak_floor_force = history%peak_force
+      history%restitution = speed/history%impact_velocity
+      associate (momentum => ball%mass*(history%impact_velocity + speed), initial => ball%mass/2*history%impact_velocity**2)
+         history%impulse_residual = abs(history%impulse - momentum)/momentum
+         energy = sum(v**2 + (step%omega*q)**2)/2 + ball%mass/2*speed**2
+         history%energy_residual = abs(energy + loss - initial)/initial
+      end associate
+      if (.not. history%energy_residual <= most_energy_residual) then
+         error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
+            //to_text(history%energy_residual)//'; allowed: up to '//to_text(most_energy_residual))
+      end if
+   end subroutine march
+
+   !> Writes motion and energies of one instant into the history.
+   pure subroutine record_motion(ball, step, q, v, z, speed, i, history)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The modes.
+      type(step_type), intent(in) :: step
+      !> Amplitudes of the modes, m sqrt(kg): [n_mode].
+      real(wp), intent(in) :: q(:)
+      !> Their rates: [n_mode].
+      real(wp), intent(in) :: v(:)
+      !> Height of the centre of mass, m.
+      real(wp), intent(in) :: z
+      !> Its velocity upwards, m/s.
+      real(wp), intent(in) :: speed
+      !> Number of the sample.
+      integer, intent(in) :: i
+      !> The history.
+      type(force_history_type), intent(inout) :: history
+      integer :: k, place
+
+      history%deflection(i) = ball%outer_radius - z
+      history%velocity(i) = -speed
+      history%max_deflection = max(history%max_deflection, history%deflection(i))
+      do k = 1, size(q)
+         place = 2 + min(step%harmonic(k), n_told)
+         history%channel(i, place) = history%channel(i, place) + (v(k)**2 + (step%omega(k)*q(k))**2)/2
+      end do
+   end subroutine record_motion
+
+end module thud_modal_ball
