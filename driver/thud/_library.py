@@ -48,7 +48,7 @@ def text(value: bytes) -> str:
 
 def words(value: bytes) -> list[str]:
     """Words of a list with commas between."""
-    return [word.strip() for word in text(value).split(",")]
+    return [word.strip() for word in text(value).split(",")] if text(value) else []
 
 
 def version() -> str:

@@ -86,6 +86,44 @@ class HollowSphere:
 
 
 @dataclass(frozen=True)
+class ModalBall:
+    """Options of the modal ball, the improved analytical model.
+
+    Attributes
+    ----------
+    harmonics : int
+        Highest harmonic n whose modes oscillate.
+    radial_modes : int
+        Modes of each harmonic that oscillate.
+    static_harmonics : int
+        Highest harmonic whose static flexibility counts.
+    rings : int
+        Rings of the lower half of the surface; at most half of `static_harmonics`.
+    damping_law : str
+        ``"constant"`` loss factor, or ``"rising"`` in proportion to frequency.
+    loss_factor : float
+        Loss factor, twice the damping ratio.
+    loss_frequency : float
+        Frequency of a rising loss factor, Hz.
+    cavity_gas : bool
+        The gas in the cavity resists changes of its volume.
+    static_families : sequence of int
+        Harmonics that answer statically instead of oscillating.
+    """
+
+    name: ClassVar[str] = "modal_ball"
+    harmonics: int = 32
+    radial_modes: int = 5
+    static_harmonics: int = 96
+    rings: int = 44
+    damping_law: str = "constant"
+    loss_factor: float = 0.1
+    loss_frequency: float = 74.0
+    cavity_gas: bool = True
+    static_families: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
 class MeasuredModes:
     """Options of the model of measured modes (after Park et al. 2010), one entry per mode.
 
@@ -134,10 +172,10 @@ class HuntCrossley:
     restitution: float = 0.0
 
 
-ModelOptions = HollowSphere | MeasuredModes | HuntCrossley
+ModelOptions = HollowSphere | ModalBall | MeasuredModes | HuntCrossley
 
 MODELS: dict[str, type[ModelOptions]] = {
-    kind.name: kind for kind in (HollowSphere, MeasuredModes, HuntCrossley)
+    kind.name: kind for kind in (HollowSphere, ModalBall, MeasuredModes, HuntCrossley)
 }
 
 
@@ -200,7 +238,7 @@ class Case:
     ----------
     name : str
         Name of the case, also of its output directory.
-    model : HollowSphere, MeasuredModes or HuntCrossley
+    model : HollowSphere, ModalBall, MeasuredModes or HuntCrossley
         The source model, by its options.
     ball, drop, sampling, levels, limits
         The other namelist groups.

@@ -36,6 +36,8 @@ class Impact:
         Whole force on the floor, flux of momentum included, N.
     parts : dict of str to ndarray, shape (n_sample,)
         The parts that the model tells apart, N.
+    channels : dict of str to ndarray, shape (n_sample,)
+        Whatever else the model has to tell, such as the contact radius; the names end with units.
     sample_rate : float
         Samples per second, Hz.
     impact_velocity : float
@@ -63,6 +65,7 @@ class Impact:
     elastic_force: NDArray[np.float64]
     floor_force: NDArray[np.float64]
     parts: dict[str, NDArray[np.float64]]
+    channels: dict[str, NDArray[np.float64]]
     sample_rate: float
     impact_velocity: float
     contact_time: float
@@ -162,8 +165,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     ball, drop
         By default the rubber ball of the paper, from 1 m.
     model
-        ``"hollow_sphere"`` (the analytical model of the paper), ``"measured_modes"`` or
-        ``"hunt_crossley"``.
+        ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
+        one), ``"measured_modes"`` or ``"hunt_crossley"``.
     sample_rate
         Samples per second, Hz.
     duration
@@ -171,7 +174,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     **options
-        Options of the model, see `HollowSphere`, `MeasuredModes` and `HuntCrossley`; such as
+        Options of the model, see `HollowSphere`, `ModalBall`, `MeasuredModes` and `HuntCrossley`; such as
         ``momentum_flux="retarding"``.
 
     Returns
@@ -201,7 +204,7 @@ def solve_case(case: Case) -> Impact:
     require_kind("case", case, Case)
     content = case_text(case)
     (n_sample,) = call(door.count_samples, content)
-    deflection, velocity, part, elastic, floor, part_names, scalars = call(
+    deflection, velocity, part, channel, elastic, floor, part_names, channel_names, scalars = call(
         door.solve, content, n_sample
     )
     sample_rate = float(scalars[0])
@@ -213,5 +216,6 @@ def solve_case(case: Case) -> Impact:
         elastic,
         floor,
         dict(zip(words(part_names), part.T, strict=False)),
+        dict(zip(words(channel_names), channel.T, strict=False)),
         *map(float, scalars),
     )

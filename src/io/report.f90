@@ -10,7 +10,10 @@ module thud_report
    implicit none (type, external)
    private
 
-   public :: get_force_csv, get_levels_csv, get_summary, get_table
+   public :: get_channels_csv, get_force_csv, get_levels_csv, get_summary, get_table
+
+   !> Format of a row of numbers: every bit of them, 25 characters each with its comma.
+   character(len=*), parameter :: csv_form = '(*(es24.16e3,:,","))'
 
 contains
 
@@ -21,7 +24,6 @@ contains
       !> Text of `force.csv`.
       character(len=:), allocatable :: text
       character(len=:), allocatable :: header
-      character(len=*), parameter :: form = '(*(es24.16e3,:,","))'
       character(len=25*(size(history%part, 2) + 5)) :: row, rest
       real(wp) :: values(size(history%part, 2) + 4)
       logical :: at_rest
@@ -37,11 +39,11 @@ contains
       text(:len(header)) = header
       at = len(header)
       do i = 1, size(history%part, 1)
-         write (row, form) real(i - 1, wp)/history%sample_rate
+         write (row, csv_form) real(i - 1, wp)/history%sample_rate
          values = [history%deflection(i), history%velocity(i), history%part(i, :), history%elastic_force(i), &
             history%floor_force(i)]
          ! Formatting takes most of a run's time, and most rows stand after the release.
-         if (i == 1 .or. any(abs(values) > 0.0_wp) .or. .not. at_rest) write (rest, form) values
+         if (i == 1 .or. any(abs(values) > 0.0_wp) .or. .not. at_rest) write (rest, csv_form) values
          at_rest = .not. any(abs(values) > 0.0_wp)
          row(25:) = ','//rest
          row(len(row):) = newline
@@ -49,6 +51,26 @@ contains
          at = at + len(row)
       end do
    end function get_force_csv
+
+   !> What else the model has to tell against time, 17 digits.
+   function get_channels_csv(history) result(text)
+      !> The history, with channels.
+      type(force_history_type), intent(in) :: history
+      !> Text of `channels.csv`.
+      character(len=:), allocatable :: text
+      character(len=25*(size(history%channel, 2) + 1)) :: row
+      integer :: i
+
+      text = 'time_s'
+      do i = 1, size(history%channel_name)
+         text = text//','//trim(history%channel_name(i))
+      end do
+      text = text//newline
+      do i = 1, size(history%channel, 1)
+         write (row, csv_form) real(i - 1, wp)/history%sample_rate, history%channel(i, :)
+         text = text//trim(row)//newline
+      end do
+   end function get_channels_csv
 
    !> Levels, limits and verdict per band.
    function get_levels_csv(bands, elastic_level, floor_level, criteria, judged_level) result(text)

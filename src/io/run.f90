@@ -9,7 +9,7 @@ module thud_run
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_posix, only: remove_file
-   use thud_report, only: get_force_csv, get_levels_csv, get_summary, get_table
+   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary, get_table
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    use thud_source_model, only: solve_model
@@ -21,6 +21,9 @@ module thud_run
    !> Files of a run.
    character(len=13), parameter :: file_names(4) = [character(len=13) :: &
       'force.csv', 'levels.csv', 'summary.nml', 'effective.nml']
+
+   !> File of models that have more to tell.
+   character(len=*), parameter :: channel_file = 'channels.csv'
 
    !> Figures that the driver may have added; they show the results that they were drawn from.
    character(len=10), parameter :: figure_names(4) = [character(len=10) :: &
@@ -56,7 +59,7 @@ contains
       type(band_type), allocatable :: bands(:)
       real(wp), allocatable :: elastic_level(:), floor_level(:)
       character(len=:), allocatable :: input
-      type(text_file_type) :: files(size(file_names))
+      type(text_file_type), allocatable :: files(:)
       logical :: differs
       integer :: first, i
 
@@ -74,12 +77,17 @@ contains
          outcome%table = get_table(case, history, elastic_level, floor_level, criteria)
          ! The octaves come first and serve the verdict also where only thirds are asked for.
          first = merge(octave_count, 0, case%bands == 'third') + 1
-         files%name = file_names
+         allocate (files(size(file_names) + merge(1, 0, allocated(history%channel))))
+         files(:size(file_names))%name = file_names
          files(1)%content = get_force_csv(history)
          files(2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
             trim(case%level_force))
          files(3)%content = get_summary(case, history, criteria)
          files(4)%content = input
+         if (allocated(history%channel)) then
+            files(5)%name = channel_file
+            files(5)%content = get_channels_csv(history)
+         end if
          call write_files(outcome%directory, files, error)
       end if
       if (.not. allocated(error)) then
@@ -89,6 +97,7 @@ contains
             do i = 1, size(figure_names)
                call remove_file(outcome%directory//'/'//trim(figure_names(i)))
             end do
+            if (.not. allocated(history%channel)) call remove_file(outcome%directory//'/'//channel_file)
          end if
       end if
       if (allocated(error)) error%message = path//': '//error%message

@@ -80,8 +80,8 @@ contains
    end subroutine count_samples
 
    !> Force history of a case.
-   subroutine solve(text, n_sample, deflection, velocity, part, elastic_force, floor_force, part_names, &
-      scalars, status, message)
+   subroutine solve(text, n_sample, deflection, velocity, part, channel, elastic_force, floor_force, part_names, &
+      channel_names, scalars, status, message)
       !f2py threadsafe
       !> Text of a namelist file.
       character(len=*), intent(in) :: text
@@ -93,12 +93,16 @@ contains
       real(wp), intent(out) :: velocity(n_sample)
       !> Parts of the force, N; columns without a name are zero: [n_sample, 4].
       real(wp), intent(out) :: part(n_sample, 4)
+      !> Whatever else the model tells; columns without a name are zero: [n_sample, 12].
+      real(wp), intent(out) :: channel(n_sample, 12)
       !> Elastic force, N: [n_sample].
       real(wp), intent(out) :: elastic_force(n_sample)
       !> Force on the floor, N: [n_sample].
       real(wp), intent(out) :: floor_force(n_sample)
       !> Names of the parts, with commas between.
       character(len=512), intent(out) :: part_names
+      !> Names of the channels, with commas between; blank where there are none.
+      character(len=512), intent(out) :: channel_names
       !> Sample rate, impact velocity, contact time, peak force, peak floor force, largest
       !> deflection, restitution, impulse, residuals of impulse and energy; SI units: [10].
       real(wp), intent(out) :: scalars(10)
@@ -118,6 +122,8 @@ contains
       floor_force = 0.0_wp
       scalars = 0.0_wp
       part_names = ''
+      channel_names = ''
+      channel = 0.0_wp
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call solve_case(case, history, error)
       if (.not. allocated(error)) then
@@ -134,6 +140,13 @@ contains
          part_names = trim(part_names)//','//history%part_name(i)
       end do
       part_names = part_names(2:)
+      if (allocated(history%channel)) then
+         channel(:, :size(history%channel_name)) = history%channel
+         do i = 1, size(history%channel_name)
+            channel_names = trim(channel_names)//','//history%channel_name(i)
+         end do
+         channel_names = channel_names(2:)
+      end if
       scalars = [history%sample_rate, history%impact_velocity, history%contact_time, history%peak_force, &
          history%peak_floor_force, history%max_deflection, history%restitution, history%impulse, &
          history%impulse_residual, history%energy_residual]

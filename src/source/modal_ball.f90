@@ -268,7 +268,7 @@ contains
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
-      real(wp), dimension(size(step%omega)) :: q, v, next_q, push
+      real(wp), dimension(size(step%omega)) :: q, v, old_q, old_v, push
       real(wp), dimension(size(step%fall, 2)) :: gap, height
       real(wp) :: z, speed, impulse, loss, energy
       integer :: i, j, n_step, last, n_mode, n_ring
@@ -287,11 +287,11 @@ contains
          call record_motion(ball, step, q, v, z, speed, i, history)
          do j = 1, sampling%substeps
             n_step = n_step + 1
-            energy = sum(v**2 + (step%omega*q)**2)/2
-            next_q = step%qq*q + step%qv*v
-            v = step%vq*q + step%vv*v
-            q = next_q
-            loss = loss + energy - sum(v**2 + (step%omega*q)**2)/2
+            old_q = q
+            old_v = v
+            q = step%qq*old_q + step%qv*old_v
+            v = step%vq*old_q + step%vv*old_v
+            push = 0.0_wp
             z = z + interval*speed
             gap = z - height
             call dgemv('T', n_mode, n_ring, -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
@@ -300,7 +300,6 @@ contains
             if (contact%last > 0) then
                last = n_step
                impulse = sum(contact%impulse(:contact%last))
-               push = 0.0_wp
                call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, 0.0_wp, push, 1)
                q = q - step%qv*push
                v = v - step%vv*push
@@ -311,6 +310,8 @@ contains
                history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius &
                   *sin(pi/2*(contact%last - 1)/(n_ring - 1)))
             end if
+            ! What damping takes lies between the impulse at the beginning and the end of the step.
+            loss = loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
             if (speed > 0.0_wp .and. (n_step - last)*interval > quiet_time) exit samples
          end do
       end do samples
@@ -327,7 +328,7 @@ contains
       history%restitution = speed/history%impact_velocity
       associate (momentum => ball%mass*(history%impact_velocity + speed), initial => ball%mass/2*history%impact_velocity**2)
          history%impulse_residual = abs(history%impulse - momentum)/momentum
-         energy = sum(v**2 + (step%omega*q)**2)/2 + ball%mass/2*speed**2
+         energy = get_energy(step, q, v) + ball%mass/2*speed**2
          history%energy_residual = abs(energy + loss - initial)/initial
       end associate
       if (.not. history%energy_residual <= most_energy_residual) then
@@ -335,6 +336,20 @@ contains
             //to_text(history%energy_residual)//'; allowed: up to '//to_text(most_energy_residual))
       end if
    end subroutine march
+
+   !> Energy of the modes, J.
+   pure function get_energy(step, q, v) result(energy)
+      !> The modes.
+      type(step_type), intent(in) :: step
+      !> Amplitudes, m sqrt(kg): [n_mode].
+      real(wp), intent(in) :: q(:)
+      !> Their rates: [n_mode].
+      real(wp), intent(in) :: v(:)
+      !> Kinetic and elastic energy, J.
+      real(wp) :: energy
+
+      energy = sum(v**2 + (step%omega*q)**2)/2
+   end function get_energy
 
    !> Writes motion and energies of one instant into the history.
    pure subroutine record_motion(ball, step, q, v, z, speed, i, history)
