@@ -158,6 +158,7 @@ def _figures(options: argparse.Namespace) -> int:
                     {name: thud.solve(drop=thud.Drop(height)) for name, height in heights.items()}
                 ),
                 "figure3_levels": lambda: thud.plot.levels({"hollow sphere": thud.solve()}),
+                "modal_families": _draw_families,
                 "momentum_flux": lambda: thud.plot.levels(
                     {choice: thud.solve(momentum_flux=choice) for choice in choices}, "elastic"
                 ),
@@ -170,6 +171,15 @@ def _figures(options: argparse.Namespace) -> int:
     if not options.quiet:
         print(f"Figures: {options.output}")
     return 0
+
+
+def _draw_families() -> Figure:
+    """Draw which modes carry which octave: families that answer statically, one at a time."""
+    shown = range(2, 7)
+    still = {f"n = {n} static": thud.solve(model="modal_ball", static_families=[n]) for n in shown}
+    every = list(range(thud.ModalBall.harmonics + 1))
+    still["all static"] = thud.solve(model="modal_ball", static_families=every)
+    return thud.plot.level_changes(thud.solve(model="modal_ball"), still)
 
 
 def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:

@@ -174,8 +174,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     **options
-        Options of the model, see `HollowSphere`, `ModalBall`, `MeasuredModes` and `HuntCrossley`; such as
-        ``momentum_flux="retarding"``.
+        Options of the model, see `HollowSphere`, `ModalBall`, `MeasuredModes` and
+        `HuntCrossley`; such as ``momentum_flux="retarding"``.
 
     Returns
     -------

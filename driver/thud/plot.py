@@ -106,10 +106,7 @@ def levels(
         values = impact.levels(method=method, force=kind)
         marker = MARKERS[i % len(MARKERS)]
         axes.plot(place, values, label=name, marker=marker, markersize=4, **_style(i))
-    axes.set_xticks(place, [f"{frequency:g}" for frequency in get_bands().nominal])
-    axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlim(-0.6, 4.6)
-    axes.set_xlabel("Octave band, Hz", fontsize=SIZE)
+    _octave_axis(axes)
     axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
     _add_legend(axes, impacts)
     return figure
@@ -148,6 +145,45 @@ def _style(i: int) -> dict[str, Any]:
         "linestyle": LINES[i % len(LINES)],
         "linewidth": 1.2,
     }
+
+
+def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str = "floor") -> Figure:
+    """Draw how octave levels change against a reference.
+
+    Parameters
+    ----------
+    reference
+        The impact that the others are compared with.
+    impacts
+        Impacts by their names in the legend.
+    force
+        ``"elastic"`` or ``"floor"``.
+
+    Returns
+    -------
+    Figure
+        Octave bands in Hz, change of the force exposure level in dB.
+    """
+    figure, axes = _axes(2.8)
+    axes.axhline(0, color="0.45", linewidth=0.8)
+    base = reference.levels(force=force)
+    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
+        marker = MARKERS[i % len(MARKERS)]
+        change = impact.levels(force=kind) - base
+        axes.plot(np.arange(5), change, label=name, marker=marker, markersize=4, **_style(i))
+    _octave_axis(axes)
+    axes.set_ylabel("Change of the level, dB", fontsize=SIZE)
+    above = {"loc": "lower left", "bbox_to_anchor": (0, 1)}
+    axes.legend(fontsize=SIZE - 1, frameon=False, ncols=3, **above)
+    return figure
+
+
+def _octave_axis(axes: Axes) -> None:
+    """Name the octaves."""
+    axes.set_xticks(np.arange(5), [f"{frequency:g}" for frequency in get_bands().nominal])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlim(-0.6, 4.6)
+    axes.set_xlabel("Octave band, Hz", fontsize=SIZE)
 
 
 def _draw_tolerance(axes: Axes, source: str) -> None:

@@ -67,6 +67,7 @@ module thud_field
       procedure :: check
       procedure :: get_text
       procedure :: get_allowed
+      procedure :: is_empty
       procedure, private :: complain
       procedure, private :: contains => contains_value
    end type field_type
@@ -280,6 +281,17 @@ contains
          if (associated(self%integer_value)) text = text//', whole'
       end if
    end subroutine get_allowed
+
+   !> Whether the field is a list without entries, which a namelist cannot hold.
+   pure function is_empty(self) result(empty)
+      !> The field.
+      class(field_type), intent(in) :: self
+      !> It is one.
+      logical :: empty
+
+      empty = .false.
+      if (associated(self%list_value)) empty = self%list_value%count == 0
+   end function is_empty
 
    !> Takes `.0` from the end of a text.
    pure subroutine drop_idle_decimal(text)

@@ -67,7 +67,7 @@ contains
          choice_field('limits', 'source', case%source, 'source whose limits apply', source_names)]
    end function get_fields
 
-   !> The keys without those of the models that are not asked for.
+   !> The keys without those of models that are not asked for and lists without entries.
    function get_active_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
@@ -77,7 +77,8 @@ contains
       integer :: i
 
       allocate (fields, source=get_fields(case))
-      active = [(fields(i)%group == case%model .or. .not. any(model_names == fields(i)%group), i=1, size(fields))]
+      active = [((fields(i)%group == case%model .or. .not. any(model_names == fields(i)%group)) &
+         .and. .not. fields(i)%is_empty(), i=1, size(fields))]
       fields = pack(fields, active)
    end function get_active_fields
 

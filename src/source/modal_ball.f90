@@ -294,13 +294,14 @@ contains
             push = 0.0_wp
             z = z + interval*speed
             gap = z - height
-            call dgemv('T', n_mode, n_ring, -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
+            if (n_mode > 0) call dgemv('T', n_mode, n_ring, -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
             call solve_contact(contact, gap, error)
             if (allocated(error)) return
             if (contact%last > 0) then
                last = n_step
                impulse = sum(contact%impulse(:contact%last))
-               call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, 0.0_wp, push, 1)
+               if (n_mode > 0) call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
+                  0.0_wp, push, 1)
                q = q - step%qv*push
                v = v - step%vv*push
                speed = speed + impulse/ball%mass

@@ -118,6 +118,8 @@ def test_figures_of_the_paper(tmp_path: Path) -> None:
         "figure2_force_history.svg",
         "figure3_levels.png",
         "figure3_levels.svg",
+        "modal_families.png",
+        "modal_families.svg",
         "momentum_flux.png",
         "momentum_flux.svg",
     ]
