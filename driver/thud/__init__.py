@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING
+from typing import Any
 
 from thud._library import version
 from thud.case import (
@@ -29,9 +29,7 @@ from thud.case import (
 from thud.errors import InputError, NumericalError, ThudError
 from thud.impact import Impact, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
-
-if TYPE_CHECKING:
-    from types import ModuleType
+from thud.recording import Recording
 
 __version__ = version()
 
@@ -51,6 +49,7 @@ __all__ = [
     "MeasuredModes",
     "ModalBall",
     "NumericalError",
+    "Recording",
     "Sampling",
     "ThudError",
     "force_exposure_levels",
@@ -63,9 +62,14 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Import `thud.plot` when it is first asked for: matplotlib takes its time."""
-    if name == "plot":
-        return importlib.import_module("thud.plot")
+# What needs matplotlib or plotly is imported when it is first asked for: they take their time.
+_LATE = {"plot": None, "comparison": None, "compare": "comparison", "read_all": "comparison"}
+
+
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it
+    """Import the modules that draw when they are first asked for."""
+    if name in _LATE:
+        module = importlib.import_module(f"thud.{_LATE[name] or name}")
+        return getattr(module, name) if _LATE[name] else module
     message = f"module 'thud' has no attribute {name!r}"
     raise AttributeError(message)

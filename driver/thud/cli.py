@@ -84,6 +84,25 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.add_argument("--no-figures", action="store_true", help="results only")
 
+    compare = commands.add_parser("compare", help="models and recordings of one drop on one page")
+    compare.set_defaults(command=_compare)
+    compare.add_argument(
+        "cases",
+        nargs="+",
+        metavar="CASE.nml|RECORD.csv",
+        help="namelist files, and recordings with columns of time, s, and force, N",
+    )
+    compare.add_argument(
+        "-o",
+        "--output",
+        metavar="DIR",
+        default="outputs/comparison",
+        help="directory for the page (default: outputs/comparison)",
+    )
+    compare.add_argument("--force", choices=("elastic", "floor"), default="floor")
+    compare.add_argument("--source", choices=("rubber_ball", "tyre"), default="rubber_ball")
+    compare.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors")
+
     figures = commands.add_parser("figures", help="draw figures 2 and 3 of the paper")
     figures.set_defaults(command=_figures)
     figures.add_argument(
@@ -173,13 +192,37 @@ def _figures(options: argparse.Namespace) -> int:
     return 0
 
 
+def _compare(options: argparse.Namespace) -> int:
+    """Compare cases and recordings."""
+    try:
+        found = thud.read_all(options.cases)
+        comparison = thud.compare(
+            {name: found[name] for name in tqdm(found, unit="case", disable=options.quiet)},
+            options.force,
+            options.source,
+        )
+        paths = comparison.save(options.output)
+    except (thud.ThudError, OSError) as error:
+        print(f"thud-driver: {_sentence(error)}", file=sys.stderr)
+        return getattr(error, "exit_code", thud.InputError.exit_code)
+    if not options.quiet:
+        rows = [thud.comparison.HEADER, *comparison.table()]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        for row in rows:
+            cells = zip(row, widths, strict=True)
+            print("   ".join(cell.ljust(width) for cell, width in cells).rstrip())
+        print(f"Page: {paths[-1]}")
+    return 0
+
+
 def _draw_families() -> Figure:
     """Draw which modes carry which octave: families that answer statically, one at a time."""
     shown = range(2, 7)
     still = {f"n = {n} static": thud.solve(model="modal_ball", static_families=[n]) for n in shown}
     every = list(range(thud.ModalBall.harmonics + 1))
     still["all static"] = thud.solve(model="modal_ball", static_families=every)
-    return thud.plot.level_changes(thud.solve(model="modal_ball"), still)
+    figure: Figure = thud.plot.level_changes(thud.solve(model="modal_ball"), still)
+    return figure
 
 
 def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:

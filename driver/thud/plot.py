@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -19,12 +19,15 @@ from thud.case import replace_file, require_kind
 from thud.errors import InputError
 from thud.impact import FORCES, Impact
 from thud.levels import get_bands, judge
+from thud.recording import Recording
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
+
+Curve = TypeVar("Curve", bound=Impact | Recording)
 
 # Okabe and Ito's colours, told apart with any colour vision; line styles tell them apart in print.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -38,13 +41,17 @@ FORMATS = ("pdf", "png", "svg")
 def _axes(height: float) -> tuple[Figure, Axes]:
     """Return an empty figure of column width and its axes."""
     figure = Figure(figsize=(WIDTH, height), dpi=300, layout="constrained")
-    axes = figure.add_subplot()
+    return figure, _dress(figure.add_subplot())
+
+
+def _dress(axes: Axes) -> Axes:
+    """Give axes the look of all figures."""
     axes.tick_params(labelsize=SIZE)
     axes.grid(visible=True, linewidth=0.4, alpha=0.5)
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    return figure, axes
+    return axes
 
 
 def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") -> Figure:
@@ -112,13 +119,13 @@ def levels(
     return figure
 
 
-def _curves(impacts: Mapping[str, Impact], force: str | None) -> Iterator[tuple[str, Impact, str]]:
+def _curves(impacts: Mapping[str, Curve], force: str | None) -> Iterator[tuple[str, Curve, str]]:
     """Yield name, impact and kind of force of each curve."""
     if not isinstance(impacts, Mapping) or not impacts:
         message = "impacts are not given; allowed: a mapping of names to impacts, at least one"
         raise InputError(message)
     for name, impact in impacts.items():
-        require_kind(name, impact, Impact)
+        require_kind(name, impact, Impact | Recording)
         if force:
             yield _literal(name), impact, force
         else:
@@ -173,17 +180,78 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
         axes.plot(np.arange(5), change, label=name, marker=marker, markersize=4, **_style(i))
     _octave_axis(axes)
     axes.set_ylabel("Change of the level, dB", fontsize=SIZE)
-    above = {"loc": "lower left", "bbox_to_anchor": (0, 1)}
-    axes.legend(fontsize=SIZE - 1, frameon=False, ncols=3, **above)
+    axes.legend(fontsize=SIZE - 1, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     return figure
 
 
-def _octave_axis(axes: Axes) -> None:
-    """Name the octaves."""
-    axes.set_xticks(np.arange(5), [f"{frequency:g}" for frequency in get_bands().nominal])
+def comparison_page(
+    impacts: Mapping[str, Impact | Recording],
+    force: str,
+    source: str,
+    table: Sequence[Sequence[str]],
+) -> Figure:
+    """Draw forces, octave and third levels of several impacts, and a table, on one page.
+
+    Parameters
+    ----------
+    impacts
+        Impacts and recordings by name.
+    force
+        ``"elastic"`` or ``"floor"``.
+    source
+        ``"rubber_ball"`` or ``"tyre"``: whose tolerance band is drawn.
+    table
+        Header and rows of text.
+
+    Returns
+    -------
+    Figure
+        As wide as the text of a page.
+    """
+    figure = Figure(figsize=(2 * WIDTH, 7.5), dpi=200, layout="constrained")
+    rows = figure.add_gridspec(3, 2, height_ratios=[3, 3, 0.35 + 0.25 * len(table)])
+    history = _dress(figure.add_subplot(rows[0, :]))
+    panels = {
+        "octave": _dress(figure.add_subplot(rows[1, 0])),
+        "third": _dress(figure.add_subplot(rows[1, 1])),
+    }
+    _draw_tolerance(panels["octave"], source)
+    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
+        history.plot(1e3 * impact.time, 1e-3 * impact.force(kind), label=name, **_style(i))
+        for bands, axes in panels.items():
+            values = impact.levels(bands, force=kind)
+            marker = MARKERS[i % len(MARKERS)]
+            axes.plot(np.arange(len(values)), values, marker=marker, markersize=3, **_style(i))
+    history.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
+    history.set_ylim(bottom=0)
+    history.set_xlabel("Time since first touch, ms", fontsize=SIZE)
+    history.set_ylabel(f"{force.capitalize()} force, kN", fontsize=SIZE)
+    history.legend(fontsize=SIZE, frameon=False)
+    _octave_axis(panels["octave"])
+    _octave_axis(panels["third"], "third")
+    for axes in panels.values():
+        axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
+    panels["octave"].legend(fontsize=SIZE, frameon=False)
+    below = figure.add_subplot(rows[2, :])
+    below.axis("off")
+    cells = below.table(
+        [[_literal(cell) for cell in row] for row in table], loc="center", edges="horizontal"
+    )
+    cells.auto_set_font_size(value=False)
+    cells.set_fontsize(SIZE - 1)
+    cells.auto_set_column_width(list(range(len(table[0]))))
+    return figure
+
+
+def _octave_axis(axes: Axes, bands: str = "octave") -> None:
+    """Name the bands."""
+    names = [f"{frequency:g}" for frequency in get_bands(bands).nominal]
+    axes.set_xticks(np.arange(len(names)), names)
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlim(-0.6, 4.6)
-    axes.set_xlabel("Octave band, Hz", fontsize=SIZE)
+    axes.set_xlim(-0.6, len(names) - 0.4)
+    axes.set_xlabel(f"{bands.capitalize()} band, Hz", fontsize=SIZE)
+    if bands == "third":
+        axes.tick_params(axis="x", labelrotation=90)
 
 
 def _draw_tolerance(axes: Axes, source: str) -> None:

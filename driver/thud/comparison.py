@@ -1,0 +1,249 @@
+"""Models and recordings of the same drop on one page."""
+
+from __future__ import annotations
+
+import html
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from thud import plot
+from thud.case import Case, read_case, replace_file, require_kind
+from thud.errors import InputError
+from thud.impact import Impact, solve_case
+from thud.levels import get_bands, judge
+from thud.recording import Recording
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Mapping
+
+    from matplotlib.figure import Figure
+
+HEADER = ("", "contact, ms", "peak, N", "restitution", "level - nominal, dB", "conforms", "run, ms")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Impacts of the same drop, side by side.
+
+    Attributes
+    ----------
+    impacts : dict of str to Impact or Recording
+        What is compared, by name.
+    run_times : dict of str to float
+        Time that each model took, s; recordings have none.
+    force : str
+        ``"elastic"`` or ``"floor"``: the force that is compared.
+    source : str
+        Source whose limits are drawn.
+    """
+
+    impacts: dict[str, Impact | Recording]
+    run_times: dict[str, float]
+    force: str = "floor"
+    source: str = "rubber_ball"
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Return one row of text per impact, in the order of `HEADER`."""
+        octaves = judge(np.zeros(5), 0, 0, 0, 0, 0, self.source).criteria[:5]
+        nominal = np.array([(octave.lower + octave.upper) / 2 for octave in octaves])
+        tolerance = np.array([(octave.upper - octave.lower) / 2 for octave in octaves])
+        rows: list[tuple[str, ...]] = []
+        for name, impact in self.impacts.items():
+            difference = impact.levels(force=self.force) - nominal
+            met = int(np.sum(np.abs(difference) <= tolerance))
+            bounce = impact.restitution
+            spent = self.run_times.get(name)
+            rows.append(
+                (
+                    name,
+                    f"{1e3 * impact.contact_time:.2f}",
+                    f"{impact.force(self.force).max():.0f}",
+                    "not known" if np.isnan(bounce) else f"{bounce:.3f}",
+                    "  ".join(f"{value:+.1f}" for value in difference),
+                    f"{met} of 5 octaves",
+                    "" if spent is None else f"{1e3 * spent:.1f}",
+                )
+            )
+        return rows
+
+    def figure(self) -> Figure:
+        """Return the page as a matplotlib figure."""
+        return plot.comparison_page(self.impacts, self.force, self.source, [HEADER, *self.table()])
+
+    def html(self) -> str:
+        """Return the page as HTML with interactive plots, complete in one file."""
+        figure = make_subplots(
+            rows=2,
+            cols=2,
+            specs=[[{"colspan": 2}, None], [{}, {}]],
+            subplot_titles=("Blocked force", "Octaves", "Third octaves"),
+            vertical_spacing=0.12,
+        )
+        octaves = judge(np.zeros(5), 0, 0, 0, 0, 0, self.source).criteria[:5]
+        names = {kind: [f"{f:g}" for f in get_bands(kind).nominal] for kind in ("octave", "third")}
+        figure.add_trace(
+            go.Bar(
+                x=names["octave"],
+                y=[octave.upper - octave.lower for octave in octaves],
+                base=[octave.lower for octave in octaves],
+                marker_color="lightgrey",
+                name=f"tolerance, {self.source.replace('_', ' ')}",
+            ),
+            row=2,
+            col=1,
+        )
+        for i, (name, impact) in enumerate(self.impacts.items()):
+            look = {"color": plot.COLOURS[i % len(plot.COLOURS)]}
+            group = {"name": html.escape(name), "legendgroup": str(i)}
+            force = impact.force(self.force)
+            # Nothing is drawn long after the contact.
+            shown = impact.time < 1.5 * impact.contact_time
+            figure.add_trace(
+                go.Scatter(x=1e3 * impact.time[shown], y=force[shown], line=look, **group),
+                row=1,
+                col=1,
+            )
+            for column, kind in enumerate(names, start=1):
+                values = impact.levels(kind, force=self.force)
+                figure.add_trace(
+                    go.Scatter(
+                        x=names[kind], y=values, line=look, marker=look, showlegend=False, **group
+                    ),
+                    row=2,
+                    col=column,
+                )
+        figure.update_xaxes(title_text="Time since first touch, ms", row=1, col=1)
+        figure.update_yaxes(title_text="Force, N", row=1, col=1)
+        for column in (1, 2):
+            figure.update_xaxes(title_text="Band, Hz", type="category", row=2, col=column)
+            figure.update_yaxes(title_text="Force exposure level, dB re 1 N", row=2, col=column)
+        figure.update_layout(height=850, template="simple_white")
+        plots = figure.to_html(full_html=False, include_plotlyjs=True)
+        cells = [
+            "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row) + "</tr>"
+            for tag, row in [("th", HEADER), *(("td", row) for row in self.table())]
+        ]
+        return _PAGE.format(force=self.force, table="\n".join(cells), plots=plots)
+
+    def save(self, directory: str | os.PathLike[str]) -> list[Path]:
+        """Write ``comparison.png``, ``.svg`` and ``.html`` and return their paths.
+
+        Raises
+        ------
+        OSError
+            Where they cannot be written.
+        """
+        folder = Path(directory)
+        folder.mkdir(parents=True, exist_ok=True)
+        figure = self.figure()
+        paths = [folder / f"comparison.{ending}" for ending in ("png", "svg", "html")]
+        for path in paths[:2]:
+            plot.save(figure, path)
+        replace_file(paths[2], self.html().encode())
+        return paths
+
+
+def compare(
+    impacts: Mapping[str, Case | Impact | Recording],
+    force: str = "floor",
+    source: str = "rubber_ball",
+) -> Comparison:
+    """Compare models and recordings of the same drop.
+
+    Parameters
+    ----------
+    impacts
+        Cases, which are solved, impacts and recordings by name, at least one.
+    force
+        ``"elastic"`` or ``"floor"``.
+    source
+        ``"rubber_ball"`` or ``"tyre"``: whose limits are drawn.
+
+    Returns
+    -------
+    Comparison
+        Its `save` writes the page.
+
+    Raises
+    ------
+    InputError
+        Where there is nothing to compare, or the drops differ.
+    """
+    if not impacts:
+        message = "nothing is given to compare; allowed: one case, impact or recording or more"
+        raise InputError(message)
+    solved: dict[str, Impact | Recording] = {}
+    run_times = {}
+    for name, given in impacts.items():
+        require_kind(name, given, Case | Impact | Recording)
+        if isinstance(given, Case):
+            start = time.perf_counter()
+            solved[name] = solve_case(given)
+            run_times[name] = time.perf_counter() - start
+        else:
+            solved[name] = given
+    heights = {
+        name: impact.case.drop.height
+        for name, impact in solved.items()
+        if isinstance(impact, Impact)
+    }
+    if len(set(heights.values())) > 1:
+        listed = ", ".join(f"{name} from {height:g} m" for name, height in heights.items())
+        message = f"&drop: height differs ({listed}); allowed: cases of the same drop"
+        raise InputError(message)
+    return Comparison(solved, run_times, force, source)
+
+
+def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:
+    """Read namelist files and recordings (``.csv``); their names are those of the cases or files.
+
+    Raises
+    ------
+    InputError
+        Names the file; also where two have the same name.
+    """
+    found: dict[str, Case | Recording] = {}
+    for path in map(Path, paths):
+        given: Case | Recording
+        if path.suffix.lower() == ".csv":
+            name, given = path.stem, Recording.from_csv(path)
+        else:
+            given = read_case(path)
+            name = given.name
+        if name in found:
+            message = f"{path}: {name!r} is the name of another one too; allowed: different names"
+            raise InputError(message)
+        found[name] = given
+    return found
+
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<title>thud: comparison</title>
+<style>
+body {{ font-family: sans-serif; margin: 2em auto; max-width: 75em; padding: 0 1em; }}
+table {{ border-collapse: collapse; }}
+th, td {{ padding: 0.3em 0.9em; text-align: right; border-bottom: 1px solid #ccc; }}
+th:first-child, td:first-child {{ text-align: left; }}
+</style>
+</head>
+<body>
+<h1>Comparison of models and recordings</h1>
+<p>Blocked force ({force} force), its levels over the tolerance of the standards; level
+deviations from the nominal values in the octaves 31.5 to 500 Hz.</p>
+<table>
+{table}
+</table>
+{plots}
+</body>
+</html>
+"""
