@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Part of the largest force below which a recording counts as noise.
 NOISE = 0.01
+# Samples that a recording needs.
+LEAST_ROWS = 8
 # Part of the sampling interval by which the times of a recording may miss.
 JITTER = 1e-3
 
@@ -65,9 +67,14 @@ class Recording:
     def from_arrays(cls, table: NDArray[np.float64], name: str = "recording") -> Recording:
         """Return the recording of a table with the columns time, s, and force, N."""
         rows, columns = table.shape
-        least = 8
-        if rows < least or columns != 2 or not np.isfinite(table).all():  # noqa: PLR2004
-            message = f"{name}: {rows} rows of {columns} numbers; allowed: {least} rows or more of time, s, and force, N, all finite"  # noqa: E501
+        if rows < LEAST_ROWS or columns != len(("time", "force")):
+            message = (
+                f"{name}: {rows} rows of {columns} numbers; allowed: {LEAST_ROWS} rows or more "
+                "of time, s, and force, N"
+            )
+            raise InputError(message)
+        if not np.isfinite(table).all():
+            message = f"{name}: a value is not finite; allowed: real numbers"
             raise InputError(message)
         time, force = table.T
         step = (time[-1] - time[0]) / (rows - 1)
