@@ -16,12 +16,8 @@ from thud.case import (
     Ball,
     Case,
     Drop,
-    HollowSphere,
-    HuntCrossley,
     Levels,
     Limits,
-    MeasuredModes,
-    ModalBall,
     Sampling,
     read_case,
     write_case,
@@ -29,6 +25,7 @@ from thud.case import (
 from thud.errors import InputError, NumericalError, ThudError
 from thud.impact import Impact, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
+from thud.models import HollowSphere, HuntCrossley, MeasuredModes, ModalBall
 from thud.recording import Recording
 
 __version__ = version()

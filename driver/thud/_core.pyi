@@ -1,4 +1,5 @@
-# The extension that f2py makes from src/python/door.f90.
+# The extension that f2py makes from the doors in src/python.
 from typing import Any
 
 thud_door: Any
+thud_level_door: Any

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 door = _core.thud_door
+level_door = _core.thud_level_door
 
 
 def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:

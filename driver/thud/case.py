@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import dataclasses
-import errno
 import os
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, get_args
+from typing import TYPE_CHECKING, Any
 
 import f90nml
 import numpy as np
 
 from thud._library import call, door, text
+from thud.checks import replace_file, require_kind
 from thud.errors import InputError
+from thud.models import LISTS, MODELS, HollowSphere, ModelOptions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from types import UnionType
     from typing import Self
 
 
@@ -69,114 +66,6 @@ class Drop:
 
     height: float = 1.0
     gravity: float = 9.81
-
-
-@dataclass(frozen=True)
-class HollowSphere:
-    """Options of the paper's analytical model.
-
-    Attributes
-    ----------
-    momentum_flux : str
-        ``"momentum_balance"``, ``"retarding"``, ``"conservative"`` or ``"none"``.
-    """
-
-    name: ClassVar[str] = "hollow_sphere"
-    momentum_flux: str = "momentum_balance"
-
-
-@dataclass(frozen=True)
-class ModalBall:
-    """Options of the modal ball, the improved analytical model.
-
-    Attributes
-    ----------
-    harmonics : int
-        Highest harmonic n whose modes oscillate.
-    radial_modes : int
-        Modes of each harmonic that oscillate.
-    static_harmonics : int
-        Highest harmonic whose static flexibility counts.
-    rings : int
-        Rings of the lower half of the surface; at most half of `static_harmonics`.
-    damping_law : str
-        ``"constant"`` loss factor, or ``"rising"`` in proportion to frequency.
-    loss_factor : float
-        Loss factor, twice the damping ratio.
-    loss_frequency : float
-        Frequency of a rising loss factor, Hz.
-    cavity_gas : bool
-        The gas in the cavity resists changes of its volume.
-    static_families : sequence of int
-        Harmonics that answer statically instead of oscillating.
-    """
-
-    name: ClassVar[str] = "modal_ball"
-    harmonics: int = 32
-    radial_modes: int = 5
-    static_harmonics: int = 96
-    rings: int = 44
-    damping_law: str = "constant"
-    loss_factor: float = 0.1
-    loss_frequency: float = 74.0
-    cavity_gas: bool = True
-    static_families: Sequence[float] = ()
-
-
-@dataclass(frozen=True)
-class MeasuredModes:
-    """Options of the model of measured modes (after Park et al. 2010), one entry per mode.
-
-    Attributes
-    ----------
-    frequency : sequence of float
-        Natural frequencies of the ball on the floor, Hz.
-    damping_ratio : sequence of float
-        Damping ratios.
-    effective_mass : sequence of float
-        Effective masses, kg.
-    allow_mass_mismatch : bool
-        The masses need not add up to that of the ball.
-    """
-
-    name: ClassVar[str] = "measured_modes"
-    frequency: Sequence[float] = ()
-    damping_ratio: Sequence[float] = ()
-    effective_mass: Sequence[float] = ()
-    allow_mass_mismatch: bool = False
-
-
-@dataclass(frozen=True)
-class HuntCrossley:
-    """Options of the lumped source; exactly one of stiffness and contact time is above 0.
-
-    Attributes
-    ----------
-    stiffness : float
-        Stiffness, N/m^exponent; 0: from `contact_time`.
-    contact_time : float
-        Wanted contact time, s; 0: from `stiffness`.
-    exponent : float
-        Exponent of the deflection; 3/2 is Hertz's.
-    damping : float
-        Damping, s/m; 0: from `restitution`.
-    restitution : float
-        Wanted coefficient of restitution; 0: from `damping`.
-    """
-
-    name: ClassVar[str] = "hunt_crossley"
-    stiffness: float = 0.0
-    contact_time: float = 0.0
-    exponent: float = 1.5
-    damping: float = 0.0
-    restitution: float = 0.0
-
-
-ModelOptions = HollowSphere | ModalBall | MeasuredModes | HuntCrossley
-
-MODELS: dict[str, type[ModelOptions]] = {
-    kind.name: kind for kind in (HollowSphere, ModalBall, MeasuredModes, HuntCrossley)
-}
 
 
 @dataclass(frozen=True)
@@ -300,45 +189,11 @@ _GROUPS: dict[str, type[Any]] = {
 }
 
 
-def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Complain about an argument of another kind."""
-    if not isinstance(value, kind):
-        expected = getattr(kind, "__name__", None) or " or ".join(
-            k.__name__ for k in get_args(kind)
-        )
-        message = f"{name} = {value!r} is not allowed; allowed: an object of {expected}"
-        raise InputError(message)
-
-
-def new_model(name: str, options: dict[str, object]) -> ModelOptions:
-    """Return the options of a model by its name.
-
-    Raises
-    ------
-    InputError
-        Where the model or an option is not known; lists those that are.
-    """
-    if name not in MODELS:
-        message = f"&model: name = {name!r} is not allowed; allowed: {_listed(MODELS)}"
-        raise InputError(message)
-    known = [option.name for option in dataclasses.fields(MODELS[name])]
-    for option in options:
-        if option not in known:
-            message = f"&{name}: {option} is not a known key; allowed: {_listed(known)}"
-            raise InputError(message)
-    return MODELS[name](**options)  # type: ignore[arg-type]
-
-
-def _listed(words: Iterable[str]) -> str:
-    """Return words in quotes with commas between."""
-    return ", ".join(map(repr, words))
-
-
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
     """Return a value as f90nml knows it."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-    if isinstance(value, list | tuple) and key in _LISTS:
+    if isinstance(value, list | tuple) and key in LISTS:
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
     known = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
     if not known or (isinstance(value, int) and abs(value) > _LARGEST):
@@ -350,14 +205,6 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
 
 # No key takes a larger number, and Python would not print it.
 _LARGEST = 10**300
-
-# The keys that take lists of numbers.
-_LISTS = {
-    option.name
-    for kind in MODELS.values()
-    for option in dataclasses.fields(kind)
-    if option.default == ()
-}
 
 
 def case_text(case: Case) -> bytes:
@@ -407,28 +254,3 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
     content = case_text(case)
     call(door.count_samples, content)
     replace_file(path, content)
-
-
-def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file under another name, then give it its own: nobody sees half a file.
-
-    Raises
-    ------
-    OSError
-        With the path that was asked for, where it cannot be written.
-    """
-    target = Path(path)
-    try:
-        if target.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
-        part = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            part.write_bytes(content)
-            part.replace(target)
-        finally:
-            part.unlink(missing_ok=True)
-    except ValueError as error:  # a path that no file system can hold
-        message = f"{path!r} is not allowed; allowed: the path of a file"
-        raise InputError(message) from error
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(target)) from error

@@ -13,7 +13,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from thud import plot
-from thud.case import Case, read_case, replace_file, require_kind
+from thud.case import Case, read_case
+from thud.checks import replace_file, require_kind
 from thud.errors import InputError
 from thud.impact import Impact, solve_case
 from thud.levels import get_bands, judge

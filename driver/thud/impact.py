@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._library import call, door, words
-from thud.case import Ball, Case, Drop, Sampling, case_text, new_model, require_kind
+from thud.case import Ball, Case, Drop, Sampling, case_text
+from thud.checks import require_kind
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
+from thud.models import new_model
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

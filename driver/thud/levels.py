@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._library import call, door, words
+from thud._library import call, level_door, words
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def get_bands(bands: str = "octave") -> Bands:
     if not isinstance(bands, str) or bands not in BANDWIDTHS:
         message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
         raise InputError(message)
-    n_band, *columns = door.get_bands(bands)
+    n_band, *columns = level_door.get_bands(bands)
     return Bands(*(column[:n_band].copy() for column in columns))
 
 
@@ -139,7 +139,7 @@ def force_exposure_levels(
     count = len(get_bands(bands).nominal)
     record = _record(force)
     rate = _number("sample_rate", sample_rate)
-    (levels,) = call(door.force_exposure, record, rate, bands, _word(method), count)
+    (levels,) = call(level_door.force_exposure, record, rate, bands, _word(method), count)
     result: NDArray[np.float64] = levels
     return result
 
@@ -156,7 +156,7 @@ def peak_count(force: ArrayLike) -> int:
     if not np.isfinite(record).all():
         message = "force holds a value that is not finite; allowed: real numbers, N"
         raise InputError(message)
-    return int(door.count_peaks(record))
+    return int(level_door.count_peaks(record))
 
 
 def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
@@ -207,7 +207,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     }
     time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
     names, units, value, lower, upper, met = call(
-        door.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height
+        level_door.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height
     )
     rows = zip(words(names), words(units), value, lower, upper, met, strict=True)
     return Conformity(

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from thud.case import replace_file, require_kind
+from thud.checks import replace_file, require_kind
 from thud.errors import InputError
 from thud.impact import FORCES, Impact
 from thud.levels import get_bands, judge

@@ -15,6 +15,7 @@ module thud_modal_ball
    use thud_kinds, only: wp
    use thud_lapack, only: dgemv
    use thud_legendre, only: get_legendre
+   use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, real_field
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: get_sample_count, sampling_type
@@ -57,19 +58,6 @@ module thud_modal_ball
       type(list_type) :: static_families
    end type modal_ball_type
 
-   !> All oscillating modes and one step of each in closed form: q and v = q' go to
-   !> (qq q + qv v, vq q + vv v); an impulse p at the beginning adds -p (qv, vv).
-   type :: step_type
-      !> Angular frequencies, rad/s: [n_mode].
-      real(wp), allocatable :: omega(:)
-      !> Harmonic of each mode: [n_mode].
-      integer, allocatable :: harmonic(:)
-      !> Factors of one step: [n_mode] each.
-      real(wp), allocatable :: qq(:), qv(:), vq(:), vv(:)
-      !> Fall of each ring's height by unit amplitude: [n_mode, n_ring].
-      real(wp), allocatable :: fall(:, :)
-   end type step_type
-
 contains
 
    !> Keys and allowed ranges of the group `&modal_ball`.
@@ -88,7 +76,8 @@ contains
          integer_field(group, 'rings', options%rings, 'rings of the lower half of the surface', 2, 200), &
          choice_field(group, 'damping_law', options%damping_law, 'loss factor against frequency', &
          [character(len=8) :: 'constant', 'rising']), &
-         real_field(group, 'loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', 0.0_wp, 1.9_wp), &
+         real_field(group, 'loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
+         0.0_wp, 1.9_wp), &
          real_field(group, 'loss_frequency', options%loss_frequency, 'Hz', 'frequency of a rising loss factor', &
          0.1_wp, 1.0e5_wp), &
          logical_field(group, 'cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
@@ -107,8 +96,8 @@ contains
          error = input_error('&modal_ball: static_harmonics = '//to_text(options%static_harmonics) &
             //' is not allowed; allowed: harmonics = '//to_text(options%harmonics)//' or more')
       else if (2*options%rings > options%static_harmonics) then
-         error = input_error('&modal_ball: rings = '//to_text(options%rings)//' cannot be told apart by static_harmonics = ' &
-            //to_text(options%static_harmonics)//'; allowed: up to half of it')
+         error = input_error('&modal_ball: rings = '//to_text(options%rings) &
+            //' cannot be told apart by static_harmonics = '//to_text(options%static_harmonics)//'; allowed: up to half of it')
       else if (2*options%rings < options%harmonics) then
          error = input_error('&modal_ball: harmonics = '//to_text(options%harmonics)//' is too high for rings = ' &
             //to_text(options%rings)//'; allowed: up to twice the rings')
@@ -129,7 +118,7 @@ contains
       type(force_history_type), intent(out) :: history
       !> The modes cannot be computed, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
-      type(step_type) :: step
+      type(mode_step_type) :: step
       type(ring_contact_type) :: contact
       real(wp) :: interval
       integer :: n_sample, i
@@ -155,7 +144,7 @@ contains
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> The modes.
-      type(step_type), intent(out) :: step
+      type(mode_step_type), intent(out) :: step
       !> The rings.
       type(ring_contact_type), intent(out) :: contact
       !> The modes cannot be computed, or the rings cannot be told apart.
@@ -164,7 +153,7 @@ contains
       type(family_type) :: family
       real(wp) :: angle(options%rings)
       real(wp) :: shape(options%rings, 2)
-      real(wp), allocatable :: response(:, :)
+      real(wp), allocatable :: response(:, :), zeta(:)
       logical :: failed
       integer :: n, i, kept, k
 
@@ -196,7 +185,9 @@ contains
             //' cannot be computed; allowed: fewer harmonics, or a thinner wall')
          return
       end if
-      call set_factors(options, interval, step)
+      allocate (zeta(size(step%omega)), source=options%loss_factor/2)
+      if (options%damping_law == 'rising') zeta = zeta*step%omega/(2*pi*options%loss_frequency)
+      call set_factors(step, zeta, interval)
       do i = 1, options%rings
          response(:, i) = response(:, i) + matmul(step%qv*step%fall(:, i), step%fall)
       end do
@@ -223,35 +214,6 @@ contains
       end do
    end function get_ring_shape
 
-   !> Factors of one exact step of every mode, also of overdamped ones.
-   pure subroutine set_factors(options, interval, step)
-      !> The damping.
-      type(modal_ball_type), intent(in) :: options
-      !> Length of a step, s.
-      real(wp), intent(in) :: interval
-      !> The modes.
-      type(step_type), intent(inout) :: step
-      real(wp), dimension(size(step%omega)) :: zeta, decay, root, c, s
-
-      zeta = options%loss_factor/2
-      if (options%damping_law == 'rising') zeta = zeta*step%omega/(2*pi*options%loss_frequency)
-      ! The one value without a limit from both sides in floating point is stepped around.
-      where (abs(zeta - 1) < 1.0e-6_wp) zeta = 1 + 1.0e-6_wp
-      decay = zeta*step%omega
-      root = step%omega*sqrt(abs(1 - zeta**2))
-      where (zeta < 1)
-         c = exp(-decay*interval)*cos(root*interval)
-         s = exp(-decay*interval)*sin(root*interval)/root
-      elsewhere
-         c = (exp((root - decay)*interval) + exp(-(root + decay)*interval))/2
-         s = (exp((root - decay)*interval) - exp(-(root + decay)*interval))/(2*root)
-      end where
-      step%qq = c + decay*s
-      step%qv = s
-      step%vq = -step%omega**2*s
-      step%vv = c - decay*s
-   end subroutine set_factors
-
    !> Marches from first touch until the ball has left for good.
    subroutine march(ball, sampling, interval, step, contact, history, error)
       !> The ball.
@@ -261,7 +223,7 @@ contains
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> The modes.
-      type(step_type), intent(in) :: step
+      type(mode_step_type), intent(in) :: step
       !> The rings.
       type(ring_contact_type), intent(inout) :: contact
       !> The history.
@@ -338,26 +300,12 @@ contains
       end if
    end subroutine march
 
-   !> Energy of the modes, J.
-   pure function get_energy(step, q, v) result(energy)
-      !> The modes.
-      type(step_type), intent(in) :: step
-      !> Amplitudes, m sqrt(kg): [n_mode].
-      real(wp), intent(in) :: q(:)
-      !> Their rates: [n_mode].
-      real(wp), intent(in) :: v(:)
-      !> Kinetic and elastic energy, J.
-      real(wp) :: energy
-
-      energy = sum(v**2 + (step%omega*q)**2)/2
-   end function get_energy
-
    !> Writes motion and energies of one instant into the history.
    pure subroutine record_motion(ball, step, q, v, z, speed, i, history)
       !> The ball.
       type(ball_type), intent(in) :: ball
       !> The modes.
-      type(step_type), intent(in) :: step
+      type(mode_step_type), intent(in) :: step
       !> Amplitudes of the modes, m sqrt(kg): [n_mode].
       real(wp), intent(in) :: q(:)
       !> Their rates: [n_mode].

@@ -1,0 +1,48 @@
+"""What several modules need: checks of arguments, and files that are never half written."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from types import UnionType
+
+
+def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
+    """Complain about an argument of another kind."""
+    if not isinstance(value, kind):
+        expected = getattr(kind, "__name__", None) or " or ".join(
+            k.__name__ for k in get_args(kind)
+        )
+        message = f"{name} = {value!r} is not allowed; allowed: an object of {expected}"
+        raise InputError(message)
+
+
+def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file under another name, then give it its own: nobody sees half a file.
+
+    Raises
+    ------
+    OSError
+        With the path that was asked for, where it cannot be written.
+    """
+    target = Path(path)
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+        part = target.with_name(f".{target.name}.{os.getpid()}.part")
+        try:
+            part.write_bytes(content)
+            part.replace(target)
+        finally:
+            part.unlink(missing_ok=True)
+    except ValueError as error:  # a path that no file system can hold
+        message = f"{path!r} is not allowed; allowed: the path of a file"
+        raise InputError(message) from error
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error

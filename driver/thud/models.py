@@ -1,0 +1,152 @@
+"""Source models by their options: dataclasses that mirror the namelist group of each model."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+@dataclass(frozen=True)
+class HollowSphere:
+    """Options of the paper's analytical model.
+
+    Attributes
+    ----------
+    momentum_flux : str
+        ``"momentum_balance"``, ``"retarding"``, ``"conservative"`` or ``"none"``.
+    """
+
+    name: ClassVar[str] = "hollow_sphere"
+    momentum_flux: str = "momentum_balance"
+
+
+@dataclass(frozen=True)
+class ModalBall:
+    """Options of the modal ball, the improved analytical model.
+
+    Attributes
+    ----------
+    harmonics : int
+        Highest harmonic n whose modes oscillate.
+    radial_modes : int
+        Modes of each harmonic that oscillate.
+    static_harmonics : int
+        Highest harmonic whose static flexibility counts.
+    rings : int
+        Rings of the lower half of the surface; at most half of `static_harmonics`.
+    damping_law : str
+        ``"constant"`` loss factor, or ``"rising"`` in proportion to frequency.
+    loss_factor : float
+        Loss factor, twice the damping ratio.
+    loss_frequency : float
+        Frequency of a rising loss factor, Hz.
+    cavity_gas : bool
+        The gas in the cavity resists changes of its volume.
+    static_families : sequence of int
+        Harmonics that answer statically instead of oscillating.
+    """
+
+    name: ClassVar[str] = "modal_ball"
+    harmonics: int = 32
+    radial_modes: int = 5
+    static_harmonics: int = 96
+    rings: int = 44
+    damping_law: str = "constant"
+    loss_factor: float = 0.1
+    loss_frequency: float = 74.0
+    cavity_gas: bool = True
+    static_families: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class MeasuredModes:
+    """Options of the model of measured modes (after Park et al. 2010), one entry per mode.
+
+    Attributes
+    ----------
+    frequency : sequence of float
+        Natural frequencies of the ball on the floor, Hz.
+    damping_ratio : sequence of float
+        Damping ratios.
+    effective_mass : sequence of float
+        Effective masses, kg.
+    allow_mass_mismatch : bool
+        The masses need not add up to that of the ball.
+    """
+
+    name: ClassVar[str] = "measured_modes"
+    frequency: Sequence[float] = ()
+    damping_ratio: Sequence[float] = ()
+    effective_mass: Sequence[float] = ()
+    allow_mass_mismatch: bool = False
+
+
+@dataclass(frozen=True)
+class HuntCrossley:
+    """Options of the lumped source; exactly one of stiffness and contact time is above 0.
+
+    Attributes
+    ----------
+    stiffness : float
+        Stiffness, N/m^exponent; 0: from `contact_time`.
+    contact_time : float
+        Wanted contact time, s; 0: from `stiffness`.
+    exponent : float
+        Exponent of the deflection; 3/2 is Hertz's.
+    damping : float
+        Damping, s/m; 0: from `restitution`.
+    restitution : float
+        Wanted coefficient of restitution; 0: from `damping`.
+    """
+
+    name: ClassVar[str] = "hunt_crossley"
+    stiffness: float = 0.0
+    contact_time: float = 0.0
+    exponent: float = 1.5
+    damping: float = 0.0
+    restitution: float = 0.0
+
+
+ModelOptions = HollowSphere | ModalBall | MeasuredModes | HuntCrossley
+
+MODELS: dict[str, type[ModelOptions]] = {
+    kind.name: kind for kind in (HollowSphere, ModalBall, MeasuredModes, HuntCrossley)
+}
+
+# The keys that take lists of numbers.
+LISTS = {
+    option.name
+    for kind in MODELS.values()
+    for option in dataclasses.fields(kind)
+    if option.default == ()
+}
+
+
+def new_model(name: str, options: dict[str, object]) -> ModelOptions:
+    """Return the options of a model by its name.
+
+    Raises
+    ------
+    InputError
+        Where the model or an option is not known; lists those that are.
+    """
+    if name not in MODELS:
+        message = f"&model: name = {name!r} is not allowed; allowed: {_listed(MODELS)}"
+        raise InputError(message)
+    known = [option.name for option in dataclasses.fields(MODELS[name])]
+    for option in options:
+        if option not in known:
+            message = f"&{name}: {option} is not a known key; allowed: {_listed(known)}"
+            raise InputError(message)
+    return MODELS[name](**options)  # type: ignore[arg-type]
+
+
+def _listed(words: Iterable[str]) -> str:
+    """Return words in quotes with commas between."""
+    return ", ".join(map(repr, words))
