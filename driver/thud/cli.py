@@ -137,9 +137,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
     """Run one case as the executable does, then draw it; return whether it conforms."""
-    if options.output is not None and not options.output.strip():
-        message = "--output has no value; allowed: a directory"
-        raise thud.InputError(message)
+    _require_output(options.output)
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, thud.read_case(path).name)  # noqa: PTH118 - may be ""
@@ -162,6 +160,13 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     if not options.quiet:
         tqdm.write(f"{text(table)}\n  Results: {folder}\n")
     return bool(conforming)
+
+
+def _require_output(output: str | None) -> None:
+    """Complain about a directory without a name."""
+    if output is not None and not output.strip():
+        message = "--output has no value; allowed: a directory"
+        raise thud.InputError(message)
 
 
 def _figures(options: argparse.Namespace) -> int:
@@ -195,12 +200,9 @@ def _figures(options: argparse.Namespace) -> int:
 def _compare(options: argparse.Namespace) -> int:
     """Compare cases and recordings."""
     try:
+        _require_output(options.output)
         found = thud.read_all(options.cases)
-        comparison = thud.compare(
-            {name: found[name] for name in tqdm(found, unit="case", disable=options.quiet)},
-            options.force,
-            options.source,
-        )
+        comparison = thud.compare(found, options.force, options.source, progress=not options.quiet)
         paths = comparison.save(options.output)
     except (thud.ThudError, OSError) as error:
         print(f"thud-driver: {_sentence(error)}", file=sys.stderr)

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
+from tqdm import tqdm
 
 from thud import plot
 from thud.case import Case, read_case
 from thud.checks import replace_file, require_kind
 from thud.errors import InputError
 from thud.impact import Impact, solve_case
-from thud.levels import get_bands, judge
+from thud.levels import get_bands, octave_limits
 from thud.recording import Recording
 
 if TYPE_CHECKING:
@@ -52,12 +53,11 @@ class Comparison:
 
     def table(self) -> list[tuple[str, ...]]:
         """Return one row of text per impact, in the order of `HEADER`."""
-        octaves = judge(np.zeros(5), 0, 0, 0, 0, 0, self.source).criteria[:5]
-        nominal = np.array([(octave.lower + octave.upper) / 2 for octave in octaves])
-        tolerance = np.array([(octave.upper - octave.lower) / 2 for octave in octaves])
+        lower, upper = octave_limits(self.source)
+        nominal, tolerance = (lower + upper) / 2, (upper - lower) / 2
         rows: list[tuple[str, ...]] = []
         for name, impact in self.impacts.items():
-            difference = impact.levels(force=self.force) - nominal
+            difference = impact.levels(method="exact", force=self.force) - nominal
             met = int(np.sum(np.abs(difference) <= tolerance))
             bounce = impact.restitution
             spent = self.run_times.get(name)
@@ -87,13 +87,13 @@ class Comparison:
             subplot_titles=("Blocked force", "Octaves", "Third octaves"),
             vertical_spacing=0.12,
         )
-        octaves = judge(np.zeros(5), 0, 0, 0, 0, 0, self.source).criteria[:5]
+        lower, upper = octave_limits(self.source)
         names = {kind: [f"{f:g}" for f in get_bands(kind).nominal] for kind in ("octave", "third")}
         figure.add_trace(
             go.Bar(
                 x=names["octave"],
-                y=[octave.upper - octave.lower for octave in octaves],
-                base=[octave.lower for octave in octaves],
+                y=upper - lower,
+                base=lower,
                 marker_color="lightgrey",
                 name=f"tolerance, {self.source.replace('_', ' ')}",
             ),
@@ -112,7 +112,7 @@ class Comparison:
                 col=1,
             )
             for column, kind in enumerate(names, start=1):
-                values = impact.levels(kind, force=self.force)
+                values = impact.levels(kind, "exact", self.force)
                 figure.add_trace(
                     go.Scatter(
                         x=names[kind], y=values, line=look, marker=look, showlegend=False, **group
@@ -155,6 +155,8 @@ def compare(
     impacts: Mapping[str, Case | Impact | Recording],
     force: str = "floor",
     source: str = "rubber_ball",
+    *,
+    progress: bool = False,
 ) -> Comparison:
     """Compare models and recordings of the same drop.
 
@@ -166,6 +168,8 @@ def compare(
         ``"elastic"`` or ``"floor"``.
     source
         ``"rubber_ball"`` or ``"tyre"``: whose limits are drawn.
+    progress
+        Show a progress bar.
 
     Returns
     -------
@@ -182,7 +186,7 @@ def compare(
         raise InputError(message)
     solved: dict[str, Impact | Recording] = {}
     run_times = {}
-    for name, given in impacts.items():
+    for name, given in tqdm(impacts.items(), unit="case", disable=not progress, leave=False):
         require_kind(name, given, Case | Impact | Recording)
         if isinstance(given, Case):
             start = time.perf_counter()
@@ -190,14 +194,14 @@ def compare(
             run_times[name] = time.perf_counter() - start
         else:
             solved[name] = given
-    heights = {
-        name: impact.case.drop.height
+    speeds = {
+        name: impact.impact_velocity
         for name, impact in solved.items()
         if isinstance(impact, Impact)
     }
-    if len(set(heights.values())) > 1:
-        listed = ", ".join(f"{name} from {height:g} m" for name, height in heights.items())
-        message = f"&drop: height differs ({listed}); allowed: cases of the same drop"
+    if len(set(speeds.values())) > 1:
+        listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
+        message = f"&drop: height or gravity differs ({listed}); allowed: cases of the same drop"
         raise InputError(message)
     return Comparison(solved, run_times, force, source)
 

@@ -216,6 +216,12 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     )
 
 
+def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the smallest and largest conforming octave levels of a source, dB, shape (5,)."""
+    octaves = judge(np.zeros(5), 0, 0, 0, 0, 0, source).criteria[:5]
+    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
+
+
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
     """Return a record as the library takes it."""
     try:

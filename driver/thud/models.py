@@ -61,7 +61,7 @@ class ModalBall:
     loss_factor: float = 0.1
     loss_frequency: float = 74.0
     cavity_gas: bool = True
-    static_families: Sequence[float] = ()
+    static_families: Sequence[int] = ()
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from matplotlib.ticker import NullLocator
 from thud.checks import replace_file, require_kind
 from thud.errors import InputError
 from thud.impact import FORCES, Impact
-from thud.levels import get_bands, judge
+from thud.levels import get_bands, octave_limits
 from thud.recording import Recording
 
 if TYPE_CHECKING:
@@ -135,8 +135,8 @@ def _curves(impacts: Mapping[str, Curve], force: str | None) -> Iterator[tuple[s
 
 
 def _literal(label: str) -> str:
-    """Return a label in which matplotlib finds no formula."""
-    return label.replace("$", r"\$")
+    """Return a label in which matplotlib finds no formula, and that it does not hide."""
+    return label.lstrip("_").replace("$", r"\$")
 
 
 def _add_legend(axes: Axes, impacts: Mapping[str, Impact]) -> None:
@@ -256,19 +256,12 @@ def _octave_axis(axes: Axes, bands: str = "octave") -> None:
 
 def _draw_tolerance(axes: Axes, source: str) -> None:
     """Draw the range of each octave as a grey box with its nominal value."""
-    octaves = judge(np.zeros(5), 0.0, 0.0, 0, 0.0, 0.0, source).criteria[:5]
-    for place, octave in enumerate(octaves):
-        axes.fill_between(
-            [place - 0.4, place + 0.4],
-            octave.lower,
-            octave.upper,
-            color="0.82",
-            linewidth=0,
-            label=f"Tolerance, {source.replace('_', ' ')}" if place == 0 else None,
-        )
-        nominal = (octave.lower + octave.upper) / 2
-        label = "Nominal" if place == 0 else None
+    for place, (lower, upper) in enumerate(zip(*octave_limits(source), strict=True)):
         line = [place - 0.4, place + 0.4]
+        name = f"Tolerance, {source.replace('_', ' ')}" if place == 0 else None
+        axes.fill_between(line, lower, upper, color="0.82", linewidth=0, label=name)
+        label = "Nominal" if place == 0 else None
+        nominal = (lower + upper) / 2
         axes.plot(line, [nominal, nominal], color="0.45", linewidth=0.8, label=label)
 
 

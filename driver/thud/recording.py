@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,12 +53,15 @@ class Recording:
             Where the file is missing or does not hold at least eight evenly spaced samples.
         """
         try:
-            with open(path, encoding="utf-8") as file:  # noqa: PTH123 - any kind of path
-                lines = [line for line in file if line.strip() and not line.startswith("#")]
-            try:
-                [float(word) for word in lines[0].split(",")]
-            except ValueError:
-                lines = lines[1:]
+            if not Path(path).is_file():  # to open a pipe could take for ever
+                raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
+            text = Path(path).read_text(encoding="utf-8-sig")
+            lines = [line for line in text.splitlines() if line.strip() and line[0] != "#"]
+            if not any(map(_is_number, lines[0].split(","))):
+                del lines[0]
+            if not lines:
+                message = "no numbers"
+                raise ValueError(message)  # noqa: TRY301 - one sentence for all that is unreadable
             table = np.loadtxt(lines, delimiter=",", ndmin=2)
         except (IndexError, OSError, ValueError) as error:
             message = f"{path}: cannot be read ({error}); allowed: columns of time, s, and force, N"
@@ -114,3 +119,12 @@ class Recording:
         return force_exposure_levels(
             self.force(force or "floor"), self.sample_rate, bands, method or "exact"
         )
+
+
+def _is_number(word: str) -> bool:
+    """Return whether a word is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -78,9 +78,11 @@ contains
    end function get_file_stem
 
    !> Complains where a directory holds anything else than an earlier run of the same case.
-   subroutine check_owner(directory, marker, content, differs, error)
+   subroutine check_owner(directory, names, marker, content, differs, error)
       !> The directory.
       character(len=*), intent(in) :: directory
+      !> Names of all files that a run may write: [n_file].
+      character(len=*), intent(in) :: names(:)
       !> Name of the file whose first line tells whose directory it is.
       character(len=*), intent(in) :: marker
       !> What this file will hold.
@@ -90,10 +92,15 @@ contains
       !> The directory belongs to something else.
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: unreadable
+      type(lock_type) :: lock
       character(len=:), allocatable :: text
 
       differs = .false.
       if (.not. directory_exists(directory)) return
+      ! Under the lock, so that nobody is writing the parts.
+      call lock_directory(directory, lock)
+      call remove_parts(directory, names)
+      call unlock_directory(lock)
       if (is_empty_directory(directory)) return
       call read_text_file(directory//'/'//marker, text, unreadable)
       if (.not. allocated(unreadable)) then

@@ -3,7 +3,7 @@ module thud_run
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count
    use thud_case, only: case_type, get_case_text, read_case
    use thud_error, only: error_type
-   use thud_file, only: check_owner, get_file_stem, read_text_file, remove_parts, text_file_type, &
+   use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, &
       write_files
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
@@ -68,8 +68,8 @@ contains
       input = get_case_text(case)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      call remove_parts(outcome%directory, file_names)
-      call check_owner(outcome%directory, 'effective.nml', input, differs, error)
+      call check_owner(outcome%directory, [character(len=13) :: file_names, channel_file], 'effective.nml', input, &
+         differs, error)
       if (.not. allocated(error)) call solve_case(case, history, error)
       if (.not. allocated(error)) call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
       if (.not. allocated(error)) then

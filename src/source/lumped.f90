@@ -6,7 +6,7 @@ module thud_lumped
    use thud_force_history, only: force_history_type, new_force_history
    use thud_kinds, only: wp
    use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
-   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
@@ -20,9 +20,6 @@ module thud_lumped
    !> Residual of the balances of impulse and energy above which a result is refused. At the
    !> default step the paper's case has 1e-12.
    real(wp), parameter :: most_residual = 1.0e-6_wp
-
-   !> Samples that a contact needs to be more than a few spikes.
-   real(wp), parameter :: least_samples = 8.0_wp
 
    !> Equation of motion of the source; its state is laid out as above.
    type, abstract, extends(ode_type) :: lumped_type
@@ -122,12 +119,8 @@ contains
          return
       end if
       history%contact_time = time
-      if (time*sampling%sample_rate < least_samples) then
-         error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the contact of ' &
-            //to_text(time)//' s too few samples; allowed: from '//to_text(least_samples/time)//' Hz')
-         return
-      end if
-      call finish(source%mass, state, history, error)
+      call check_contact_samples(sampling, time, error)
+      if (.not. allocated(error)) call finish(source%mass, state, history, error)
 
    contains
 

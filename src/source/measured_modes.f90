@@ -10,7 +10,7 @@ module thud_measured_modes
    use thud_force_history, only: force_history_type, new_force_history
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
-   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
@@ -60,7 +60,7 @@ contains
 
       fields = [ &
          list_field(group, 'frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
-         0.0_wp, 1.0e6_wp, lower_open=.true.), &
+         1.0e-3_wp, 1.0e6_wp), &
          list_field(group, 'damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
          0.0_wp, 1.0_wp, upper_open=.true.), &
          list_field(group, 'effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
@@ -150,6 +150,8 @@ contains
          error = numerical_error('&measured_modes: the balance of impulse misses by ' &
             //to_text(history%impulse_residual)//' and that of energy by '//to_text(history%energy_residual) &
             //'; allowed: up to '//to_text(most_residual))
+      else
+         call check_contact_samples(sampling, history%contact_time, error)
       end if
    end subroutine solve_measured_modes
 

@@ -7,6 +7,7 @@
 !> is no penalty stiffness.
 module thud_modal_ball
    use thud_ball, only: ball_type
+   use thud_blas_threads, only: use_one_blas_thread
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
@@ -18,7 +19,7 @@ module thud_modal_ball
    use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, real_field
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
-   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_text, only: to_text
    implicit none (type, external)
@@ -26,9 +27,8 @@ module thud_modal_ball
 
    public :: check_modal_ball, get_modal_ball_fields, modal_ball_type, solve_modal_ball
 
-   !> The ball has left the floor for good when nothing touched for this time, s. Its surface may
-   !> touch again while it swings back.
-   real(wp), parameter :: quiet_time = 2.0e-3_wp
+   !> Angle that a mode may turn through in a step; faster ones answer statically.
+   real(wp), parameter :: most_phase = pi/2
 
    !> Part of the energy at first touch that the steps may lose in contact.
    real(wp), parameter :: most_energy_residual = 0.02_wp
@@ -91,17 +91,25 @@ contains
       type(modal_ball_type), intent(in) :: options
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
+      logical :: wrong(options%static_families%count)
 
-      if (options%static_harmonics < options%harmonics) then
-         error = input_error('&modal_ball: static_harmonics = '//to_text(options%static_harmonics) &
-            //' is not allowed; allowed: harmonics = '//to_text(options%harmonics)//' or more')
-      else if (2*options%rings > options%static_harmonics) then
-         error = input_error('&modal_ball: rings = '//to_text(options%rings) &
-            //' cannot be told apart by static_harmonics = '//to_text(options%static_harmonics)//'; allowed: up to half of it')
-      else if (2*options%rings < options%harmonics) then
-         error = input_error('&modal_ball: harmonics = '//to_text(options%harmonics)//' is too high for rings = ' &
-            //to_text(options%rings)//'; allowed: up to twice the rings')
-      end if
+      associate (families => options%static_families%values(:options%static_families%count))
+         wrong = abs(families - nint(families)) > 0.0_wp .or. nint(families) > options%harmonics
+         if (options%static_harmonics < options%harmonics) then
+            error = input_error('&modal_ball: static_harmonics = '//to_text(options%static_harmonics) &
+               //' is not allowed; allowed: harmonics = '//to_text(options%harmonics)//' or more')
+         else if (2*options%rings > options%static_harmonics) then
+            error = input_error('&modal_ball: rings = '//to_text(options%rings) &
+               //' cannot be told apart by static_harmonics = '//to_text(options%static_harmonics) &
+               //'; allowed: up to half of it')
+         else if (2*options%rings < options%harmonics) then
+            error = input_error('&modal_ball: harmonics = '//to_text(options%harmonics)//' is too high for rings = ' &
+               //to_text(options%rings)//'; allowed: up to twice the rings')
+         else if (any(wrong)) then
+            error = input_error('&modal_ball: static_families holds '//to_text(families(findloc(wrong, .true., dim=1))) &
+               //'; allowed: whole numbers up to harmonics = '//to_text(options%harmonics))
+         end if
+      end associate
    end subroutine check_modal_ball
 
    !> Force history of one drop.
@@ -130,6 +138,7 @@ contains
       history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_told - 1), &
          'energy_rest_J']
       allocate (history%channel(n_sample, n_told + 2), source=0.0_wp)
+      call use_one_blas_thread()
       call prepare(ball, options, interval, step, contact, error)
       if (allocated(error)) return
       call march(ball, sampling, interval, step, contact, history, error)
@@ -168,7 +177,7 @@ contains
             associate (static => options%static_families)
                if (any(nint(static%values(:static%count)) == n)) kept = 0
             end associate
-            call get_family(basis, n, kept, family, failed)
+            call get_family(basis, n, kept, most_phase/interval, family, failed)
          else
             call get_static_family(basis, n, family, failed)
          end if
@@ -193,7 +202,7 @@ contains
       end do
       call new_ring_contact(response, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
-         //' cannot be told apart; allowed: fewer rings, or more static_harmonics')
+         //' cannot be told apart; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
    !> Fall of the rings' height by unit displacements U and V of one harmonic.
@@ -232,7 +241,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(size(step%omega)) :: q, v, old_q, old_v, push
       real(wp), dimension(size(step%fall, 2)) :: gap, height
-      real(wp) :: z, speed, impulse, loss, energy
+      real(wp) :: z, speed, impulse, loss, quiet
       integer :: i, j, n_step, last, n_mode, n_ring
 
       n_mode = size(step%omega)
@@ -241,6 +250,10 @@ contains
       q = 0.0_wp
       v = 0.0_wp
       z = ball%outer_radius
+      ! The ball has left for good when nothing touched for half a period of its slowest mode: its
+      ! surface may touch again while it swings back.
+      quiet = 0.0_wp
+      if (n_mode > 0) quiet = pi/minval(step%omega)
       speed = -history%impact_velocity
       loss = 0.0_wp
       last = 0
@@ -275,30 +288,53 @@ contains
             end if
             ! What damping takes lies between the impulse at the beginning and the end of the step.
             loss = loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
-            if (speed > 0.0_wp .and. (n_step - last)*interval > quiet_time) exit samples
+            if (contact%last == n_ring) then
+               error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval) &
+                  //' ms after first touch the ball lies on its equator, its centre sunk by ' &
+                  //to_text(1.0e3_wp*(ball%outer_radius - z)) &
+                  //' mm; allowed: a lower height, or a stiffer ball')
+               return
+            end if
+            if (speed > 0.0_wp .and. (n_step - last)*interval > quiet) exit samples
          end do
       end do samples
       if (i > size(history%floor_force)) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(quiet_time)//' s after the last contact; allowed: longer than that')
+            //to_text(quiet)//' s after the last contact; allowed: longer than that')
          return
       end if
+      history%contact_time = last*interval
+      call check_contact_samples(sampling, history%contact_time, error)
+      if (.not. allocated(error)) call finish(ball%mass, speed, get_energy(step, q, v) + loss, history, error)
+   end subroutine march
+
+   !> Scalars of the impact, and the check of the balances.
+   subroutine finish(mass, speed, energy, history, error)
+      !> Mass of the ball, kg.
+      real(wp), intent(in) :: mass
+      !> Velocity upwards of the centre of mass after the contact, m/s.
+      real(wp), intent(in) :: speed
+      !> Energy that the modes hold or have lost, J.
+      real(wp), intent(in) :: energy
+      !> The history; its samples are complete.
+      type(force_history_type), intent(inout) :: history
+      !> The balance of energy does not close.
+      type(error_type), allocatable, intent(out) :: error
+
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
-      history%contact_time = last*interval
       history%peak_force = maxval(history%floor_force)
       history%peak_floor_force = history%peak_force
       history%restitution = speed/history%impact_velocity
-      associate (momentum => ball%mass*(history%impact_velocity + speed), initial => ball%mass/2*history%impact_velocity**2)
+      associate (momentum => mass*(history%impact_velocity + speed), initial => mass/2*history%impact_velocity**2)
          history%impulse_residual = abs(history%impulse - momentum)/momentum
-         energy = get_energy(step, q, v) + ball%mass/2*speed**2
-         history%energy_residual = abs(energy + loss - initial)/initial
+         history%energy_residual = abs(mass/2*speed**2 + energy - initial)/initial
       end associate
       if (.not. history%energy_residual <= most_energy_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
             //to_text(history%energy_residual)//'; allowed: up to '//to_text(most_energy_residual))
       end if
-   end subroutine march
+   end subroutine finish
 
    !> Writes motion and energies of one instant into the history.
    pure subroutine record_motion(ball, step, q, v, z, speed, i, history)

@@ -63,10 +63,12 @@ contains
       real(wp) :: after(size(gap))
       logical :: wrong(size(gap))
       integer :: round, first_wrong
+      logical :: failed
 
       if (.not. any(contact%touches)) contact%touches = gap < 0.0_wp
       do round = 1, most_rounds
-         call close_gaps(contact, gap)
+         call close_gaps(contact, gap, failed)
+         if (failed) exit
          if (contact%last == 0) then
             after = gap
          else
@@ -87,11 +89,13 @@ contains
    end subroutine solve_contact
 
    !> Impulses that close the gaps of the touching rings.
-   subroutine close_gaps(contact, gap)
+   subroutine close_gaps(contact, gap, failed)
       !> The contact.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_ring].
       real(wp), intent(in) :: gap(:)
+      !> The response of the touching rings is not positive definite.
+      logical, intent(out) :: failed
       real(wp), allocatable :: matrix(:, :), solution(:, :)
       integer, allocatable :: touching(:)
       integer :: i, n, info
@@ -99,6 +103,7 @@ contains
       n = count(contact%touches)
       contact%last = findloc(contact%touches, .true., dim=1, back=.true.)
       contact%impulse = 0.0_wp
+      failed = .false.
       if (n == 0) return
       if (contact%last == n) then
          contact%impulse(:n) = -gap(:n)
@@ -110,7 +115,8 @@ contains
          matrix = contact%response(touching, touching)
          solution(:, 1) = -gap(touching)
          call dposv('L', n, 1, matrix, n, solution, n, info)
-         if (info == 0) contact%impulse(touching) = solution(:, 1)
+         failed = info /= 0
+         if (.not. failed) contact%impulse(touching) = solution(:, 1)
       end if
    end subroutine close_gaps
 

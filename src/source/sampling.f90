@@ -8,13 +8,16 @@ module thud_sampling
    implicit none (type, external)
    private
 
-   public :: check_sampling, get_sample_count, get_sampling_fields, sampling_type
+   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, sampling_type
 
    !> Samples of one record; more would fill the memory and no drop needs them.
    real(wp), parameter :: most_samples = 5.0e6_wp
 
    !> Integration steps of one record; more would run for minutes.
    real(wp), parameter :: most_steps = 1.0e8_wp
+
+   !> Samples that a contact needs to be more than a few spikes.
+   real(wp), parameter :: least_contact_samples = 8.0_wp
 
    !> The sampled record; the default rate is the paper's.
    type :: sampling_type
@@ -62,6 +65,20 @@ contains
             //to_text(most_steps))
       end if
    end subroutine check_sampling
+
+   !> Complains about a contact of hardly any samples.
+   subroutine check_contact_samples(sampling, contact_time, error)
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> Contact time, s.
+      real(wp), intent(in) :: contact_time
+      !> Names the rate that would do.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (contact_time*sampling%sample_rate >= least_contact_samples) return
+      error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the contact of ' &
+         //to_text(contact_time)//' s too few samples; allowed: from '//to_text(least_contact_samples/contact_time)//' Hz')
+   end subroutine check_contact_samples
 
    !> Number of samples of the record.
    pure function get_sample_count(sampling) result(n_sample)

@@ -16,8 +16,9 @@ module thud_sphere_modes
 
    public :: basis_type, family_type, get_family, get_static_family, new_basis
 
-   !> What is left to rounding of the exact zero of the rigid mode, over the largest eigenvalue.
-   real(wp), parameter :: rigid_threshold = 1.0e-9_wp
+   !> Distance of Poisson's ratio from 1/2 within which material is incompressible: beyond it the
+   !> compressible energy would drown the others in rounding, and modes differ by as little.
+   real(wp), parameter :: incompressible_distance = 1.0e-7_wp
 
    !> Gram matrices of the basis, the same for every harmonic.
    type :: basis_type
@@ -73,14 +74,14 @@ contains
       logical, intent(in) :: with_gas
       !> The basis.
       type(basis_type) :: basis
-      real(wp), allocatable :: node(:), u(:, :), u_slope(:, :), d(:, :), e(:, :), w(:, :)
-      integer :: degree, n, i, power
+      real(wp), allocatable :: node(:)
+      integer :: degree, n, i
 
       basis%outer_radius = ball%outer_radius
       basis%inner_radius = ball%outer_radius - ball%wall_thickness
       basis%density = get_density(ball)
       basis%shear_modulus = ball%youngs_modulus/(2*(1 + ball%poisson_ratio))
-      basis%incompressible = .not. ball%poisson_ratio < 0.5_wp
+      basis%incompressible = 0.5_wp - ball%poisson_ratio < incompressible_distance
       if (.not. basis%incompressible) then
          basis%lame = 2*basis%shear_modulus*ball%poisson_ratio/(1 - 2*ball%poisson_ratio)
       end if
@@ -105,14 +106,26 @@ contains
          basis%at_end(:, :, i) = basis%at_end(:, :, i)*(2/ball%wall_thickness)**(i - 1)
       end do
 
+      call set_gram(basis, n)
+   end function new_basis
+
+   !> Gram matrices of the strain and kinetic energies.
+   subroutine set_gram(basis, n)
+      !> The basis, its polynomials set.
+      type(basis_type), intent(inout) :: basis
+      !> Number of polynomials.
+      integer, intent(in) :: n
+      real(wp), dimension(size(basis%radius), 2*n) :: u, u_slope, d, e, w
+      integer :: power
+
       ! Columns for U, then for W: U, r U', D = n (n + 1) V, E = n (n + 1) (r V' - V), W.
       associate (r => spread(basis%radius, 2, n), p => basis%polynomial, zero => 0*basis%polynomial(:, :, 1))
-         u = reshape([p(:, :, 1), zero], [size(node), 2*n])
-         u_slope = reshape([r*p(:, :, 2), zero], [size(node), 2*n])
-         d = reshape([r*p(:, :, 2) + 2*p(:, :, 1), -p(:, :, 1)], [size(node), 2*n])
+         u = reshape([p(:, :, 1), zero], shape(u))
+         u_slope = reshape([r*p(:, :, 2), zero], shape(u))
+         d = reshape([r*p(:, :, 2) + 2*p(:, :, 1), -p(:, :, 1)], shape(u))
          e = reshape([r*(3*p(:, :, 2) + r*p(:, :, 3)) - r*p(:, :, 2) - 2*p(:, :, 1), &
-            p(:, :, 1) - r*p(:, :, 2)], [size(node), 2*n])
-         w = reshape([zero, p(:, :, 1)], [size(node), 2*n])
+            p(:, :, 1) - r*p(:, :, 2)], shape(u))
+         w = reshape([zero, p(:, :, 1)], shape(u))
       end associate
       ! With L = n (n + 1) the strain energy of r^2 e:e is
       ! (rU')^2 + 2U^2 - 2UD + (1 - 1/L) D^2 + (L U^2 + 2 U E + E^2/L)/2.
@@ -157,7 +170,7 @@ contains
          matrix = product_of(a, b) + product_of(b, a)
       end function mixed
 
-   end function new_basis
+   end subroutine set_gram
 
    !> Degree of the polynomials that resolve a harmonic: its modes fall off like r^n, which takes
    !> a degree in proportion to the root of the exponent; the tests hold it against higher ones.
@@ -173,13 +186,15 @@ contains
    end function get_degree
 
    !> The lowest modes of one harmonic, and the flexibility of all others.
-   subroutine get_family(basis, harmonic, most_modes, family, failed)
+   subroutine get_family(basis, harmonic, most_modes, highest_omega, family, failed)
       !> The basis.
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
       !> Number of modes to keep; fewer where the basis has fewer.
       integer, intent(in) :: most_modes
+      !> Highest angular frequency to keep, rad/s.
+      real(wp), intent(in) :: highest_omega
       !> The modes.
       type(family_type), intent(out) :: family
       !> The eigenproblem could not be solved.
@@ -194,13 +209,15 @@ contains
       call dsygv(1, 'V', 'L', n, stiffness, n, mass, n, square, work, size(work), info)
       failed = info /= 0
       if (failed) return
-      first = count(square < rigid_threshold*square(n)) + 1
-      if (harmonic /= 1) first = 1
-      last = min(first + most_modes - 1, n)
+      ! The lowest mode of n = 1 is the rigid one.
+      first = merge(2, 1, harmonic == 1)
+      failed = .not. all(square(first:) > 0.0_wp)
+      if (failed) return
+      last = min(first - 1 + min(most_modes, count(square(first:) <= highest_omega**2)), n)
       family%omega = sqrt(square(first:last))
       surface = matmul(surface, stiffness)
       family%surface = surface(:, first:last)
-      do k = max(last, first - 1) + 1, n
+      do k = last + 1, n
          family%flexibility = family%flexibility + outer(surface(:, k))/square(k)
       end do
    end subroutine get_family
