@@ -9,7 +9,8 @@ module thud_source_model
    use thud_hunt_crossley, only: check_hunt_crossley, get_hunt_crossley_fields, hunt_crossley_type, solve_hunt_crossley
    use thud_measured_modes, only: check_measured_modes, get_measured_modes_fields, measured_modes_type, &
       solve_measured_modes
-   use thud_modal_ball, only: check_modal_ball, get_modal_ball_fields, modal_ball_type, solve_modal_ball
+   use thud_modal_ball, only: solve_modal_ball
+   use thud_modal_ball_options, only: check_modal_ball, get_modal_ball_fields, modal_ball_type
    use thud_sampling, only: sampling_type
    use thud_text, only: join_quoted, quoted
    implicit none (type, external)

@@ -29,10 +29,10 @@ module thud_hollow_sphere
       'momentum_balance', 'retarding', 'conservative', 'none']
 
    !> Factor s of the flux term in compression, for each choice.
-   real(wp), parameter :: compression_weight(4) = [0.0_wp, -1.0_wp, 0.5_wp, 0.0_wp]
+   real(wp), parameter :: compression_weights(4) = [0.0_wp, -1.0_wp, 0.5_wp, 0.0_wp]
 
    !> Factor s of the flux term in restitution, for each choice.
-   real(wp), parameter :: restitution_weight(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
+   real(wp), parameter :: restitution_weights(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
    !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
    type, extends(lumped_type) :: shell_type
@@ -48,14 +48,13 @@ module thud_hollow_sphere
       real(wp) :: ambient_pressure = 0.0_wp
       !> Ratio of specific heats of the gas.
       real(wp) :: heat_capacity_ratio = 0.0_wp
-      !> Factor s of the flux term in this phase.
-      real(wp) :: flux_weight = 0.0_wp
-      !> Factor s of the flux term after the turning point.
-      real(wp) :: next_flux_weight = 0.0_wp
+      !> Factor s of the flux term before the turning point.
+      real(wp) :: compression_weight = 0.0_wp
+      !> Factor s of the flux term after it.
+      real(wp) :: restitution_weight = 0.0_wp
    contains
       procedure :: get_derivative
       procedure :: get_parts
-      procedure :: begin_restitution
       procedure :: get_failure
    end type shell_type
 
@@ -72,12 +71,14 @@ contains
          'momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_hollow_sphere_fields
 
-   !> The equation of motion of a ball, with the flux term of the compression phase.
-   pure function new_shell(ball, flux_weight) result(shell)
+   !> The equation of motion of a ball.
+   pure function new_shell(ball, compression_weight, restitution_weight) result(shell)
       !> The ball.
       type(ball_type), intent(in) :: ball
-      !> Factor s of the flux term.
-      real(wp), intent(in) :: flux_weight
+      !> Factor s of the flux term in compression.
+      real(wp), intent(in) :: compression_weight
+      !> Factor s of the flux term in restitution.
+      real(wp), intent(in) :: restitution_weight
       !> The equation.
       type(shell_type) :: shell
 
@@ -88,7 +89,8 @@ contains
       shell%initial_pressure = ball%ambient_pressure + ball%gauge_pressure
       shell%ambient_pressure = ball%ambient_pressure
       shell%heat_capacity_ratio = ball%heat_capacity_ratio
-      shell%flux_weight = flux_weight
+      shell%compression_weight = compression_weight
+      shell%restitution_weight = restitution_weight
    end function new_shell
 
    !> Stiffness of the shell under the flattening load, N/m (paper eq. 2, after Reissner).
@@ -163,7 +165,7 @@ contains
       real(wp), intent(out) :: rate(:)
       !> False where the shell is closed.
       logical, intent(out) :: valid
-      real(wp) :: elastic_force, flux, moving_mass
+      real(wp) :: elastic_force, flux, moving_mass, weight
 
       associate (deflection => state(at_deflection), velocity => state(at_velocity))
          ! Below the closing deflection the gas has volume and the ball moving mass.
@@ -172,12 +174,13 @@ contains
          if (.not. valid) return
          elastic_force = self%stiffness*deflection + get_gas_force(self, deflection)
          flux = self%mass/(2*self%radius)*velocity**2
+         weight = get_flux_weight(self)
          moving_mass = self%mass*(1 - deflection/(2*self%radius))
          rate(at_deflection) = velocity
-         rate(at_velocity) = (self%flux_weight*flux - elastic_force)/moving_mass
+         rate(at_velocity) = (weight*flux - elastic_force)/moving_mass
          ! The floor changes the momentum m v of the ball: d(m v)/dt = -(elastic + (1 - s) flux).
-         rate(at_impulse) = elastic_force + (1 - self%flux_weight)*flux
-         rate(at_loss) = (0.5_wp - self%flux_weight)*flux*velocity
+         rate(at_impulse) = elastic_force + (1 - weight)*flux
+         rate(at_loss) = (0.5_wp - weight)*flux*velocity
       end associate
    end subroutine get_derivative
 
@@ -193,17 +196,19 @@ contains
       real(wp), intent(out) :: elastic_force
 
       parts = [self%stiffness*state(at_deflection), get_gas_force(self, state(at_deflection)), &
-         (1 - self%flux_weight)*self%mass/(2*self%radius)*state(at_velocity)**2]
+         (1 - get_flux_weight(self))*self%mass/(2*self%radius)*state(at_velocity)**2]
       elastic_force = parts(1) + parts(2)
    end subroutine get_parts
 
-   !> Takes the flux term of the restitution phase.
-   pure subroutine begin_restitution(self)
+   !> Factor s of the flux term in the present phase.
+   pure function get_flux_weight(shell) result(weight)
       !> The shell.
-      class(shell_type), intent(inout) :: self
+      class(shell_type), intent(in) :: shell
+      !> The factor.
+      real(wp) :: weight
 
-      self%flux_weight = self%next_flux_weight
-   end subroutine begin_restitution
+      weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
+   end function get_flux_weight
 
    !> Error of a drop that closes the shell.
    function get_failure(self, drop, time, state) result(error)
@@ -251,8 +256,7 @@ contains
             //' is not allowed; allowed: '//join_quoted(flux_choices))
          return
       end if
-      shell = new_shell(ball, compression_weight(choice))
-      shell%next_flux_weight = restitution_weight(choice)
+      shell = new_shell(ball, compression_weights(choice), restitution_weights(choice))
       call solve_lumped(shell, drop, sampling, [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'], &
          history, error)
    end subroutine solve_hollow_sphere

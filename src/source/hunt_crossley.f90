@@ -245,7 +245,7 @@ contains
       real(wp) :: v0
 
       v0 = get_impact_velocity(drop)
-      spring = spring_type(ball%mass, options%stiffness, options%exponent, options%damping)
+      spring = spring_type(mass=ball%mass, stiffness=options%stiffness, exponent=options%exponent, damping=options%damping)
       if (options%restitution > 0.0_wp) spring%damping = get_damping(options%restitution, v0)
       if (options%contact_time > 0.0_wp) then
          spring%stiffness = get_stiffness(options%contact_time, spring%exponent, spring%damping, spring%mass, v0)

@@ -25,9 +25,10 @@ module thud_lumped
    type, abstract, extends(ode_type) :: lumped_type
       !> Mass that moves before and after the contact, kg.
       real(wp) :: mass = 0.0_wp
+      !> The turning point is still to come; some equations change there.
+      logical :: compressing = .true.
    contains
       procedure(get_parts_interface), deferred :: get_parts
-      procedure :: begin_restitution
       procedure :: get_failure
    end type lumped_type
 
@@ -48,14 +49,6 @@ module thud_lumped
    end interface
 
 contains
-
-   !> Called at the turning point; sources whose equation changes there override it.
-   pure subroutine begin_restitution(self)
-      !> The source.
-      class(lumped_type), intent(inout) :: self
-
-      self%mass = abs(self%mass)
-   end subroutine begin_restitution
 
    !> Error of a state outside the domain of the equation; sources that have such states override
    !> it.
@@ -93,14 +86,14 @@ contains
       real(wp) :: state(n_state)
       real(wp) :: time, step
       integer :: i, j, n_sample
-      logical :: compressing, released
+      logical :: released
 
       n_sample = get_sample_count(sampling)
       history = new_force_history(sampling%sample_rate, n_sample, part_name)
       history%impact_velocity = get_impact_velocity(drop)
       state = [0.0_wp, history%impact_velocity, 0.0_wp, 0.0_wp]
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
-      compressing = .true.
+      source%compressing = .true.
       released = .false.
       call record_sample(source, state, 1, history)
       do i = 2, n_sample
@@ -144,7 +137,7 @@ contains
                return
             end if
             ! Compression ends with the velocity, restitution with the deflection.
-            component = merge(at_velocity, at_deflection, compressing)
+            component = merge(at_velocity, at_deflection, source%compressing)
             if (new_state(component) > 0.0_wp) then
                time = end_time
                state = new_state
@@ -155,10 +148,9 @@ contains
             time = time + length
             state = new_state
             state(component) = 0.0_wp
-            released = .not. compressing
+            released = .not. source%compressing
             if (released) return
-            compressing = .false.
-            call source%begin_restitution()
+            source%compressing = .false.
             history%max_deflection = state(at_deflection)
             call source%get_parts(state, parts, history%peak_force)
          end do

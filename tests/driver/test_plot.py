@@ -48,6 +48,7 @@ def test_useless_impacts_are_told() -> None:
 
 def test_names_are_no_formulas(tmp_path: Path) -> None:
     thud.plot.save(thud.plot.levels({"$x^{$": thud.solve()}), f"{tmp_path}/levels.png")
+    assert (tmp_path / "levels.png").exists()
 
 
 def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
