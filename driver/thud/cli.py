@@ -49,11 +49,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("thud-driver: interrupted; what was finished is kept", file=sys.stderr)
         return INTERRUPTED
-    except OSError as error:
-        # A screen that is full or closed; what Python still wants to write goes nowhere.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except (thud.ThudError, OSError) as error:
+        if isinstance(error, OSError) and error.filename is None:
+            # A screen that is full or closed; what Python still wants to write goes nowhere.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"thud-driver: {_sentence(error)}", file=sys.stderr)
-        return thud.InputError.exit_code
+        return _exit_code(error)
     return code
 
 
@@ -127,7 +128,7 @@ def _run(options: argparse.Namespace) -> int:
             conforms = _run_case(path, options)
         except (thud.ThudError, OSError) as error:
             tqdm.write(f"thud-driver: {_sentence(error)}", file=sys.stderr)
-            failure = getattr(error, "exit_code", thud.InputError.exit_code)
+            failure = _exit_code(error)
             worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
         else:
             if options.check and not conforms and worst == 0:
@@ -138,18 +139,19 @@ def _run(options: argparse.Namespace) -> int:
 def _run_case(path: str, options: argparse.Namespace) -> bool:
     """Run one case as the executable does, then draw it; return whether it conforms."""
     _require_output(options.output)
+    case = thud.read_case(path)
     output = options.output or ""
     if output and len(options.cases) > 1:
-        output = os.path.join(output, thud.read_case(path).name)  # noqa: PTH118 - may be ""
+        output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
     directory, table, remark, conforming = call(door.run, os.fsencode(path), os.fsencode(output))
     if text(remark):
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     # The library pads its answer with blanks; a directory of the user's may end with them.
     folder = Path(output or os.fsdecode(directory.rstrip()))
     if not options.no_figures:
-        impact = thud.solve_case(thud.read_case(path))
-        name = impact.case.name.replace("_", " ")
-        source = impact.case.limits.source
+        impact = thud.solve_case(case)
+        name = case.name.replace("_", " ")
+        source = case.limits.source
         _draw(
             folder,
             {
@@ -173,25 +175,21 @@ def _figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper."""
     heights = {f"{height:.2f} m": height for height in (0.1, 1.0, 1.6)}
     choices = ("momentum_balance", "retarding", "conservative", "none")
-    try:
-        options.output.mkdir(parents=True, exist_ok=True)
-        _draw(
-            options.output,
-            {
-                "figure2_force_history": lambda: thud.plot.force_history(
-                    {name: thud.solve(drop=thud.Drop(height)) for name, height in heights.items()}
-                ),
-                "figure3_levels": lambda: thud.plot.levels({"hollow sphere": thud.solve()}),
-                "modal_families": _draw_families,
-                "momentum_flux": lambda: thud.plot.levels(
-                    {choice: thud.solve(momentum_flux=choice) for choice in choices}, "elastic"
-                ),
-            },
-            quiet=options.quiet,
-        )
-    except OSError as error:
-        print(f"thud-driver: {_sentence(error)}", file=sys.stderr)
-        return thud.InputError.exit_code
+    options.output.mkdir(parents=True, exist_ok=True)
+    _draw(
+        options.output,
+        {
+            "figure2_force_history": lambda: thud.plot.force_history(
+                {name: thud.solve(drop=thud.Drop(height)) for name, height in heights.items()}
+            ),
+            "figure3_levels": lambda: thud.plot.levels({"hollow sphere": thud.solve()}),
+            "modal_families": _draw_families,
+            "momentum_flux": lambda: thud.plot.levels(
+                {choice: thud.solve(momentum_flux=choice) for choice in choices}, "elastic"
+            ),
+        },
+        quiet=options.quiet,
+    )
     if not options.quiet:
         print(f"Figures: {options.output}")
     return 0
@@ -199,14 +197,10 @@ def _figures(options: argparse.Namespace) -> int:
 
 def _compare(options: argparse.Namespace) -> int:
     """Compare cases and recordings."""
-    try:
-        _require_output(options.output)
-        found = thud.read_all(options.cases)
-        comparison = thud.compare(found, options.force, options.source, progress=not options.quiet)
-        paths = comparison.save(options.output)
-    except (thud.ThudError, OSError) as error:
-        print(f"thud-driver: {_sentence(error)}", file=sys.stderr)
-        return getattr(error, "exit_code", thud.InputError.exit_code)
+    _require_output(options.output)
+    found = thud.read_all(options.cases)
+    comparison = thud.compare(found, options.force, options.source, progress=not options.quiet)
+    paths = comparison.save(options.output)
     if not options.quiet:
         rows = [thud.comparison.HEADER, *comparison.table()]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
@@ -233,6 +227,11 @@ def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool
         figure = draw()
         for ending in FORMATS:
             thud.plot.save(figure, folder / f"{name}{ending}")
+
+
+def _exit_code(error: Exception) -> int:
+    """Return the exit code of an error; a file that cannot be written is bad input."""
+    return error.exit_code if isinstance(error, thud.ThudError) else thud.InputError.exit_code
 
 
 def _sentence(error: Exception) -> str:

@@ -70,14 +70,7 @@ def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") 
         Time in ms, force in kN.
     """
     figure, axes = _axes(2.5)
-    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
-        axes.plot(1e3 * impact.time, 1e-3 * impact.force(kind), label=name, **_style(i))
-    axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
-    axes.set_ylim(bottom=0)
-    axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
-    axes.set_ylabel(
-        f"{force.capitalize()} force, kN" if force else "Blocked force, kN", fontsize=SIZE
-    )
+    _draw_forces(axes, impacts, force)
     _add_legend(axes, impacts)
     return figure
 
@@ -111,8 +104,7 @@ def levels(
     place = np.arange(5)
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
         values = impact.levels(method=method, force=kind)
-        marker = MARKERS[i % len(MARKERS)]
-        axes.plot(place, values, label=name, marker=marker, markersize=4, **_style(i))
+        axes.plot(place, values, label=name, **_style(i), **_marker(i))
     _octave_axis(axes)
     axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
     _add_legend(axes, impacts)
@@ -139,6 +131,17 @@ def _literal(label: str) -> str:
     return label.lstrip("_").replace("$", r"\$")
 
 
+def _draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
+    """Draw forces against time, with their axes."""
+    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
+        axes.plot(1e3 * impact.time, 1e-3 * impact.force(kind), label=name, **_style(i))
+    axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
+    name = force.capitalize() if force else "Blocked"
+    axes.set_ylabel(f"{name} force, kN", fontsize=SIZE)
+
+
 def _add_legend(axes: Axes, impacts: Mapping[str, Impact]) -> None:
     """Add the legend; a single impact gives it its name."""
     title = _literal(next(iter(impacts))) if len(impacts) == 1 else None
@@ -152,6 +155,11 @@ def _style(i: int) -> dict[str, Any]:
         "linestyle": LINES[i % len(LINES)],
         "linewidth": 1.2,
     }
+
+
+def _marker(i: int, size: float = 4) -> dict[str, Any]:
+    """Return the marker of a curve."""
+    return {"marker": MARKERS[i % len(MARKERS)], "markersize": size}
 
 
 def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str = "floor") -> Figure:
@@ -175,9 +183,8 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
     axes.axhline(0, color="0.45", linewidth=0.8)
     base = reference.levels(force=force)
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
-        marker = MARKERS[i % len(MARKERS)]
         change = impact.levels(force=kind) - base
-        axes.plot(np.arange(5), change, label=name, marker=marker, markersize=4, **_style(i))
+        axes.plot(np.arange(5), change, label=name, **_style(i), **_marker(i))
     _octave_axis(axes)
     axes.set_ylabel("Change of the level, dB", fontsize=SIZE)
     axes.legend(fontsize=SIZE - 1, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
@@ -216,16 +223,11 @@ def comparison_page(
         "third": _dress(figure.add_subplot(rows[1, 1])),
     }
     _draw_tolerance(panels["octave"], source)
-    for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
-        history.plot(1e3 * impact.time, 1e-3 * impact.force(kind), label=name, **_style(i))
+    _draw_forces(history, impacts, force)
+    for i, (_, impact, kind) in enumerate(_curves(impacts, force)):
         for bands, axes in panels.items():
-            values = impact.levels(bands, force=kind)
-            marker = MARKERS[i % len(MARKERS)]
-            axes.plot(np.arange(len(values)), values, marker=marker, markersize=3, **_style(i))
-    history.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
-    history.set_ylim(bottom=0)
-    history.set_xlabel("Time since first touch, ms", fontsize=SIZE)
-    history.set_ylabel(f"{force.capitalize()} force, kN", fontsize=SIZE)
+            values = impact.levels(bands, "exact", kind)
+            axes.plot(np.arange(len(values)), values, **_style(i), **_marker(i, 3))
     history.legend(fontsize=SIZE, frameon=False)
     _octave_axis(panels["octave"])
     _octave_axis(panels["third"], "third")

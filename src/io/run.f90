@@ -85,8 +85,8 @@ contains
          files(3)%content = get_summary(case, history, criteria)
          files(4)%content = input
          if (allocated(history%channel)) then
-            files(5)%name = channel_file
-            files(5)%content = get_channels_csv(history)
+            files(size(files))%name = channel_file
+            files(size(files))%content = get_channels_csv(history)
          end if
          call write_files(outcome%directory, files, error)
       end if

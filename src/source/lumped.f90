@@ -3,7 +3,7 @@
 module thud_lumped
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: force_history_type, new_force_history
+   use thud_force_history, only: force_history_type, most_residual, new_force_history
    use thud_kinds, only: wp
    use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -16,10 +16,6 @@ module thud_lumped
    !> Places of the quantities in the state: deflection (m), velocity (m/s), impulse given to the
    !> floor (N s), energy lost (J).
    integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4, n_state = 4
-
-   !> Residual of the balances of impulse and energy above which a result is refused. At the
-   !> default step the paper's case has 1e-12.
-   real(wp), parameter :: most_residual = 1.0e-6_wp
 
    !> Equation of motion of the source; its state is laid out as above.
    type, abstract, extends(ode_type) :: lumped_type

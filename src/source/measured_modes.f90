@@ -7,7 +7,7 @@ module thud_measured_modes
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
-   use thud_force_history, only: force_history_type, new_force_history
+   use thud_force_history, only: force_history_type, most_residual, new_force_history
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -19,10 +19,6 @@ module thud_measured_modes
 
    !> Part by which the effective masses may miss the mass of the ball: their printed digits.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
-
-   !> Residual of the balances of impulse and energy above which a result is refused; the
-   !> quadrature that checks them has 1e-10.
-   real(wp), parameter :: most_residual = 1.0e-6_wp
 
    !> Options of the model: one entry per mode in each list.
    type :: measured_modes_type

@@ -87,11 +87,17 @@ contains
       type(family_type) :: family
       real(wp) :: angle(options%rings)
       real(wp) :: shape(options%rings, 2)
-      real(wp), allocatable :: response(:, :), zeta(:)
+      real(wp), allocatable, dimension(:, :) :: value, first, second, response
+      real(wp), allocatable :: zeta(:)
       logical :: failed
       integer :: n, i, kept, k
 
-      angle = [(pi/2*(i - 1)/(options%rings - 1), i=1, options%rings)]
+      angle = get_ring_angles(options%rings)
+      allocate (value(0:options%static_harmonics, options%rings))
+      allocate (first, second, mold=value)
+      do i = 1, options%rings
+         call get_legendre(cos(angle(i)), value(:, i), first(:, i), second(:, i))
+      end do
       basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
       allocate (response(options%rings, options%rings), source=interval/ball%mass)
       allocate (step%omega(0), step%harmonic(0), step%fall(0, options%rings))
@@ -107,8 +113,11 @@ contains
             call get_static_family(basis, n, family, failed)
          end if
          if (failed) exit
-         shape = get_ring_shape(n, angle)
+         ! Fall of the rings' height by unit U and V: P_n cos t and -dP_n/dt sin t.
+         shape(:, 1) = value(n, :)*cos(angle)
+         shape(:, 2) = first(n, :)*sin(angle)**2
          response = response + matmul(shape, matmul(family%flexibility, transpose(shape)))/interval
+         if (size(family%omega) == 0) cycle
          step%omega = [step%omega, family%omega]
          step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
          step%fall = reshape([transpose(step%fall), matmul(shape, family%surface)], [size(step%omega), options%rings], &
@@ -130,23 +139,16 @@ contains
          //' cannot be told apart; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
-   !> Fall of the rings' height by unit displacements U and V of one harmonic.
-   pure function get_ring_shape(harmonic, angle) result(shape)
-      !> Harmonic n.
-      integer, intent(in) :: harmonic
-      !> Angles of the rings from the lowest point: [n_ring].
-      real(wp), intent(in) :: angle(:)
-      !> P_n cos t and -dP_n/dt sin t: [n_ring, 2].
-      real(wp) :: shape(size(angle), 2)
-      real(wp), dimension(0:harmonic) :: value, first, second
+   !> Angles of the rings from the lowest point to the equator.
+   pure function get_ring_angles(n_ring) result(angle)
+      !> Number of rings.
+      integer, intent(in) :: n_ring
+      !> Angles, rad: [n_ring].
+      real(wp) :: angle(n_ring)
       integer :: i
 
-      do i = 1, size(angle)
-         call get_legendre(cos(angle(i)), value, first, second)
-         shape(i, 1) = value(harmonic)*cos(angle(i))
-         shape(i, 2) = first(harmonic)*sin(angle(i))**2
-      end do
-   end function get_ring_shape
+      angle = [(pi/2*(i - 1)/(n_ring - 1), i=1, n_ring)]
+   end function get_ring_angles
 
    !> Marches from first touch until the ball has left for good.
    subroutine march(ball, sampling, interval, step, contact, history, error)
@@ -165,13 +167,14 @@ contains
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(size(step%omega)) :: q, v, old_q, old_v, push
-      real(wp), dimension(size(step%fall, 2)) :: gap, height
+      real(wp), dimension(size(step%fall, 2)) :: gap, height, radius
       real(wp) :: z, speed, impulse, loss, quiet
       integer :: i, j, n_step, last, n_mode, n_ring
 
       n_mode = size(step%omega)
       n_ring = size(step%fall, 2)
-      height = [(ball%outer_radius*cos(pi/2*(i - 1)/(n_ring - 1)), i=1, n_ring)]
+      height = ball%outer_radius*cos(get_ring_angles(n_ring))
+      radius = ball%outer_radius*sin(get_ring_angles(n_ring))
       q = 0.0_wp
       v = 0.0_wp
       z = ball%outer_radius
@@ -208,8 +211,7 @@ contains
                z = z + interval*impulse/ball%mass
                history%impulse = history%impulse + impulse
                history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
-               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius &
-                  *sin(pi/2*(contact%last - 1)/(n_ring - 1)))
+               history%channel(i, 1) = max(history%channel(i, 1), radius(contact%last))
             end if
             ! What damping takes lies between the impulse at the beginning and the end of the step.
             loss = loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)

@@ -72,6 +72,16 @@ def test_table_gives_deviations_from_the_nominal_levels() -> None:
     assert float(row[6]) > 0
 
 
+def test_page_and_table_have_the_same_levels() -> None:
+    case = thud.Case(levels=thud.Levels(method="fft"))
+    comparison = thud.compare({"shell": case}, force="elastic")
+    exact = thud.solve().levels("octave", "exact", "elastic")
+    octaves = comparison.figure().axes[1]
+    drawn = next(line for line in octaves.lines if len(line.get_ydata()) == len(exact))
+    np.testing.assert_array_equal(drawn.get_ydata(), exact)
+    assert comparison.table()[0][4].split()[0] == f"{exact[0] - 39:+.1f}"
+
+
 def test_recording_stands_beside_its_model(tmp_path: Path) -> None:
     impact = thud.solve()
     write_recording(tmp_path / "plate.csv", impact)
