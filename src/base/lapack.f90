@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgemv, dposv, dpotrf, dsygv, dtrsv
+   public :: dgels, dgemv, dpbtrf, dpbtrs, dposv, dpotrf, dsbmv, dsygv, dsyrk, dtrsm, dtrsv
 
    interface
       !> Generalised symmetric eigenproblem.
@@ -58,6 +58,71 @@ module thud_lapack
          real(wp), intent(in) :: a(lda, *), x(*)
          real(wp), intent(inout) :: y(*)
       end subroutine dgemv
+
+      !> Least squares.
+      pure subroutine dgels(trans, m, n, nrhs, a, lda, b, ldb, work, lwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: trans
+         integer, intent(in) :: m, n, nrhs, lda, ldb, lwork
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         real(wp), intent(out) :: work(*)
+         integer, intent(out) :: info
+      end subroutine dgels
+
+      !> Cholesky factor of a banded matrix.
+      pure subroutine dpbtrf(uplo, n, kd, ab, ldab, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, kd, ldab
+         real(wp), intent(inout) :: ab(ldab, *)
+         integer, intent(out) :: info
+      end subroutine dpbtrf
+
+      !> Solution with the Cholesky factor of a banded matrix.
+      pure subroutine dpbtrs(uplo, n, kd, nrhs, ab, ldab, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, kd, nrhs, ldab, ldb
+         real(wp), intent(in) :: ab(ldab, *)
+         real(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dpbtrs
+
+      !> Symmetric banded matrix times vector.
+      pure subroutine dsbmv(uplo, n, k, alpha, a, lda, x, incx, beta, y, incy)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, k, lda, incx, incy
+         real(wp), intent(in) :: alpha, beta
+         real(wp), intent(in) :: a(lda, *), x(*)
+         real(wp), intent(inout) :: y(*)
+      end subroutine dsbmv
+
+      !> Matrix times its transpose.
+      pure subroutine dsyrk(uplo, trans, n, k, alpha, a, lda, beta, c, ldc)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo, trans
+         integer, intent(in) :: n, k, lda, ldc
+         real(wp), intent(in) :: alpha, beta
+         real(wp), intent(in) :: a(lda, *)
+         real(wp), intent(inout) :: c(ldc, *)
+      end subroutine dsyrk
+
+      !> Solutions with a triangular matrix.
+      pure subroutine dtrsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: side, uplo, transa, diag
+         integer, intent(in) :: m, n, lda, ldb
+         real(wp), intent(in) :: alpha
+         real(wp), intent(in) :: a(lda, *)
+         real(wp), intent(inout) :: b(ldb, *)
+      end subroutine dtrsm
    end interface
 
 end module thud_lapack

@@ -1,0 +1,209 @@
+!> Stiffness and mass of the ball as banded matrices, and the operator of shift and invert on them.
+!>
+!> Below Poisson's ratio 1/2 the pressure is condensed in each element. At 1/2 every solution has to
+!> keep the mean dilatations at zero: an augmented Lagrangian does that with one factorisation
+!> of a positive definite matrix; each turn makes the dilatations some 1e-4 of what they were.
+module thud_mode_matrices
+   use thud_ball, only: ball_type, get_density
+   use thud_error, only: error_type, numerical_error
+   use thud_kinds, only: wp
+   use thud_lapack, only: dpbtrf, dpbtrs, dsbmv
+   use thud_mesh, only: mesh_type
+   use thud_mixed_element, only: get_mixed_element, n_dilatation, n_node
+   implicit none (type, external)
+   private
+
+   public :: apply_inverse, apply_mass, mode_matrices_type, new_mode_matrices
+
+   !> Bulk modulus over shear modulus that stands for an infinite one while the constraint is met.
+   real(wp), parameter :: augmented_ratio = 1.0e4_wp
+
+   !> Change of the pressures, relative, at which the constraint counts as met: what is left of the
+   !> dilatations is then that of a bulk modulus 1e7 times the shear modulus or more, and the
+   !> frequencies are off by less than 1e-8.
+   real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
+
+   !> Most turns of the augmented Lagrangian; two are needed.
+   integer, parameter :: most_turns = 30
+
+   !> Matrices over the free displacements.
+   type :: mode_matrices_type
+      !> Number of unknowns and of diagonals below the main one.
+      integer :: n = 0, n_band = 0
+      !> Poisson's ratio is 1/2.
+      logical :: incompressible = .false.
+      !> Bulk modulus, real or augmented, Pa.
+      real(wp) :: bulk_modulus = 0.0_wp
+      !> Eigenvalue that the operator is inverted about, (rad/s)2.
+      real(wp) :: shift = 0.0_wp
+      !> Cholesky factor of stiffness - shift*mass, lower band: [n_band + 1, n].
+      real(wp), allocatable :: factor(:, :)
+      !> Mass, lower band: [n_band + 1, n].
+      real(wp), allocatable :: mass(:, :)
+      !> Unknown of each displacement, 0 where it is held: [2, 0:n_line, 0:n_ring].
+      integer, allocatable :: unknown(:, :, :)
+      !> Unknowns of each element, n + 1 where held: [18, n_element].
+      integer, allocatable :: place(:, :)
+      !> Mean dilatations of each element: [3, 18, n_element].
+      real(wp), allocatable :: dilatation(:, :, :)
+   end type mode_matrices_type
+
+contains
+
+   !> Matrices of a ball, factored.
+   subroutine new_mode_matrices(ball, mesh, matrices, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Mesh of order 2.
+      type(mesh_type), intent(in) :: mesh
+      !> The matrices.
+      type(mode_matrices_type), intent(out) :: matrices
+      !> The matrix is not positive definite.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: shear_modulus, density
+      integer :: info
+
+      shear_modulus = ball%youngs_modulus/(2*(1 + ball%poisson_ratio))
+      density = get_density(ball)
+      matrices%incompressible = ball%poisson_ratio >= 0.5_wp
+      if (matrices%incompressible) then
+         matrices%bulk_modulus = augmented_ratio*shear_modulus
+      else
+         matrices%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*ball%poisson_ratio))
+      end if
+      ! Below zero, where the rigid motion lies, and well below the first elastic mode.
+      matrices%shift = -0.1_wp*ball%youngs_modulus/density/ball%outer_radius**2
+      call number_unknowns(mesh, matrices)
+      call assemble(mesh, shear_modulus, density, matrices)
+      call dpbtrf('L', matrices%n, matrices%n_band, matrices%factor, matrices%n_band + 1, info)
+      if (info /= 0) error = numerical_error('&ball: poisson_ratio or wall_thickness make the stiffness of the ball ' &
+         //'too ill-conditioned for double precision; allowed: less extreme values')
+   end subroutine new_mode_matrices
+
+   !> Numbers the displacements ring by ring along each polar line, which keeps the band narrow.
+   pure subroutine number_unknowns(mesh, matrices)
+      !> The mesh.
+      type(mesh_type), intent(in) :: mesh
+      !> Gets its unknowns.
+      type(mode_matrices_type), intent(inout) :: matrices
+      integer :: i, j, k, a, b, c, element, n_ring, n_line
+
+      n_ring = ubound(mesh%r, 2)
+      n_line = ubound(mesh%r, 1)
+      allocate (matrices%unknown(2, 0:n_line, 0:n_ring), source=0)
+      do j = 0, n_line
+         do i = 0, n_ring
+            do k = 1, 2
+               ! Nothing leaves the axis.
+               if (k == 1 .and. (j == 0 .or. j == n_line)) cycle
+               matrices%n = matrices%n + 1
+               matrices%unknown(k, j, i) = matrices%n
+            end do
+         end do
+      end do
+      allocate (matrices%place(2*n_node, mesh%n_radial*mesh%n_polar))
+      element = 0
+      do j = 0, n_line - 2, 2
+         do i = 0, n_ring - 2, 2
+            element = element + 1
+            matrices%place(:, element) = [(((matrices%unknown(c, j + b, i + a), c=1, 2), a=0, 2), b=0, 2)]
+            associate (place => matrices%place(:, element))
+               matrices%n_band = max(matrices%n_band, maxval(place) - minval(place, mask=place > 0))
+            end associate
+         end do
+      end do
+      where (matrices%place == 0) matrices%place = matrices%n + 1
+   end subroutine number_unknowns
+
+   !> Adds up the matrices of all elements.
+   pure subroutine assemble(mesh, shear_modulus, density, matrices)
+      !> The mesh.
+      type(mesh_type), intent(in) :: mesh
+      !> Shear modulus, Pa.
+      real(wp), intent(in) :: shear_modulus
+      !> Density, kg/m3.
+      real(wp), intent(in) :: density
+      !> Gets stiffness - shift*mass, mass and dilatations.
+      type(mode_matrices_type), intent(inout) :: matrices
+      real(wp) :: distortion(2*n_node, 2*n_node), mass(n_node, n_node), inertia, volume
+      integer :: a, b, i, j, element, row, column
+
+      allocate (matrices%factor(0:matrices%n_band, matrices%n), matrices%mass(0:matrices%n_band, matrices%n), source=0.0_wp)
+      allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%place, 2)))
+      element = 0
+      do j = 0, ubound(mesh%r, 1) - 2, 2
+         do i = 0, ubound(mesh%r, 2) - 2, 2
+            element = element + 1
+            associate (place => matrices%place(:, element), dilatation => matrices%dilatation(:, :, element))
+               call get_mixed_element(reshape(transpose(mesh%r(j:j + 2, i:i + 2)), [n_node]), &
+                  reshape(transpose(mesh%z(j:j + 2, i:i + 2)), [n_node]), shear_modulus, density, distortion, dilatation, &
+                  mass)
+               do b = 1, 2*n_node
+                  do a = b, 2*n_node
+                     row = max(place(a), place(b))
+                     column = min(place(a), place(b))
+                     if (row > matrices%n) cycle
+                     inertia = 0.0_wp
+                     if (mod(a - b, 2) == 0) inertia = mass((a + 1)/2, (b + 1)/2)
+                     volume = dot_product(dilatation(:, a), dilatation(:, b))
+                     matrices%factor(row - column, column) = matrices%factor(row - column, column) &
+                        + distortion(a, b) + matrices%bulk_modulus*volume - matrices%shift*inertia
+                     matrices%mass(row - column, column) = matrices%mass(row - column, column) + inertia
+                  end do
+               end do
+            end associate
+         end do
+      end do
+   end subroutine assemble
+
+   !> Mass times displacements.
+   pure subroutine apply_mass(matrices, x, y)
+      !> The matrices.
+      type(mode_matrices_type), intent(in) :: matrices
+      !> Displacements, m: [n].
+      real(wp), intent(in) :: x(:)
+      !> Product, kg m: [n].
+      real(wp), intent(out) :: y(:)
+
+      call dsbmv('L', matrices%n, matrices%n_band, 1.0_wp, matrices%mass, matrices%n_band + 1, x, 1, 0.0_wp, y, 1)
+   end subroutine apply_mass
+
+   !> Displacements under forces on the shifted system, without change of volume at Poisson's ratio 1/2.
+   subroutine apply_inverse(matrices, force, x)
+      !> The matrices.
+      type(mode_matrices_type), intent(in) :: matrices
+      !> Forces, N: [n].
+      real(wp), intent(in) :: force(:)
+      !> Displacements, m: [n].
+      real(wp), intent(out) :: x(:)
+      real(wp) :: pressure(n_dilatation, size(matrices%place, 2)), change(n_dilatation, size(matrices%place, 2))
+      real(wp) :: padded(matrices%n + 1)
+      integer :: turn, element, info
+
+      x = force
+      call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, x, matrices%n, info)
+      if (.not. matrices%incompressible) return
+      pressure = 0.0_wp
+      do turn = 1, most_turns
+         padded(:matrices%n) = x
+         padded(matrices%n + 1) = 0.0_wp
+         do element = 1, size(matrices%place, 2)
+            change(:, element) = matrices%bulk_modulus &
+               *matmul(matrices%dilatation(:, :, element), padded(matrices%place(:, element)))
+         end do
+         pressure = pressure + change
+         if (sum(change**2) <= constraint_tolerance**2*sum(pressure**2)) exit
+         ! The change of the pressures drives what is still to be added to the displacements.
+         padded = 0.0_wp
+         do element = 1, size(matrices%place, 2)
+            associate (place => matrices%place(:, element))
+               padded(place) = padded(place) - matmul(change(:, element), matrices%dilatation(:, :, element))
+            end associate
+         end do
+         call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, padded, matrices%n + 1, &
+            info)
+         x = x + padded(:matrices%n)
+      end do
+   end subroutine apply_inverse
+
+end module thud_mode_matrices
