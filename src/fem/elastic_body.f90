@@ -1,0 +1,144 @@
+!> The deforming ball: nodes, masses, material and gas, and the forces on its nodes.
+module thud_elastic_body
+   use thud_ball, only: ball_type
+   use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume, new_cavity
+   use thud_element_row, only: add_nodal_forces, element_row_type, get_gradients, n_component, n_point, n_symmetric, &
+      new_element_row
+   use thud_kinds, only: wp
+   use thud_material, only: material_type
+   use thud_mesh, only: mesh_type
+   use thud_rubber, only: add_branch_stress, add_viscous_stress, get_elastic_stress, get_volume_ratios
+   implicit none (type, external)
+   private
+
+   public :: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure, cavity_closed, &
+      element_inverted
+
+   !> Why forces cannot be computed.
+   integer, parameter :: no_failure = 0, element_inverted = 1, cavity_closed = 2
+
+   !> The ball; arrays over nodes are [0:n_polar, 0:n_radial], components r and z last.
+   type :: elastic_body_type
+      !> Mesh of order 1, undeformed, around the origin.
+      type(mesh_type) :: mesh
+      !> Its rings of elements: [n_radial].
+      type(element_row_type), allocatable :: row(:)
+      !> Material.
+      type(material_type) :: material
+      !> Gas.
+      type(cavity_type) :: cavity
+      !> Masses of the nodes, kg.
+      real(wp), allocatable :: mass(:, :)
+      !> Flow of each Maxwell branch: [n_polar, symmetric, point, branch, n_radial].
+      real(wp), allocatable :: flow(:, :, :, :, :)
+   end type elastic_body_type
+
+   !> What the forces come with.
+   type :: body_state_type
+      !> Strain energy, that of Maxwell branches included, J.
+      real(wp) :: strain_energy = 0.0_wp
+      !> Power that viscosity dissipates, W.
+      real(wp) :: dissipation = 0.0_wp
+      !> Work done on the gas, J.
+      real(wp) :: gas_energy = 0.0_wp
+      !> Overpressure of the gas, Pa.
+      real(wp) :: gas_pressure = 0.0_wp
+      !> Smallest local ratio of volumes J.
+      real(wp) :: least_jacobian = 1.0_wp
+      !> `no_failure`, or why there are no forces.
+      integer :: failure = no_failure
+   end type body_state_type
+
+contains
+
+   !> The ball at rest.
+   pure function new_elastic_body(ball, mesh, material) result(body)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Mesh of order 1.
+      type(mesh_type), intent(in) :: mesh
+      !> The material.
+      type(material_type), intent(in) :: material
+      !> The body.
+      type(elastic_body_type) :: body
+      integer :: i, n
+
+      n = mesh%n_polar
+      body%mesh = mesh
+      body%material = material
+      body%cavity = new_cavity(ball, mesh%r(:, 0), mesh%z(:, 0))
+      allocate (body%row(mesh%n_radial))
+      allocate (body%mass(0:n, 0:mesh%n_radial), source=0.0_wp)
+      do i = 1, mesh%n_radial
+         body%row(i) = new_element_row(mesh, i - 1)
+         body%mass(:n - 1, i - 1) = body%mass(:n - 1, i - 1) + body%row(i)%share(:, 1)
+         body%mass(:n - 1, i) = body%mass(:n - 1, i) + body%row(i)%share(:, 2)
+         body%mass(1:, i - 1) = body%mass(1:, i - 1) + body%row(i)%share(:, 3)
+         body%mass(1:, i) = body%mass(1:, i) + body%row(i)%share(:, 4)
+      end do
+      ! The mesh is a little smaller than the sphere; the mass is that of the ball.
+      body%mass = body%mass*(ball%mass/sum(body%mass))
+      allocate (body%flow(n, n_symmetric, n_point, size(material%branch_time), mesh%n_radial), source=0.0_wp)
+      body%flow(:, 1:3, :, :, :) = 1.0_wp
+   end function new_elastic_body
+
+   !> Forces of stress and gas.
+   pure subroutine get_internal_forces(body, position, velocity, interval, keep, force, state)
+      !> The body; its flow goes on if it is kept.
+      type(elastic_body_type), intent(inout) :: body
+      !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
+      real(wp), intent(in), contiguous :: position(0:, 0:, :)
+      !> Velocities of the nodes, m/s: the same shape.
+      real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
+      !> The flow of the branches is taken to the end of the step.
+      logical, intent(in) :: keep
+      !> Forces, N: the same shape as the positions.
+      real(wp), intent(out), contiguous :: force(0:, 0:, :)
+      !> Energies and power.
+      type(body_state_type), intent(out) :: state
+      real(wp) :: f(body%mesh%n_polar, n_component, n_point), rate(body%mesh%n_polar, n_component, n_point)
+      real(wp) :: stress(body%mesh%n_polar, n_component, n_point), cofactor(body%mesh%n_polar, n_component, n_point)
+      real(wp) :: jacobian(body%mesh%n_polar, n_point), volume
+      integer :: i, k, n
+
+      n = body%mesh%n_polar
+      force = 0.0_wp
+      do i = 1, body%mesh%n_radial
+         associate (row => body%row(i), material => body%material)
+            call get_gradients(row, n, position(:, i - 1:i, 1), position(:, i - 1:i, 2), f)
+            call get_volume_ratios(n, f, cofactor, jacobian)
+            state%least_jacobian = min(state%least_jacobian, minval(jacobian))
+            if (.not. state%least_jacobian > 0.0_wp) then
+               state%failure = element_inverted
+               return
+            end if
+            call get_elastic_stress(n, material%shear_modulus, material%mooney_share, material%bulk_modulus, row%weight, &
+               row%volume, f, cofactor, jacobian, stress, state%strain_energy)
+            if (material%viscosity > 0.0_wp) then
+               call get_gradients(row, n, velocity(:, i - 1:i, 1), velocity(:, i - 1:i, 2), rate)
+               call add_viscous_stress(n, material%viscosity, row%weight, rate, cofactor, jacobian, stress, &
+                  state%dissipation)
+            end if
+            do k = 1, size(material%branch_time)
+               call add_branch_stress(n, material%branch_modulus(k), material%branch_time(k), interval, keep, row%weight, f, &
+                  cofactor, jacobian, body%flow(:, :, :, k, i), stress, state%strain_energy, state%dissipation)
+            end do
+            call add_nodal_forces(row, n, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
+         end associate
+      end do
+      volume = get_volume(position(:, 0, 1), position(:, 0, 2))
+      if (.not. volume > 0.0_wp) then
+         state%failure = cavity_closed
+         return
+      end if
+      state%gas_pressure = get_gas_pressure(body%cavity, volume)
+      state%gas_energy = get_gas_energy(body%cavity, volume)
+      call add_gas_forces(state%gas_pressure, position(:, 0, 1), position(:, 0, 2), force(:, 0, 1), force(:, 0, 2))
+      ! Nothing leaves the axis.
+      force(0, :, 1) = 0.0_wp
+      force(n, :, 1) = 0.0_wp
+   end subroutine get_internal_forces
+
+end module thud_elastic_body

@@ -1,0 +1,308 @@
+!> The transient impact by finite elements at large strain (paper section 4.2, figure 5).
+!>
+!> Each sampling interval holds as many equal steps as stability asks for. Impulses of the floor are
+!> added up around each sample: the force is their mean over the interval, nothing aliases, and the
+!> impulse of the record is that of the run.
+module thud_finite_element
+   use thud_ball, only: ball_type
+   use thud_drop, only: drop_type, get_impact_velocity
+   use thud_elastic_body, only: cavity_closed, no_failure
+   use thud_error, only: error_type, input_error, numerical_error
+   use thud_finite_element_options, only: finite_element_type
+   use thud_force_history, only: force_history_type, new_force_history
+   use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
+      new_impact_run
+   use thud_kinds, only: wp
+   use thud_material, only: material_type, new_material
+   use thud_motion, only: motion_type, new_motion, take_snapshot
+   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: get_frame_count, solve_finite_element
+
+   !> Part of the energy at first touch by which the balance may miss.
+   real(wp), parameter :: most_energy_residual = 0.005_wp
+
+   !> Part of it at which a running computation is stopped as unstable.
+   real(wp), parameter :: unstable_residual = 0.05_wp
+
+   !> Part of the wall that the surface may sink into the floor.
+   real(wp), parameter :: most_sink = 0.01_wp
+
+   !> Most steps in a sampling interval.
+   integer, parameter :: most_steps = 100000
+
+   !> Samples between two looks at the step.
+   integer, parameter :: look_interval = 12
+
+   !> The contacts of a run.
+   type :: contacts_type
+      !> Time after the last contact at which it counts as over, s: shear waves crossed the ball.
+      real(wp) :: quiet = 0.0_wp
+      !> First and latest instant of the present contact, s.
+      real(wp) :: first = 0.0_wp, latest = 0.0_wp
+      !> There is a contact, or there was one less than `quiet` ago.
+      logical :: active = .false.
+      !> Contacts that are over.
+      integer :: n_over = 0
+   end type contacts_type
+
+contains
+
+   !> Force history of one drop.
+   subroutine solve_finite_element(ball, drop, options, sampling, history, motion, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Mesh, material, contact.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling rate, length of the record, least number of steps in a sampling interval.
+      type(sampling_type), intent(in) :: sampling
+      !> Force and motion, with the energies in the channels.
+      type(force_history_type), intent(out) :: history
+      !> Snapshots of the deformed ball.
+      type(motion_type), intent(out) :: motion
+      !> The ball cannot be computed, or the balances do not close.
+      type(error_type), allocatable, intent(out) :: error
+      type(impact_run_type) :: run
+      type(material_type) :: material
+      type(contacts_type) :: contacts
+      real(wp) :: speed, gap
+
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
+      history%impact_velocity = get_impact_velocity(drop)
+      history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
+         'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'dissipated_energy_J', &
+         'least_volume_ratio']
+      allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
+      speed = history%impact_velocity - drop%gravity*options%flight_before
+      gap = speed*options%flight_before + drop%gravity*options%flight_before**2/2
+      if (speed < 0.0_wp) then
+         error = input_error('&finite_element: flight_before = '//to_text(options%flight_before) &
+            //' s is longer than the fall; allowed: up to '//to_text(history%impact_velocity/drop%gravity)//' s')
+         return
+      end if
+      call new_material(options%material, ball, material, error)
+      if (allocated(error)) return
+      run = new_impact_run(ball, options, material, drop%gravity, gap, speed)
+      contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
+      motion = new_motion(run%position, get_frame_count(options, sampling))
+      call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, motion, error)
+      if (.not. allocated(error)) call finish(ball, run, sampling, speed, history, error)
+   end subroutine solve_finite_element
+
+   !> Most snapshots of a run.
+   pure function get_frame_count(options, sampling) result(n_frame)
+      !> The options.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> The number.
+      integer :: n_frame
+
+      n_frame = 0
+      if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
+   end function get_frame_count
+
+   !> Samples between two snapshots.
+   pure function get_stride(options, sampling) result(stride)
+      !> The options, with snapshots.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> The number, at least 1.
+      integer :: stride
+
+      stride = max(1, nint(options%snapshot_interval*sampling%sample_rate))
+   end function get_stride
+
+   !> Marches until the ball has left for good.
+   subroutine march(run, start, contacts, options, sampling, history, motion, error)
+      !> The ball.
+      type(impact_run_type), intent(inout) :: run
+      !> Height of its centre of mass at first touch, m.
+      real(wp), intent(in) :: start
+      !> Its contacts.
+      type(contacts_type), intent(inout) :: contacts
+      !> Bounces, flight, step.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Gets its samples, and contact time and restitution of the first contact.
+      type(force_history_type), intent(inout) :: history
+      !> Gets the snapshots.
+      type(motion_type), intent(inout) :: motion
+      !> The ball cannot be computed, or the record is too short.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: interval, time, share, first_energy
+      integer :: i, k, n_step, n_sample, stride
+
+      n_sample = size(history%floor_force)
+      interval = 1/sampling%sample_rate
+      n_step = 0
+      stride = huge(stride)
+      if (size(motion%time) > 0) stride = get_stride(options, sampling)
+      samples: do i = 1, n_sample
+         time = (i - 1)*interval
+         if (mod(i - 1, look_interval) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
+         if (n_step > most_steps) then
+            error = numerical_error(trim(place(time))//' the step must be less than '//to_text(interval/most_steps) &
+               //' s to be stable; allowed: a coarser mesh, a lower bulk_ratio, less viscosity')
+            return
+         end if
+         do k = 0, n_step - 1
+            time = (i - 1)*interval + k*(interval/n_step)
+            call kick(run, interval/n_step)
+            if (i + k == 1) first_energy = get_energy(run)
+            call check_run(run, time, first_energy, history, error)
+            if (allocated(error)) return
+            if (k == 0) then
+               call record(run, i, start, history)
+               if (mod(i - 1, stride) == 0) call take_snapshot(motion, time, run%position, run%velocity, run%floor_force, &
+                  run%state%gas_pressure)
+            end if
+            ! The part of the impulse that lies nearer to the next sample.
+            share = min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp))
+            history%floor_force(i) = history%floor_force(i) + (1 - share)*run%impulse/interval
+            if (i < n_sample) history%floor_force(i + 1) = history%floor_force(i + 1) + share*run%impulse/interval
+            history%impulse = history%impulse + run%impulse
+            call follow_contact(run, contacts, time, interval/n_step, history)
+            call drift(run, interval/n_step)
+         end do
+         if (contacts%n_over < options%bounces) cycle
+         if (time > contacts%latest + max(contacts%quiet, options%flight_after)) exit samples
+      end do samples
+      if (contacts%n_over < options%bounces) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
+            //to_text(contacts%quiet)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
+      end if
+   end subroutine march
+
+   !> Peaks of the impact, and the checks of the balances.
+   subroutine finish(ball, run, sampling, speed, history, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The run.
+      type(impact_run_type), intent(in) :: run
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Velocity downwards at the start, m/s.
+      real(wp), intent(in) :: speed
+      !> The history; its samples are complete.
+      type(force_history_type), intent(inout) :: history
+      !> A balance does not close.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: gain
+
+      history%part(:, 1) = history%floor_force
+      history%elastic_force = history%floor_force
+      history%peak_force = maxval(history%floor_force)
+      history%peak_floor_force = history%peak_force
+      history%max_deflection = maxval(history%deflection)
+      gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
+      history%impulse_residual = abs(history%impulse - gain)/gain
+      call check_contact_samples(sampling, history%contact_time, error)
+      if (allocated(error)) return
+      if (.not. history%energy_residual <= most_energy_residual) then
+         error = numerical_error('&finite_element: the balance of energy misses by '//to_text(history%energy_residual) &
+            //' of the energy at first touch; allowed: up to '//to_text(most_energy_residual)//', a smaller step_safety helps')
+      else if (run%sink > most_sink*ball%wall_thickness) then
+         error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink)//' mm into the floor; allowed: ' &
+            //'up to '//to_text(most_sink)//' of the wall, a higher penalty_ratio helps')
+      end if
+   end subroutine finish
+
+   !> Beginning of a sentence on what happened when.
+   function place(time) result(text)
+      !> Time since the record began, s.
+      real(wp), intent(in) :: time
+      !> The beginning.
+      character(len=64) :: text
+
+      text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
+   end function place
+
+   !> Follows the contacts: when they begin and end, and what they leave of the velocity.
+   subroutine follow_contact(run, contacts, time, step, history)
+      !> The ball.
+      type(impact_run_type), intent(in) :: run
+      !> Its contacts.
+      type(contacts_type), intent(inout) :: contacts
+      !> Time since the record began, s.
+      real(wp), intent(in) :: time
+      !> Length of the step, s.
+      real(wp), intent(in) :: step
+      !> Gets contact time and restitution of the first contact.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: speed
+
+      if (run%impulse > 0.0_wp) then
+         if (.not. contacts%active) contacts%first = time - step/2
+         contacts%active = .true.
+         contacts%latest = time + step/2
+      else if (contacts%active .and. time > contacts%latest + contacts%quiet) then
+         contacts%active = .false.
+         contacts%n_over = contacts%n_over + 1
+         if (contacts%n_over > 1) return
+         history%contact_time = contacts%latest - contacts%first
+         ! Back to the end of the contact.
+         speed = get_mean_velocity(run) + run%gravity*(time + step/2 - contacts%latest)
+         history%restitution = speed/history%impact_velocity
+      end if
+   end subroutine follow_contact
+
+   !> Writes one sample of everything but the force.
+   subroutine record(run, i, start, history)
+      !> The ball, between kick and drift.
+      type(impact_run_type), intent(in) :: run
+      !> Number of the sample.
+      integer, intent(in) :: i
+      !> Height of the centre of mass at first touch, m.
+      real(wp), intent(in) :: start
+      !> The history.
+      type(force_history_type), intent(inout) :: history
+
+      history%deflection(i) = start - get_mean_height(run)
+      history%velocity(i) = -get_mean_velocity(run)
+      associate (r => run%position(:, ubound(run%position, 2), 1))
+         history%channel(i, 1) = maxval(r, mask=run%floor_force > 0.0_wp)
+         if (.not. any(run%floor_force > 0.0_wp)) history%channel(i, 1) = 0.0_wp
+      end associate
+      history%channel(i, 2:) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, run%state%gas_energy, &
+         run%potential, run%spring + run%stopped, run%dissipated, run%state%least_jacobian]
+   end subroutine record
+
+   !> Complains about a ball that cannot be computed any further.
+   subroutine check_run(run, time, first_energy, history, error)
+      !> The ball.
+      type(impact_run_type), intent(in) :: run
+      !> Time since the record began, s.
+      real(wp), intent(in) :: time
+      !> Energy of the first sample, J.
+      real(wp), intent(in) :: first_energy
+      !> Gets the largest residual of the energy, relative to the energy of motion at first touch.
+      type(force_history_type), intent(inout) :: history
+      !> What happened, when and why.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: residual
+
+      if (run%state%failure == cavity_closed) then
+         error = numerical_error(trim(place(time))//' the cavity has no volume left; allowed: a lower height, a stiffer ball')
+      else if (run%state%failure /= no_failure) then
+         error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
+            //to_text(run%state%least_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
+      else
+         residual = abs(get_energy(run) - first_energy)/(sum(run%mass(:, :, 2))/2*history%impact_velocity**2)
+         if (.not. residual < unstable_residual) then
+            error = numerical_error(trim(place(time))//' the run is unstable (energy off by '//to_text(residual) &
+               //' of that at first touch); allowed: a smaller step_safety')
+         else
+            history%energy_residual = max(history%energy_residual, residual)
+         end if
+      end if
+   end subroutine check_run
+
+end module thud_finite_element

@@ -1,0 +1,73 @@
+!> Options of the finite-element model, group by group.
+module thud_finite_element_options
+   use thud_ball, only: ball_type
+   use thud_error, only: error_type
+   use thud_field, only: field_type
+   use thud_floor_contact, only: contact_options_type, get_contact_fields
+   use thud_kinds, only: wp
+   use thud_material, only: check_material, get_material_fields, material_options_type
+   use thud_mesh, only: get_mesh_fields, mesh_options_type
+   use thud_new_field, only: integer_field, real_field
+   implicit none (type, external)
+   private
+
+   public :: check_finite_element, finite_element_type, get_finite_element_fields
+
+   !> Options of the model.
+   type :: finite_element_type
+      !> Contacts to be followed.
+      integer :: bounces = 1
+      !> Free flight before first touch, s.
+      real(wp) :: flight_before = 0.0_wp
+      !> Free flight after the last contact, s.
+      real(wp) :: flight_after = 0.0_wp
+      !> Part of the limit of stability that a step uses.
+      real(wp) :: step_safety = 0.85_wp
+      !> Time between snapshots of the deformed ball, s; 0 for none.
+      real(wp) :: snapshot_interval = 1.0e-3_wp
+      !> Mesh.
+      type(mesh_options_type) :: mesh
+      !> Material.
+      type(material_options_type) :: material
+      !> Contact.
+      type(contact_options_type) :: contact
+   end type finite_element_type
+
+contains
+
+   !> Keys and allowed ranges of the groups `&finite_element`, `&mesh`, `&material`, `&contact` and
+   !> `&output`.
+   function get_finite_element_fields(options) result(fields)
+      !> The options that the fields read and set.
+      type(finite_element_type), intent(in), target :: options
+      !> One field per component: [17].
+      type(field_type), allocatable :: fields(:)
+      character(len=*), parameter :: group = 'finite_element'
+
+      fields = [ &
+         integer_field(group, 'bounces', options%bounces, 'contacts to be followed', 1, 100), &
+         real_field(group, 'flight_before', options%flight_before, 's', 'free flight before first touch', 0.0_wp, 1.0_wp), &
+         real_field(group, 'flight_after', options%flight_after, 's', 'free flight after the last contact', &
+         0.0_wp, 10.0_wp), &
+         real_field(group, 'step_safety', options%step_safety, '', 'part of the limit of stability that a step uses', &
+         0.01_wp, 0.98_wp), &
+         get_mesh_fields(options%mesh), &
+         get_material_fields(options%material), &
+         get_contact_fields(options%contact), &
+         real_field('output', 'snapshot_interval', options%snapshot_interval, 's', &
+         'time between snapshots of the deformed ball; 0: none', 0.0_wp, 10.0_wp)]
+   end function get_finite_element_fields
+
+   !> Complains about options that do not fit each other or the ball.
+   subroutine check_finite_element(options, ball, error)
+      !> The options, each inside its own range.
+      type(finite_element_type), intent(in) :: options
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+
+      call check_material(options%material, ball, error)
+   end subroutine check_finite_element
+
+end module thud_finite_element_options

@@ -1,0 +1,201 @@
+!> The ball in motion: one step of explicit central differences after the other, and the books of
+!> momentum and energy.
+module thud_impact_run
+   use thud_ball, only: ball_type
+   use thud_constants, only: pi
+   use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
+   use thud_finite_element_options, only: finite_element_type
+   use thud_floor_contact, only: floor_contact_type, get_penalty_forces, new_floor_contact, stop_at_floor
+   use thud_kinds, only: wp
+   use thud_material, only: material_type
+   use thud_mesh, only: new_mesh
+   use thud_stable_step, only: find_growth, get_first_direction, most_growth
+   implicit none (type, external)
+   private
+
+   public :: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, new_impact_run
+
+   !> Turns of the power iteration at the start, and in each later look at the step.
+   integer, parameter :: first_turns = 80, next_turns = 3
+
+   !> What is known between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
+   type :: impact_run_type
+      !> The ball.
+      type(elastic_body_type) :: body
+      !> Its contact.
+      type(floor_contact_type) :: contact
+      !> Gravity, m/s2.
+      real(wp) :: gravity = 0.0_wp
+      !> Positions over the floor, m.
+      real(wp), allocatable :: position(:, :, :)
+      !> Velocities half a step before, m/s; at the very start, those of the start.
+      real(wp), allocatable :: velocity(:, :, :)
+      !> Masses of the nodes, kg.
+      real(wp), allocatable :: mass(:, :, :)
+      !> Direction of the fastest motion.
+      real(wp), allocatable :: direction(:, :, :)
+      !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar].
+      real(wp), allocatable :: floor_force(:)
+      !> Impulse of the floor in the latest step, N s.
+      real(wp) :: impulse = 0.0_wp
+      !> Energies, power and failure of the latest step.
+      type(body_state_type) :: state
+      !> Energies of the latest step: of motion, in the springs of the floor, in the field of gravity, J.
+      real(wp) :: kinetic = 0.0_wp, spring = 0.0_wp, potential = 0.0_wp
+      !> Energies lost so far: by viscosity, and by nodes that the floor stopped, J.
+      real(wp) :: dissipated = 0.0_wp, stopped = 0.0_wp
+      !> Time that the velocities have been driven for, s.
+      real(wp) :: time = 0.0_wp
+      !> Length of the step before, s; 0 at the start.
+      real(wp) :: last_interval = 0.0_wp
+      !> Deepest that a node has sunk into the floor, m.
+      real(wp) :: sink = 0.0_wp
+   end type impact_run_type
+
+contains
+
+   !> A ball above the floor, falling.
+   pure function new_impact_run(ball, options, material, gravity, gap, speed) result(run)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Mesh and contact.
+      type(finite_element_type), intent(in) :: options
+      !> The material.
+      type(material_type), intent(in) :: material
+      !> Gravity, m/s2.
+      real(wp), intent(in) :: gravity
+      !> Height of the lowest point, m.
+      real(wp), intent(in) :: gap
+      !> Velocity downwards, m/s.
+      real(wp), intent(in) :: speed
+      !> The run.
+      type(impact_run_type) :: run
+
+      run%body = new_elastic_body(ball, new_mesh(ball, options%mesh, 1), material)
+      run%contact = new_floor_contact(options%contact, run%body%mesh, material)
+      run%gravity = gravity
+      associate (mesh => run%body%mesh)
+         allocate (run%position(0:mesh%n_polar, 0:mesh%n_radial, 2), run%velocity(0:mesh%n_polar, 0:mesh%n_radial, 2))
+         run%position(:, :, 1) = mesh%r
+         run%position(:, :, 2) = mesh%z + ball%outer_radius + gap
+         run%velocity(:, :, 1) = 0.0_wp
+         run%velocity(:, :, 2) = -speed
+         allocate (run%mass(0:mesh%n_polar, 0:mesh%n_radial, 2), source=spread(run%body%mass, 3, 2))
+         allocate (run%direction(0:mesh%n_polar, 0:mesh%n_radial, 2), source=get_first_direction(run%body))
+         allocate (run%floor_force(0:mesh%n_polar), source=0.0_wp)
+      end associate
+   end function new_impact_run
+
+   !> Number of steps in a sampling interval that keeps the run stable.
+   pure subroutine choose_step(run, interval, safety, least, n_step)
+      !> The run.
+      type(impact_run_type), intent(inout) :: run
+      !> Sampling interval, s.
+      real(wp), intent(in) :: interval
+      !> Part of the limit of stability to be used.
+      real(wp), intent(in) :: safety
+      !> Least number of steps.
+      integer, intent(in) :: least
+      !> The number so far, 0 at the start; the number to go on with.
+      integer, intent(inout) :: n_step
+      real(wp) :: growth, ratio, wave, width
+      integer :: n_turn, turn
+
+      n_turn = next_turns
+      if (n_step == 0) then
+         n_turn = first_turns
+         associate (material => run%body%material, mesh => run%body%mesh)
+            wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
+            width = min(mesh%r(mesh%n_polar/2, 1) - mesh%r(mesh%n_polar/2, 0), pi/real(mesh%n_polar, wp)*mesh%r(mesh%n_polar/2, 0))
+         end associate
+         n_step = max(least, ceiling(min(interval*wave/width, 1.0e8_wp)))
+      end if
+      do turn = 1, 20
+         call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_turn, run%direction, growth)
+         ratio = growth/(safety*most_growth)
+         ! Growth rises with the first to the second power of the step: take the worse.
+         if (ratio <= 1.0_wp) then
+            n_step = max(least, ceiling(n_step*sqrt(ratio)))
+            exit
+         end if
+         n_step = ceiling(n_step*min(ratio, 2.0_wp))
+      end do
+   end subroutine choose_step
+
+   !> First half of a step: forces and energies where the ball is, and velocities half a step on.
+   pure subroutine kick(run, interval)
+      !> The run.
+      type(impact_run_type), intent(inout) :: run
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
+      real(wp) :: force(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
+      real(wp) :: before(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
+      real(wp), dimension(0:run%body%mesh%n_polar) :: impulse, falling
+      real(wp) :: span
+      integer :: last
+
+      last = run%body%mesh%n_radial
+      span = (run%last_interval + interval)/2
+      call get_internal_forces(run%body, run%position, run%velocity, interval, .true., force, run%state)
+      if (run%state%failure /= no_failure) return
+      call get_penalty_forces(run%contact, run%position(:, last, 2), run%floor_force, run%spring)
+      force(:, last, 2) = force(:, last, 2) + run%floor_force
+      before = run%velocity
+      run%time = run%time + span
+      run%velocity = before + span*force/run%mass
+      run%velocity(:, :, 2) = run%velocity(:, :, 2) - span*run%gravity
+      falling = run%velocity(:, last, 2)
+      call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2), interval, run%velocity(:, last, 2), &
+         impulse)
+      run%stopped = run%stopped - dot_product(impulse, falling + run%velocity(:, last, 2))/2
+      run%floor_force = run%floor_force + impulse/span
+      run%impulse = span*sum(run%floor_force)
+      run%kinetic = sum(run%mass*before*run%velocity)/2
+      run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
+      run%dissipated = run%dissipated + span*run%state%dissipation
+      if (.not. run%contact%stops) run%sink = max(run%sink, -minval(run%position(:, last, 2)))
+   end subroutine kick
+
+   !> Second half of a step: positions a step on.
+   pure subroutine drift(run, interval)
+      !> The run.
+      type(impact_run_type), intent(inout) :: run
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
+
+      run%position = run%position + interval*run%velocity
+      run%last_interval = interval
+   end subroutine drift
+
+   !> Energy of the latest step, with all that was lost; it should not change.
+   pure function get_energy(run) result(energy)
+      !> The run.
+      type(impact_run_type), intent(in) :: run
+      !> The energy, J.
+      real(wp) :: energy
+
+      energy = run%kinetic + run%state%strain_energy + run%state%gas_energy + run%potential + run%spring + run%dissipated &
+         + run%stopped
+   end function get_energy
+
+   !> Height of the centre of mass.
+   pure function get_mean_height(run) result(height)
+      !> The run.
+      type(impact_run_type), intent(in) :: run
+      !> The height, m.
+      real(wp) :: height
+
+      height = sum(run%mass(:, :, 2)*run%position(:, :, 2))/sum(run%mass(:, :, 2))
+   end function get_mean_height
+
+   !> Velocity of the centre of mass.
+   pure function get_mean_velocity(run) result(velocity)
+      !> The run.
+      type(impact_run_type), intent(in) :: run
+      !> The velocity upwards, m/s.
+      real(wp) :: velocity
+
+      velocity = sum(run%mass(:, :, 2)*run%velocity(:, :, 2))/sum(run%mass(:, :, 2))
+   end function get_mean_velocity
+
+end module thud_impact_run

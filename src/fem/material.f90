@@ -1,0 +1,166 @@
+!> Material of the ball in the transient model: what the group `&material` asks for, and the moduli
+!> that follow from it.
+module thud_material
+   use thud_ball, only: ball_type, get_density
+   use thud_constants, only: pi
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, list_type, name_length
+   use thud_kinds, only: wp
+   use thud_new_field, only: choice_field, list_field, real_field
+   use thud_prony, only: fit_constant_loss, get_loss_factor, get_storage_ratio
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: check_material, get_material_fields, get_material_loss_factor, material_options_type, material_type, &
+      most_branches, new_material
+
+   !> Most Maxwell branches.
+   integer, parameter :: most_branches = 16
+
+   !> What the group asks for.
+   type :: material_options_type
+      !> Law of elasticity: `neo_hookean` or `mooney_rivlin`.
+      character(len=name_length) :: law = 'neo_hookean'
+      !> Part of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
+      real(wp) :: mooney_share = 0.2_wp
+      !> Most bulk modulus over shear modulus; Poisson's ratio may ask for less.
+      real(wp) :: bulk_ratio = 50.0_wp
+      !> Law of viscosity: `none`, `kelvin_voigt`, `constant_loss` or `prony`.
+      character(len=name_length) :: viscosity = 'kelvin_voigt'
+      !> Loss factor at `loss_frequency`.
+      real(wp) :: loss_factor = 0.2_wp
+      !> Frequency of the loss factor, Hz; there the ball's modulus of elasticity is the storage modulus.
+      real(wp) :: loss_frequency = 74.0_wp
+      !> Prony series: moduli over the long-term modulus.
+      type(list_type) :: prony_share
+      !> Prony series: relaxation times, s.
+      type(list_type) :: prony_time
+   end type material_options_type
+
+   !> The material.
+   type :: material_type
+      !> Density, kg/m3.
+      real(wp) :: density = 0.0_wp
+      !> Long-term shear modulus, Pa.
+      real(wp) :: shear_modulus = 0.0_wp
+      !> Part of it that goes with the second invariant.
+      real(wp) :: mooney_share = 0.0_wp
+      !> Bulk modulus, Pa.
+      real(wp) :: bulk_modulus = 0.0_wp
+      !> Viscosity of Kelvin and Voigt, Pa s.
+      real(wp) :: viscosity = 0.0_wp
+      !> Shear moduli of the Maxwell branches, Pa: [n_branch].
+      real(wp), allocatable :: branch_modulus(:)
+      !> Their relaxation times, s: [n_branch].
+      real(wp), allocatable :: branch_time(:)
+   end type material_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&material`.
+   function get_material_fields(options) result(fields)
+      !> The options that the fields read and set.
+      type(material_options_type), intent(in), target :: options
+      !> One field per component: [8].
+      type(field_type), allocatable :: fields(:)
+      character(len=*), parameter :: group = 'material'
+
+      fields = [ &
+         choice_field(group, 'law', options%law, 'law of elasticity', &
+         [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
+         real_field(group, 'mooney_share', options%mooney_share, '', &
+         'part of the shear modulus with the second invariant, of mooney_rivlin', 0.0_wp, 1.0_wp), &
+         real_field(group, 'bulk_ratio', options%bulk_ratio, '', &
+         "most bulk modulus over shear modulus; less where Poisson's ratio says so", 2.0_wp, 1.0e5_wp), &
+         choice_field(group, 'viscosity', options%viscosity, 'law of viscosity', &
+         [character(len=16) :: 'none', 'kelvin_voigt', 'constant_loss', 'prony']), &
+         real_field(group, 'loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt; ' &
+         //'over 10 to 1000 Hz, of constant_loss', 0.0_wp, 1.0_wp, lower_open=.true.), &
+         real_field(group, 'loss_frequency', options%loss_frequency, 'Hz', &
+         "where the ball's modulus is the storage modulus", 1.0_wp, 1.0e4_wp), &
+         list_field(group, 'prony_share', options%prony_share, '', 'moduli over the long-term modulus, of prony', &
+         0.0_wp, 1.0e3_wp), &
+         list_field(group, 'prony_time', options%prony_time, 's', 'relaxation times, of prony', &
+         0.0_wp, 1.0e3_wp, lower_open=.true.)]
+   end function get_material_fields
+
+   !> Complains about options that do not fit each other, and about balls that the model cannot take.
+   subroutine check_material(options, ball, error)
+      !> The options, each inside its own range.
+      type(material_options_type), intent(in) :: options
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: n_share, n_time
+
+      n_share = options%prony_share%count
+      n_time = options%prony_time%count
+      if (options%viscosity == 'prony' .and. (n_share == 0 .or. n_share /= n_time .or. n_share > most_branches)) then
+         error = input_error('&material: prony_share has '//to_text(n_share)//' entries and prony_time '//to_text(n_time) &
+            //'; allowed: the same number of both, 1 to '//to_text(most_branches))
+      else if (options%viscosity /= 'prony' .and. n_share + n_time > 0) then
+         error = input_error("&material: prony_share and prony_time do nothing with viscosity = '" &
+            //trim(options%viscosity)//"'; allowed: viscosity = 'prony'")
+      else if (ball%gauge_pressure > 0.0_wp) then
+         error = input_error('&ball: gauge_pressure = '//to_text(ball%gauge_pressure) &
+            //' Pa is not allowed with finite_element, whose wall starts without stress; allowed: 0')
+      else if (ball%poisson_ratio < 0.0_wp) then
+         error = input_error('&ball: poisson_ratio = '//to_text(ball%poisson_ratio) &
+            //' is not allowed with finite_element; allowed: 0 to 0.5')
+      end if
+   end subroutine check_material
+
+   !> Moduli of the material.
+   subroutine new_material(options, ball, material, error)
+      !> The options, checked.
+      type(material_options_type), intent(in) :: options
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The material.
+      type(material_type), intent(out) :: material
+      !> No Prony series fits the loss factor.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: storage_modulus, omega
+      real(wp), allocatable :: share(:)
+
+      omega = 2*pi*options%loss_frequency
+      material%density = get_density(ball)
+      if (options%law == 'mooney_rivlin') material%mooney_share = options%mooney_share
+      storage_modulus = ball%youngs_modulus/(2*(1 + ball%poisson_ratio))
+      material%bulk_modulus = options%bulk_ratio*storage_modulus
+      if (ball%poisson_ratio < 0.5_wp) then
+         material%bulk_modulus = min(material%bulk_modulus, ball%youngs_modulus/(3*(1 - 2*ball%poisson_ratio)))
+      end if
+      allocate (share(0), material%branch_time(0))
+      select case (options%viscosity)
+      case ('kelvin_voigt')
+         material%viscosity = options%loss_factor*storage_modulus/omega
+      case ('constant_loss')
+         call fit_constant_loss(options%loss_factor, share, material%branch_time, error)
+         if (allocated(error)) return
+      case ('prony')
+         share = options%prony_share%values(:options%prony_share%count)
+         material%branch_time = options%prony_time%values(:options%prony_time%count)
+      case default
+         continue
+      end select
+      material%shear_modulus = storage_modulus/get_storage_ratio(share, material%branch_time, omega)
+      allocate (material%branch_modulus, source=share*material%shear_modulus)
+   end subroutine new_material
+
+   !> Loss factor of the material in shear.
+   pure elemental function get_material_loss_factor(material, frequency) result(loss_factor)
+      !> The material.
+      type(material_type), intent(in) :: material
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      !> Loss modulus over storage modulus.
+      real(wp) :: loss_factor
+
+      loss_factor = get_loss_factor(material%branch_modulus/material%shear_modulus, material%branch_time, 2*pi*frequency) &
+         + 2*pi*frequency*material%viscosity/material%shear_modulus
+   end function get_material_loss_factor
+
+end module thud_material

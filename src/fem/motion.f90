@@ -1,0 +1,74 @@
+!> Instants of the deforming ball, for pictures: positions, velocities and pressures at the nodes.
+module thud_motion
+   use thud_floor_contact, only: get_nodal_areas
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: motion_type, new_motion, take_snapshot
+
+   !> Snapshots; nodes are numbered as in `thud_mesh`.
+   type :: motion_type
+      !> Number of snapshots taken.
+      integer :: n_frame = 0
+      !> Times since the record began, s: [room].
+      real(wp), allocatable :: time(:)
+      !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
+      real(wp), allocatable :: start(:, :, :)
+      !> Positions, the floor at height 0, m: [0:n_polar, 0:n_radial, 2, room].
+      real(wp), allocatable :: position(:, :, :, :)
+      !> Velocities, m/s: the same shape.
+      real(wp), allocatable :: velocity(:, :, :, :)
+      !> Pressure on the floor at the nodes of the outer surface, Pa: [0:n_polar, room].
+      real(wp), allocatable :: contact_pressure(:, :)
+      !> Overpressure of the gas, Pa: [room].
+      real(wp), allocatable :: cavity_pressure(:)
+   end type motion_type
+
+contains
+
+   !> Room for snapshots.
+   pure function new_motion(start, room) result(motion)
+      !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
+      real(wp), intent(in) :: start(0:, 0:, :)
+      !> Most snapshots.
+      integer, intent(in) :: room
+      !> No snapshot yet.
+      type(motion_type) :: motion
+      integer :: n_polar, n_radial
+
+      n_polar = ubound(start, 1)
+      n_radial = ubound(start, 2)
+      allocate (motion%time(room), motion%cavity_pressure(room), motion%contact_pressure(0:n_polar, room))
+      allocate (motion%start(0:n_polar, 0:n_radial, 2), source=start)
+      allocate (motion%position(0:n_polar, 0:n_radial, 2, room), motion%velocity(0:n_polar, 0:n_radial, 2, room))
+   end function new_motion
+
+   !> Adds a snapshot where there is room for one.
+   pure subroutine take_snapshot(motion, time, position, velocity, floor_force, cavity_pressure)
+      !> The snapshots.
+      type(motion_type), intent(inout) :: motion
+      !> Time since the record began, s.
+      real(wp), intent(in) :: time
+      !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
+      real(wp), intent(in) :: position(0:, 0:, :)
+      !> Velocities of the nodes, m/s: the same shape.
+      real(wp), intent(in) :: velocity(0:, 0:, :)
+      !> Forces of the floor on the nodes of the outer surface, N: [0:n_polar].
+      real(wp), intent(in) :: floor_force(0:)
+      !> Overpressure of the gas, Pa.
+      real(wp), intent(in) :: cavity_pressure
+
+      if (motion%n_frame == size(motion%time)) return
+      motion%n_frame = motion%n_frame + 1
+      associate (i => motion%n_frame)
+         motion%time(i) = time
+         motion%position(:, :, :, i) = position
+         motion%velocity(:, :, :, i) = velocity
+         motion%contact_pressure(:, i) = floor_force/get_nodal_areas(position(:, ubound(position, 2), 1), &
+            position(:, ubound(position, 2), 2))
+         motion%cavity_pressure(i) = cavity_pressure
+      end associate
+   end subroutine take_snapshot
+
+end module thud_motion

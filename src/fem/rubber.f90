@@ -1,0 +1,300 @@
+!> Stresses of nearly incompressible rubber at large strain, for the elements of one ring together.
+!>
+!> Elastic: W = mu/2 [(1 - c)(J^(-2/3) I1 - 3) + c (J^(-4/3) I2 - 3)] + K/2 (theta - 1)**2 with the
+!> share c of Mooney and Rivlin and the mean dilatation theta of the element.
+!> Viscous: Cauchy stress 2 eta dev D (Kelvin and Voigt), and Maxwell branches with the energy
+!> mu_i/2 (tr(Cbar Cv^-1) - 3) and the flow Cv' = (Cbar - tr(Cbar Cv^-1)/3 Cv)/tau_i (Simo and Miehe
+!> 1992), stepped in closed form (Shutov, Landgraf and Ihlemann 2013, Comput. Methods Appl. Mech. Eng.
+!> 265, 213-225): Cv stays symmetric, positive definite and of determinant 1 with any step.
+!>
+!> Components as in `thud_element_row`.
+module thud_rubber
+   use thud_element_row, only: n_component, n_point, n_symmetric
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: add_branch_stress, add_viscous_stress, get_elastic_stress, get_inverse_cube_root, get_volume_ratios
+
+   !> Range in which the polynomial starts the iteration for the cube root well enough: two turns
+   !> give all digits.
+   real(wp), parameter :: start_from = 0.4_wp, start_to = 2.5_wp
+
+contains
+
+   !> Cofactors of the deformation gradient, J F^-T, and its determinant J.
+   pure subroutine get_volume_ratios(n, f, cofactor, jacobian)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Deformation gradients: [n, component, point].
+      real(wp), intent(in) :: f(n, n_component, n_point)
+      !> Cofactors: [n, component, point].
+      real(wp), intent(out) :: cofactor(n, n_component, n_point)
+      !> Determinants: [n, point].
+      real(wp), intent(out) :: jacobian(n, n_point)
+      integer :: g, j
+
+      do g = 1, n_point
+         !$omp simd
+         do j = 1, n
+            cofactor(j, 1, g) = f(j, 4, g)*f(j, 5, g)
+            cofactor(j, 2, g) = -f(j, 3, g)*f(j, 5, g)
+            cofactor(j, 3, g) = -f(j, 2, g)*f(j, 5, g)
+            cofactor(j, 4, g) = f(j, 1, g)*f(j, 5, g)
+            cofactor(j, 5, g) = f(j, 1, g)*f(j, 4, g) - f(j, 2, g)*f(j, 3, g)
+            jacobian(j, g) = cofactor(j, 5, g)*f(j, 5, g)
+         end do
+      end do
+   end subroutine get_volume_ratios
+
+   !> x**(-1/3) of positive numbers.
+   pure subroutine get_inverse_cube_root(n, x, root)
+      !> How many.
+      integer, intent(in) :: n
+      !> The numbers: [n].
+      real(wp), intent(in) :: x(n)
+      !> Their roots: [n].
+      real(wp), intent(out) :: root(n)
+      real(wp) :: rest
+      integer :: j, turn
+
+      if (minval(x) < start_from .or. maxval(x) > start_to) then
+         root = x**(-1.0_wp/3.0_wp)
+         return
+      end if
+      ! Least squares over the range, off by 4 % at most; each turn raises the error to its fourth power.
+      !$omp simd private(rest)
+      do j = 1, n
+         root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
+         do turn = 1, 2
+            rest = 1 - x(j)*root(j)**3
+            root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
+         end do
+      end do
+   end subroutine get_inverse_cube_root
+
+   !> First Piola-Kirchhoff stresses of the elastic solid.
+   pure subroutine get_elastic_stress(n, shear_modulus, mooney_share, bulk_modulus, weight, volume, f, cofactor, jacobian, &
+      stress, energy)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Shear modulus, Pa.
+      real(wp), intent(in) :: shear_modulus
+      !> Part of it with the second invariant.
+      real(wp), intent(in) :: mooney_share
+      !> Bulk modulus, Pa.
+      real(wp), intent(in) :: bulk_modulus
+      !> Volumes of the points, undeformed, m3: [n, point].
+      real(wp), intent(in) :: weight(n, n_point)
+      !> Volumes of the elements, undeformed, m3: [n].
+      real(wp), intent(in) :: volume(n)
+      !> Deformation gradients: [n, component, point].
+      real(wp), intent(in) :: f(n, n_component, n_point)
+      !> Their cofactors: [n, component, point].
+      real(wp), intent(in) :: cofactor(n, n_component, n_point)
+      !> Their determinants: [n, point].
+      real(wp), intent(in) :: jacobian(n, n_point)
+      !> Stresses, Pa: [n, component, point].
+      real(wp), intent(out) :: stress(n, n_component, n_point)
+      !> Gets the strain energy added, J.
+      real(wp), intent(inout) :: energy
+      real(wp) :: pressure(n), root(n), modulus, invariant, factor, total
+      integer :: c, g, j
+
+      pressure = -volume
+      do g = 1, n_point
+         pressure = pressure + weight(:, g)*jacobian(:, g)
+      end do
+      pressure = pressure/volume
+      total = bulk_modulus/2*sum(volume*pressure**2)
+      pressure = bulk_modulus*pressure
+      modulus = shear_modulus*(1 - mooney_share)
+      do g = 1, n_point
+         call get_inverse_cube_root(n, jacobian(:, g), root)
+         !$omp simd private(invariant, factor) reduction(+:total)
+         do j = 1, n
+            invariant = root(j)**2*(f(j, 1, g)**2 + f(j, 2, g)**2 + f(j, 3, g)**2 + f(j, 4, g)**2 + f(j, 5, g)**2)
+            factor = pressure(j) - modulus*invariant/(3*jacobian(j, g))
+            do c = 1, n_component
+               stress(j, c, g) = modulus*root(j)**2*f(j, c, g) + factor*cofactor(j, c, g)
+            end do
+            total = total + weight(j, g)*modulus/2*(invariant - 3)
+         end do
+         if (mooney_share > 0.0_wp) call add_second_invariant(n, shear_modulus*mooney_share, weight(:, g), f(:, :, g), &
+            cofactor(:, :, g), jacobian(:, g), root, stress(:, :, g), total)
+      end do
+      energy = energy + total
+   end subroutine get_elastic_stress
+
+   !> Adds the stresses of the second invariant, modulus/2 (J^(-4/3) I2 - 3), at one Gauss point.
+   pure subroutine add_second_invariant(n, modulus, weight, f, cofactor, jacobian, root, stress, energy)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Its part of the shear modulus, Pa.
+      real(wp), intent(in) :: modulus
+      !> Volumes of the points, undeformed, m3: [n].
+      real(wp), intent(in) :: weight(n)
+      !> Deformation gradients: [n, component].
+      real(wp), intent(in) :: f(n, n_component)
+      !> Their cofactors: [n, component].
+      real(wp), intent(in) :: cofactor(n, n_component)
+      !> Their determinants: [n].
+      real(wp), intent(in) :: jacobian(n)
+      !> Determinants to the power -1/3: [n].
+      real(wp), intent(in) :: root(n)
+      !> Stresses, Pa: [n, component].
+      real(wp), intent(inout) :: stress(n, n_component)
+      !> Gets the energy added, J.
+      real(wp), intent(inout) :: energy
+      real(wp) :: c(n_symmetric), first, second, scale, volumetric
+      integer :: j
+
+      !$omp simd private(c, first, second, scale, volumetric) reduction(+:energy)
+      do j = 1, n
+         c = [f(j, 1)**2 + f(j, 3)**2, f(j, 2)**2 + f(j, 4)**2, f(j, 5)**2, f(j, 1)*f(j, 2) + f(j, 3)*f(j, 4)]
+         first = c(1) + c(2) + c(3)
+         second = (c(1) + c(2))*c(3) + c(1)*c(2) - c(4)**2
+         scale = modulus*root(j)**4
+         volumetric = -2*scale*second/(3*jacobian(j))
+         stress(j, 1) = stress(j, 1) + scale*((first - c(1))*f(j, 1) - c(4)*f(j, 2)) + volumetric*cofactor(j, 1)
+         stress(j, 2) = stress(j, 2) + scale*((first - c(2))*f(j, 2) - c(4)*f(j, 1)) + volumetric*cofactor(j, 2)
+         stress(j, 3) = stress(j, 3) + scale*((first - c(1))*f(j, 3) - c(4)*f(j, 4)) + volumetric*cofactor(j, 3)
+         stress(j, 4) = stress(j, 4) + scale*((first - c(2))*f(j, 4) - c(4)*f(j, 3)) + volumetric*cofactor(j, 4)
+         stress(j, 5) = stress(j, 5) + scale*(first - c(3))*f(j, 5) + volumetric*cofactor(j, 5)
+         energy = energy + weight(j)*(scale*second - 3*modulus)/2
+      end do
+   end subroutine add_second_invariant
+
+   !> Adds the stresses of Kelvin's and Voigt's viscosity.
+   pure subroutine add_viscous_stress(n, viscosity, weight, rate, cofactor, jacobian, stress, power)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Viscosity, Pa s.
+      real(wp), intent(in) :: viscosity
+      !> Volumes of the points, undeformed, m3: [n, point].
+      real(wp), intent(in) :: weight(n, n_point)
+      !> Rates of the deformation gradients, 1/s: [n, component, point].
+      real(wp), intent(in) :: rate(n, n_component, n_point)
+      !> Cofactors of the deformation gradients: [n, component, point].
+      real(wp), intent(in) :: cofactor(n, n_component, n_point)
+      !> Their determinants: [n, point].
+      real(wp), intent(in) :: jacobian(n, n_point)
+      !> Stresses, Pa: [n, component, point].
+      real(wp), intent(inout) :: stress(n, n_component, n_point)
+      !> Gets the power dissipated added, W.
+      real(wp), intent(inout) :: power
+      real(wp) :: rr, zz, hoop, rz, mean, scale, total
+      integer :: g, j
+
+      total = 0.0_wp
+      do g = 1, n_point
+         !$omp simd private(rr, zz, hoop, rz, mean, scale) reduction(+:total)
+         do j = 1, n
+            scale = 2*viscosity/jacobian(j, g)
+            rr = rate(j, 1, g)*cofactor(j, 1, g) + rate(j, 2, g)*cofactor(j, 2, g)
+            zz = rate(j, 3, g)*cofactor(j, 3, g) + rate(j, 4, g)*cofactor(j, 4, g)
+            hoop = rate(j, 5, g)*cofactor(j, 5, g)
+            rz = scale/2*(rate(j, 1, g)*cofactor(j, 3, g) + rate(j, 2, g)*cofactor(j, 4, g) &
+               + rate(j, 3, g)*cofactor(j, 1, g) + rate(j, 4, g)*cofactor(j, 2, g))
+            mean = (rr + zz + hoop)/3
+            rr = scale*(rr - mean)
+            zz = scale*(zz - mean)
+            hoop = scale*(hoop - mean)
+            stress(j, 1, g) = stress(j, 1, g) + rr*cofactor(j, 1, g) + rz*cofactor(j, 3, g)
+            stress(j, 2, g) = stress(j, 2, g) + rr*cofactor(j, 2, g) + rz*cofactor(j, 4, g)
+            stress(j, 3, g) = stress(j, 3, g) + rz*cofactor(j, 1, g) + zz*cofactor(j, 3, g)
+            stress(j, 4, g) = stress(j, 4, g) + rz*cofactor(j, 2, g) + zz*cofactor(j, 4, g)
+            stress(j, 5, g) = stress(j, 5, g) + hoop*cofactor(j, 5, g)
+            total = total + weight(j, g)*jacobian(j, g)*(rr**2 + zz**2 + hoop**2 + 2*rz**2)
+         end do
+      end do
+      power = power + total/(2*viscosity)
+   end subroutine add_viscous_stress
+
+   !> Adds the stresses of one Maxwell branch in the middle of a step, and takes its flow to the end.
+   !>
+   !> The flow is known at the middles between the instants of the displacements, as velocities are:
+   !> the step is of second order.
+   pure subroutine add_branch_stress(n, modulus, time, interval, keep, weight, f, cofactor, jacobian, flow, stress, energy, &
+      power)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Shear modulus of the branch, Pa.
+      real(wp), intent(in) :: modulus
+      !> Relaxation time, s.
+      real(wp), intent(in) :: time
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
+      !> The flow is taken to the end of the step; otherwise it stays, to try forces only.
+      logical, intent(in) :: keep
+      !> Volumes of the points, undeformed, m3: [n, point].
+      real(wp), intent(in) :: weight(n, n_point)
+      !> Deformation gradients: [n, component, point].
+      real(wp), intent(in) :: f(n, n_component, n_point)
+      !> Their cofactors: [n, component, point].
+      real(wp), intent(in) :: cofactor(n, n_component, n_point)
+      !> Their determinants: [n, point].
+      real(wp), intent(in) :: jacobian(n, n_point)
+      !> Flow Cv from half a step before to half a step after: [n, symmetric, point].
+      real(wp), intent(inout) :: flow(n, n_symmetric, n_point)
+      !> Stresses, Pa: [n, component, point].
+      real(wp), intent(inout) :: stress(n, n_component, n_point)
+      !> Gets the energy of the branch added, J.
+      real(wp), intent(inout) :: energy
+      !> Gets the power dissipated added, W.
+      real(wp), intent(inout) :: power
+      real(wp), dimension(n) :: root, shrink, determinant
+      real(wp), dimension(n, n_symmetric) :: c, half
+      real(wp) :: inverse(n_symmetric), trace, square, coupling, factor, scale
+      integer :: g, j, k
+
+      do g = 1, n_point
+         call get_inverse_cube_root(n, jacobian(:, g), root)
+         shrink = root**2
+         !$omp simd
+         do j = 1, n
+            c(j, 1) = shrink(j)*(f(j, 1, g)**2 + f(j, 3, g)**2)
+            c(j, 2) = shrink(j)*(f(j, 2, g)**2 + f(j, 4, g)**2)
+            c(j, 3) = shrink(j)*f(j, 5, g)**2
+            c(j, 4) = shrink(j)*(f(j, 1, g)*f(j, 2, g) + f(j, 3, g)*f(j, 4, g))
+         end do
+         half = flow(:, :, g) + (exp(interval/(2*time)) - 1)*c
+         determinant = (half(:, 1)*half(:, 2) - half(:, 4)**2)*half(:, 3)
+         call get_inverse_cube_root(n, determinant, root)
+         !$omp simd private(inverse, trace, square, coupling, factor, scale) reduction(+:energy, power)
+         do j = 1, n
+            ! Inverse of Cv: adjugate over determinant, with the norm of Cv taken out.
+            scale = 1/(root(j)*determinant(j))
+            inverse(1) = scale*half(j, 2)*half(j, 3)
+            inverse(2) = scale*half(j, 1)*half(j, 3)
+            inverse(3) = scale*(half(j, 1)*half(j, 2) - half(j, 4)**2)
+            inverse(4) = -scale*half(j, 4)*half(j, 3)
+            trace = c(j, 1)*inverse(1) + c(j, 2)*inverse(2) + c(j, 3)*inverse(3) + 2*c(j, 4)*inverse(4)
+            square = (c(j, 1)*inverse(1) + c(j, 4)*inverse(4))**2 + (c(j, 2)*inverse(2) + c(j, 4)*inverse(4))**2 &
+               + (c(j, 3)*inverse(3))**2 &
+               + 2*(c(j, 1)*inverse(4) + c(j, 4)*inverse(2))*(c(j, 4)*inverse(1) + c(j, 2)*inverse(4))
+            coupling = modulus*shrink(j)
+            factor = -modulus*trace/(3*jacobian(j, g))
+            stress(j, 1, g) = stress(j, 1, g) + coupling*(f(j, 1, g)*inverse(1) + f(j, 2, g)*inverse(4)) &
+               + factor*cofactor(j, 1, g)
+            stress(j, 2, g) = stress(j, 2, g) + coupling*(f(j, 1, g)*inverse(4) + f(j, 2, g)*inverse(2)) &
+               + factor*cofactor(j, 2, g)
+            stress(j, 3, g) = stress(j, 3, g) + coupling*(f(j, 3, g)*inverse(1) + f(j, 4, g)*inverse(4)) &
+               + factor*cofactor(j, 3, g)
+            stress(j, 4, g) = stress(j, 4, g) + coupling*(f(j, 3, g)*inverse(4) + f(j, 4, g)*inverse(2)) &
+               + factor*cofactor(j, 4, g)
+            stress(j, 5, g) = stress(j, 5, g) + coupling*f(j, 5, g)*inverse(3) + factor*cofactor(j, 5, g)
+            energy = energy + weight(j, g)*modulus/2*(trace - 3)
+            power = power + weight(j, g)*modulus/(2*time)*(square - trace**2/3)
+         end do
+         if (.not. keep) cycle
+         half = flow(:, :, g) + (exp(interval/time) - 1)*c
+         determinant = (half(:, 1)*half(:, 2) - half(:, 4)**2)*half(:, 3)
+         call get_inverse_cube_root(n, determinant, root)
+         do k = 1, n_symmetric
+            flow(:, k, g) = half(:, k)*root
+         end do
+      end do
+   end subroutine add_branch_stress
+
+end module thud_rubber

@@ -1,0 +1,91 @@
+!> The limit of stability of the central differences, found on the equations of motion themselves.
+!>
+!> With velocities half a step behind, the step dt is stable while dt**2 K + 2 dt C <= 4 M for the
+!> tangents K and C of elasticity and viscosity: the largest eigenvalue of the left side over M, here
+!> the growth, may reach 4. Power iteration finds it; each turn takes one evaluation of the
+!> forces. The direction is kept between calls, so that a few turns follow the deforming ball.
+module thud_stable_step
+   use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
+   use thud_floor_contact, only: floor_contact_type
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: find_growth, get_first_direction, most_growth
+
+   !> Growth at the limit of stability.
+   real(wp), parameter :: most_growth = 4.0_wp
+
+   !> Largest displacement that the forces are tried with, over the thickness of an element.
+   real(wp), parameter :: trial = 1.0e-6_wp
+
+contains
+
+   !> A direction that every motion has a part of, the fastest ones most.
+   pure function get_first_direction(body) result(direction)
+      !> The body.
+      type(elastic_body_type), intent(in) :: body
+      !> The direction: [0:n_polar, 0:n_radial, 2].
+      real(wp), allocatable :: direction(:, :, :)
+      integer :: i, j, k
+
+      allocate (direction(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2))
+      do k = 1, 2
+         do i = 0, body%mesh%n_radial
+            do j = 0, body%mesh%n_polar
+               direction(j, i, k) = (-1)**(i + j)*(1 + 0.5_wp*modulo(0.618_wp*real(j + 7*i + 3*k, wp), 1.0_wp))
+            end do
+         end do
+      end do
+      direction(0, :, 1) = 0.0_wp
+      direction(body%mesh%n_polar, :, 1) = 0.0_wp
+   end function get_first_direction
+
+   !> Growth of a step, by some turns of the power iteration.
+   pure subroutine find_growth(body, contact, position, velocity, interval, n_turn, direction, growth)
+      !> The body; it stays as it is.
+      type(elastic_body_type), intent(inout) :: body
+      !> The contact.
+      type(floor_contact_type), intent(in) :: contact
+      !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
+      real(wp), intent(in), contiguous :: position(0:, 0:, :)
+      !> Velocities of the nodes, m/s: the same shape.
+      real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
+      !> Number of turns.
+      integer, intent(in) :: n_turn
+      !> Direction of the fastest motion, better after each call: the same shape.
+      real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
+      !> The growth; from below, close after tens of turns. Huge where there are no forces.
+      real(wp), intent(out) :: growth
+      real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
+      real(wp) :: mass(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2), step, thickness
+      type(body_state_type) :: state
+      integer :: last, turn
+
+      last = body%mesh%n_radial
+      mass = spread(body%mass, 3, 2)
+      thickness = minval(hypot(body%mesh%r(:, 1:) - body%mesh%r(:, :last - 1), body%mesh%z(:, 1:) - body%mesh%z(:, :last - 1)))
+      growth = huge(growth)
+      call get_internal_forces(body, position, velocity, interval, .false., here, state)
+      if (state%failure /= no_failure) return
+      do turn = 1, n_turn
+         direction = direction/sqrt(sum(mass*direction**2))
+         step = trial*thickness/maxval(abs(direction))
+         call get_internal_forces(body, position + step*direction, velocity + 2*step/interval*direction, interval, .false., &
+            there, state)
+         if (state%failure /= no_failure) then
+            growth = huge(growth)
+            return
+         end if
+         product = (here - there)*(interval**2/step)
+         ! Springs of the floor count as soon as their nodes come near.
+         where (position(:, last, 2) < thickness) product(:, last, 2) = product(:, last, 2) &
+            + interval**2*merge(0.0_wp, contact%stiffness, contact%stops)*direction(:, last, 2)
+         growth = sum(direction*product)
+         direction = product/mass
+      end do
+   end subroutine find_growth
+
+end module thud_stable_step
