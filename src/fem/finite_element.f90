@@ -31,6 +31,9 @@ module thud_finite_element
    !> Part of the wall that the surface may sink into the floor.
    real(wp), parameter :: most_sink = 0.01_wp
 
+   !> Most memory for snapshots, bytes.
+   real(wp), parameter :: most_motion_bytes = 2.0e9_wp
+
    !> Most steps in a sampling interval.
    integer, parameter :: most_steps = 100000
 
@@ -85,6 +88,12 @@ contains
             //' s is longer than the fall; allowed: up to '//to_text(history%impact_velocity/drop%gravity)//' s')
          return
       end if
+      if (get_motion_bytes(options, sampling) > most_motion_bytes) then
+         error = input_error('&output: snapshot_interval = '//to_text(options%snapshot_interval)//' s makes ' &
+            //to_text(get_frame_count(options, sampling))//' snapshots, more than the memory is meant to hold; allowed: a ' &
+            //'longer interval, or 0 for none')
+         return
+      end if
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
       run = new_impact_run(ball, options, material, drop%gravity, gap, speed)
@@ -106,6 +115,18 @@ contains
       n_frame = 0
       if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
    end function get_frame_count
+
+   !> Memory that the snapshots of a run take.
+   pure function get_motion_bytes(options, sampling) result(bytes)
+      !> The options.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> The bytes.
+      real(wp) :: bytes
+
+      bytes = 32.0_wp*(options%mesh%radial_elements + 1)*(options%mesh%polar_elements + 1)*get_frame_count(options, sampling)
+   end function get_motion_bytes
 
    !> Samples between two snapshots.
    pure function get_stride(options, sampling) result(stride)
@@ -202,6 +223,10 @@ contains
       history%peak_force = maxval(history%floor_force)
       history%peak_floor_force = history%peak_force
       history%max_deflection = maxval(history%deflection)
+      associate (material => run%body%material)
+         history%fact_name = [character(len=24) :: 'shear_modulus_Pa', 'bulk_modulus_Pa', 'shortest_step_s', 'deepest_sink_m']
+         history%fact = [material%shear_modulus, material%bulk_modulus, run%shortest_interval, run%sink]
+      end associate
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(history%impulse - gain)/gain
       call check_contact_samples(sampling, history%contact_time, error)

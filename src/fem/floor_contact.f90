@@ -21,9 +21,9 @@ module thud_floor_contact
    !> What the group asks for.
    type :: contact_options_type
       !> `penalty` or `impulse`.
-      character(len=name_length) :: method = 'penalty'
+      character(len=name_length) :: treatment = 'impulse'
       !> Stiffness of the penalty over that of the elements above it, both per area.
-      real(wp) :: penalty_ratio = 1.0_wp
+      real(wp) :: penalty_ratio = 3.0_wp
    end type contact_options_type
 
    !> The contact.
@@ -45,10 +45,10 @@ contains
       character(len=*), parameter :: group = 'contact'
 
       fields = [ &
-         choice_field(group, 'method', options%method, 'how the floor holds the ball', &
+         choice_field(group, 'treatment', options%treatment, 'how the floor holds the ball', &
          [character(len=8) :: 'penalty', 'impulse']), &
          real_field(group, 'penalty_ratio', options%penalty_ratio, '', &
-         'stiffness of the penalty over that of the elements above it', 0.01_wp, 100.0_wp)]
+         'stiffness of the penalty over that of the elements above it, per area', 0.01_wp, 100.0_wp)]
    end function get_contact_fields
 
    !> The contact of a ball.
@@ -64,7 +64,7 @@ contains
       real(wp) :: modulus
 
       associate (last => mesh%n_radial)
-         contact%stops = options%method == 'impulse'
+         contact%stops = options%treatment == 'impulse'
          modulus = material%bulk_modulus + 4*(material%shear_modulus + sum(material%branch_modulus))/3
          allocate (contact%stiffness(0:mesh%n_polar))
          contact%stiffness = options%penalty_ratio*modulus*get_nodal_areas(mesh%r(:, last), mesh%z(:, last)) &

@@ -15,7 +15,7 @@ module thud_free_modes
    implicit none (type, external)
    private
 
-   public :: free_modes_type, get_free_modes, get_modes_fields, modes_options_type
+   public :: check_modes, free_modes_type, get_free_modes, get_modes_fields, modes_options_type
 
    !> Relative error of the eigenvalues that ends the iteration, far below that of the mesh.
    real(wp), parameter :: eigenvalue_tolerance = 1.0e-11_wp
@@ -62,6 +62,21 @@ contains
       fields = [integer_field('modes', 'count', options%count, 'number of elastic free modes', 1, 100)]
    end function get_modes_fields
 
+   !> Complains about more modes than the mesh can tell.
+   subroutine check_modes(options, mesh_options, error)
+      !> Number of modes.
+      type(modes_options_type), intent(in) :: options
+      !> Numbers of elements.
+      type(mesh_options_type), intent(in) :: mesh_options
+      !> Names the count and the most that is allowed.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: most
+
+      most = mesh_options%polar_elements*mesh_options%radial_elements/4
+      if (options%count > most) error = input_error('&modes: count = '//to_text(options%count) &
+         //' is not allowed with so few elements; allowed: 1 to '//to_text(most)//', a quarter of their number')
+   end subroutine check_modes
+
    !> The lowest elastic modes of a ball.
    subroutine get_free_modes(ball, mesh_options, count, modes, error)
       !> The ball.
@@ -72,18 +87,13 @@ contains
       integer, intent(in) :: count
       !> The modes.
       type(free_modes_type), intent(out) :: modes
-      !> The mesh is too coarse for so many modes, or they cannot be computed.
+      !> The modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(mode_matrices_type) :: matrices
       real(wp), allocatable :: vector(:, :), eigenvalue(:)
       integer :: i
 
       modes%mesh = new_mesh(ball, mesh_options, 2)
-      if (8*count > mesh_options%polar_elements*(mesh_options%radial_elements + 1)) then
-         error = input_error('&modes: count = '//to_text(count)//' is too much for the mesh; allowed: up to an eighth of ' &
-            //'polar_elements*(radial_elements + 1)')
-         return
-      end if
       call use_one_blas_thread()
       call new_mode_matrices(ball, modes%mesh, matrices, error)
       if (allocated(error)) return

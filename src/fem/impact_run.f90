@@ -48,6 +48,8 @@ module thud_impact_run
       real(wp) :: time = 0.0_wp
       !> Length of the step before, s; 0 at the start.
       real(wp) :: last_interval = 0.0_wp
+      !> Shortest step, s.
+      real(wp) :: shortest_interval = huge(1.0_wp)
       !> Deepest that a node has sunk into the floor, m.
       real(wp) :: sink = 0.0_wp
    end type impact_run_type
@@ -130,7 +132,7 @@ contains
       real(wp), intent(in) :: interval
       real(wp) :: force(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
       real(wp) :: before(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
-      real(wp), dimension(0:run%body%mesh%n_polar) :: impulse, falling
+      real(wp) :: impulse(0:run%body%mesh%n_polar)
       real(wp) :: span
       integer :: last
 
@@ -144,10 +146,9 @@ contains
       run%time = run%time + span
       run%velocity = before + span*force/run%mass
       run%velocity(:, :, 2) = run%velocity(:, :, 2) - span*run%gravity
-      falling = run%velocity(:, last, 2)
       call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2), interval, run%velocity(:, last, 2), &
          impulse)
-      run%stopped = run%stopped - dot_product(impulse, falling + run%velocity(:, last, 2))/2
+      run%stopped = run%stopped - dot_product(impulse, before(:, last, 2) + run%velocity(:, last, 2))/2
       run%floor_force = run%floor_force + impulse/span
       run%impulse = span*sum(run%floor_force)
       run%kinetic = sum(run%mass*before*run%velocity)/2
@@ -165,6 +166,7 @@ contains
 
       run%position = run%position + interval*run%velocity
       run%last_interval = interval
+      run%shortest_interval = min(run%shortest_interval, interval)
    end subroutine drift
 
    !> Energy of the latest step, with all that was lost; it should not change.

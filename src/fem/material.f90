@@ -25,7 +25,7 @@ module thud_material
       !> Part of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
       real(wp) :: mooney_share = 0.2_wp
       !> Most bulk modulus over shear modulus; Poisson's ratio may ask for less.
-      real(wp) :: bulk_ratio = 50.0_wp
+      real(wp) :: bulk_ratio = 200.0_wp
       !> Law of viscosity: `none`, `kelvin_voigt`, `constant_loss` or `prony`.
       character(len=name_length) :: viscosity = 'kelvin_voigt'
       !> Loss factor at `loss_frequency`.

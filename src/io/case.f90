@@ -5,24 +5,34 @@ module thud_case
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_force_exposure, only: level_methods
+   use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_namelist_text, only: group_type, parse_groups
    use thud_new_field, only: choice_field, text_field
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
-   use thud_source_model, only: check_model, get_model_fields, model_names, model_options_type
+   use thud_source_model, only: check_model, get_model_fields, get_owner, model_names, model_options_type
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
    public :: case_type, describe_keys, get_case_text, get_fields, read_case
 
-   !> Groups that every file must hold.
-   character(len=24), parameter :: required_groups(3) = [character(len=24) :: 'ball', 'drop', 'model']
+   !> Groups that a file must hold for an impact, and for free modes.
+   character(len=24), parameter :: impact_groups(3) = [character(len=24) :: 'ball', 'drop', 'model']
+   character(len=24), parameter :: modes_groups(2) = [character(len=24) :: 'ball', 'modes']
+   !> Groups that free modes use; the rest is for an impact.
+   character(len=24), parameter :: groups_of_modes(4) = [character(len=24) :: 'case', 'ball', 'modes', 'mesh']
 
    !> Input of one run.
    type :: case_type
       !> Name of the case, also of its output directory.
       character(len=name_length) :: name = ''
+      !> An impact is asked for, by the group `&model`.
+      logical :: has_impact = .true.
+      !> Free modes are asked for, by the group `&modes`.
+      logical :: has_modes = .false.
+      !> Number of free modes.
+      type(modes_options_type) :: modes
       !> The ball.
       type(ball_type) :: ball
       !> The drop.
@@ -55,6 +65,7 @@ contains
       fields = [ &
          text_field('case', 'name', case%name, 'name of the case, also of its output directory'), &
          get_ball_fields(case%ball), &
+         get_modes_fields(case%modes), &
          get_drop_fields(case%drop), &
          choice_field('model', 'name', case%model, 'source model', model_names), &
          get_model_fields(case%options), &
@@ -67,7 +78,20 @@ contains
          choice_field('limits', 'source', case%source, 'source whose limits apply', source_names)]
    end function get_fields
 
-   !> The keys without those of models that are not asked for and lists without entries.
+   !> What a group does in a case: it is used by the impact or by the free modes.
+   pure elemental function is_used(case, group) result(used)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Name of the group.
+      character(len=*), intent(in) :: group
+      !> Whether it does anything.
+      logical :: used
+
+      used = case%has_modes .and. any(groups_of_modes == group)
+      if (case%has_impact .and. group /= 'modes') used = used .or. any([character(len=24) :: '', case%model] == get_owner(group))
+   end function is_used
+
+   !> The keys that do something, without lists that have no entries.
    function get_active_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
@@ -77,8 +101,7 @@ contains
       integer :: i
 
       allocate (fields, source=get_fields(case))
-      active = [((fields(i)%group == case%model .or. .not. any(model_names == fields(i)%group)) &
-         .and. .not. fields(i)%is_empty(), i=1, size(fields))]
+      active = [(is_used(case, fields(i)%group) .and. .not. fields(i)%is_empty(), i=1, size(fields))]
       fields = pack(fields, active)
    end function get_active_fields
 
@@ -100,7 +123,13 @@ contains
       call parse_groups(text, groups, error)
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
-      call check_groups(groups, fields, error)
+      case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
+      case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
+      if (case%has_impact) then
+         call check_groups(groups, fields, impact_groups, error)
+      else
+         call check_groups(groups, fields, modes_groups, error)
+      end if
       if (allocated(error)) return
       do i = 1, size(groups)
          call assign_group(groups(i), fields, error)
@@ -116,7 +145,7 @@ contains
       call check_name(case%name, error)
    end subroutine read_case
 
-   !> Complains about options of models that are not asked for, and about those that do not fit.
+   !> Complains about groups that do nothing, and about options that do not fit.
    subroutine check_options(groups, case, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
@@ -127,20 +156,28 @@ contains
       integer :: i
 
       do i = 1, size(groups)
-         if (groups(i)%name == case%model .or. .not. any(model_names == groups(i)%name)) cycle
-         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
-            //' does nothing with &model: name = '//quoted(case%model)//'; allowed: &'//trim(case%model))
+         if (is_used(case, groups(i)%name)) cycle
+         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing ')
+         if (case%has_impact) then
+            error%message = error%message//'with &model: name = '//quoted(case%model)//'; allowed: &'//trim(case%model)
+         else
+            error%message = error%message//'with &modes alone; allowed: '//join_quoted(groups_of_modes)
+         end if
          return
       end do
+      if (case%has_modes) call check_modes(case%modes, case%options%finite_element%mesh, error)
+      if (allocated(error) .or. .not. case%has_impact) return
       call check_model(case%model, case%options, case%ball, error)
    end subroutine check_options
 
    !> Complains about groups that are missing, unknown or given twice.
-   subroutine check_groups(groups, fields, error)
+   subroutine check_groups(groups, fields, required_groups, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
+      !> Groups that have to be there: [n].
+      character(len=*), intent(in) :: required_groups(:)
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       integer :: i, j
@@ -256,7 +293,7 @@ contains
    end function get_case_text
 
    !> Every key with its default, allowed range and meaning, as a commented namelist file. Groups
-   !> of models other than the default one stand behind `!`.
+   !> that the default model does not use stand behind `!`.
    function describe_keys() result(text)
       !> The description; a valid input file.
       character(len=:), allocatable :: text
@@ -270,7 +307,7 @@ contains
       text = '! Every key of an input file with its default value. SI units.'//newline
       do i = 1, size(fields)
          mark = ''
-         if (any(model_names == fields(i)%group) .and. fields(i)%group /= case%model) mark = '! '
+         if (.not. is_used(case, fields(i)%group)) mark = '! '
          call fields(i)%get_allowed(allowed)
          call fields(i)%get_text(value)
          if (.not. any(fields(:i - 1)%group == fields(i)%group)) then

@@ -1,10 +1,12 @@
 !> The few calls of the operating system that Fortran lacks (POSIX.1-2008).
 module thud_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: directory_exists, ignore_signals, is_empty_directory, lock_directory, lock_type, make_directory, print_text
+   public :: directory_exists, get_free_bytes, ignore_signals, is_empty_directory, lock_directory, lock_type
+   public :: make_directory, print_text
    public :: remove_file, rename_file, standard_error, standard_output, unlock_directory
 
    !> Descriptors of the process.
@@ -32,6 +34,14 @@ module thud_posix
          integer(c_int), value :: operation
          integer(c_int) :: status
       end function c_flock
+
+      function c_statvfs(path, buffer) bind(c, name='statvfs') result(status)
+         import :: c_char, c_int, c_long
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_long), intent(out) :: buffer(*)
+         integer(c_int) :: status
+      end function c_statvfs
 
       function c_mkdir(path, mode) bind(c, name='mkdir') result(status)
          import :: c_char, c_int
@@ -77,7 +87,7 @@ module thud_posix
       end function c_closedir
 
       function c_write(descriptor, buffer, length) bind(c, name='write') result(written)
-         import :: c_char, c_int, c_intptr_t, c_size_t
+         import :: c_char, c_int, c_intptr_t, c_long, c_size_t
          implicit none (type, external)
          integer(c_int), value :: descriptor
          character(kind=c_char), intent(in) :: buffer(*)
@@ -230,13 +240,41 @@ contains
    end subroutine rename_file
 
    !> Removes a file or an empty directory if it is there.
-   subroutine remove_file(path)
+   subroutine remove_file(path, done)
       !> Path.
       character(len=*), intent(in) :: path
+      !> There was something, and it is gone.
+      logical, intent(out), optional :: done
       integer(c_int) :: status
 
       status = c_remove(path//c_null_char)
-      if (status /= 0) return
+      if (present(done)) done = status == 0
    end subroutine remove_file
+
+   !> Room on the disk of a directory, or of the next one above that is there.
+   function get_free_bytes(path) result(bytes)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> Bytes that this user may write; huge where the system does not tell.
+      real(wp) :: bytes
+      ! The 64-bit `struct statvfs` of Linux begins with block size, fragment size, blocks, free
+      ! blocks, and blocks free for this user.
+      integer(c_long) :: buffer(64)
+      integer :: i
+
+      bytes = huge(bytes)
+      i = len(path)
+      do while (i > 0)
+         if (directory_exists(path(:i))) exit
+         i = index(path(:i - 1), '/', back=.true.)
+      end do
+      buffer = 0
+      if (i > 0) then
+         if (c_statvfs(path(:i)//c_null_char, buffer) /= 0) return
+      else
+         if (c_statvfs('.'//c_null_char, buffer) /= 0) return
+      end if
+      bytes = real(buffer(2), wp)*real(buffer(5), wp)
+   end function get_free_bytes
 
 end module thud_posix

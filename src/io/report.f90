@@ -4,13 +4,14 @@ module thud_report
    use thud_case, only: case_type
    use thud_constants, only: version
    use thud_force_history, only: force_history_type
+   use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: get_channels_csv, get_force_csv, get_levels_csv, get_summary, get_table
+   public :: get_channels_csv, get_force_csv, get_levels_csv, get_modes_table, get_summary, get_table
 
    !> Format of a row of numbers: every bit of them, 25 characters each with its comma.
    character(len=*), parameter :: csv_form = '(*(es24.16e3,:,","))'
@@ -130,7 +131,7 @@ contains
          //line('impact_velocity', to_text(history%impact_velocity), 'm/s') &
          //line('restitution', to_text(history%restitution), '') &
          //line('impulse', to_text(history%impulse), 'N s, of the floor force') &
-         //'/'//newline//newline//'&checks'//newline &
+         //fact_lines(history)//'/'//newline//newline//'&checks'//newline &
          //line('impulse_residual', to_text(history%impulse_residual), 'of the change of momentum') &
          //line('energy_residual', to_text(history%energy_residual), 'of the energy at first touch') &
          //'/'//newline//newline//'&verdict'//newline &
@@ -164,8 +165,7 @@ contains
       character(len=6), parameter :: octave_name(octave_count) = ['  31.5', '    63', '   125', '   250', '   500']
       integer :: i
 
-      text = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline
-      text = text//'  octave   force exposure level, dB       limits, dB      verdict on the'//newline &
+      text = '  octave   force exposure level, dB       limits, dB      verdict on the'//newline &
          //'      Hz     elastic       floor      '//padded(case%source, 18)//trim(case%level_force)//' force'//newline
       do i = 1, octave_count
          text = text//'  '//octave_name(i)//right(fixed(elastic_level(i), 2), 12)//right(fixed(floor_level(i), 2), 12) &
@@ -182,9 +182,83 @@ contains
          //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
          //scalar_row('largest deflection', history%max_deflection*1000, 3, 'mm') &
          //scalar_row('impulse', history%impulse, 3, 'N s') &
-         //newline//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
+         //facts(history)//newline//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
          //' to the limits of the '//trim(case%source)//' (levels: '//trim(case%level_method)//').'//newline
    end function get_table
+
+   !> The same as lines of a namelist.
+   function fact_lines(history) result(lines)
+      !> The history.
+      type(force_history_type), intent(in) :: history
+      !> One line each.
+      character(len=:), allocatable :: lines
+      integer :: i
+
+      lines = ''
+      do i = 1, size(history%fact_name)
+         lines = lines//line(trim(history%fact_name(i)), to_text(history%fact(i)), '')
+      end do
+   end function fact_lines
+
+   !> Numbers that the model chose or found.
+   function facts(history) result(rows)
+      !> The history.
+      type(force_history_type), intent(in) :: history
+      !> One row each.
+      character(len=:), allocatable :: rows
+      integer :: i, cut
+
+      rows = ''
+      do i = 1, size(history%fact_name)
+         ! Names end with their units.
+         cut = index(trim(history%fact_name(i)), '_', back=.true.)
+         rows = rows//'  '//padded(spaced(history%fact_name(i)(:cut - 1)), 20)//right(short_scientific(history%fact(i)), 10) &
+            //' '//trim(history%fact_name(i)(cut + 1:))//newline
+      end do
+   end function facts
+
+   !> A name with blanks for its underscores.
+   pure function spaced(name) result(text)
+      !> The name.
+      character(len=*), intent(in) :: name
+      !> The text.
+      character(len=len(name)) :: text
+      integer :: i
+
+      text = name
+      do i = 1, len(name)
+         if (name(i:i) == '_') text(i:i) = ' '
+      end do
+   end function spaced
+
+   !> A number with four digits.
+   function short_scientific(value) result(text)
+      !> The number.
+      real(wp), intent(in) :: value
+      !> Its text.
+      character(len=:), allocatable :: text
+      character(len=10) :: buffer
+
+      write (buffer, '(es10.3)') value
+      text = trim(adjustl(buffer))
+   end function short_scientific
+
+   !> The free modes on the screen.
+   function get_modes_table(modes) result(text)
+      !> The modes.
+      type(free_modes_type), intent(in) :: modes
+      !> The table.
+      character(len=:), allocatable :: text
+      integer :: i
+
+      text = '  free modes     frequency   harmonic   participation'//newline &
+         //'                       Hz                of the pole'//newline &
+         //'   rigid        '//right(trim(fixed(modes%rigid_frequency, 3)), 9)//right('1', 11)//right('1.000', 16)//newline
+      do i = 1, size(modes%frequency)
+         text = text//right(to_text(i), 6)//right(trim(fixed(modes%frequency(i), 3)), 19) &
+            //right(to_text(modes%harmonic(i)), 11)//right(trim(fixed(modes%participation(i), 3)), 16)//newline
+      end do
+   end function get_modes_table
 
    !> One scalar of the table, with its limits where there are any.
    function scalar_row(name, value, decimals, unit, criterion, scale) result(row)

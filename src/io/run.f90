@@ -2,32 +2,51 @@
 module thud_run
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count
    use thud_case, only: case_type, get_case_text, read_case
-   use thud_error, only: error_type
+   use thud_constants, only: version
+   use thud_error, only: error_type, input_error
    use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, &
       write_files
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
+   use thud_finite_element, only: get_frame_count
+   use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
-   use thud_posix, only: remove_file
-   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary, get_table
+   use thud_mesh_files, only: estimate_motion_bytes, get_frame_name, get_modes_files, get_motion_files, modes_names, &
+      motion_names
+   use thud_motion, only: motion_type
+   use thud_posix, only: get_free_bytes, remove_file
+   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_modes_table, get_summary, get_table
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    use thud_source_model, only: solve_model
+   use thud_text, only: newline, to_text
    implicit none (type, external)
    private
 
-   public :: load_case, outcome_type, run_case, solve_case
+   public :: compute_case, load_case, outcome_type, results_type, run_case, store_case
 
-   !> Files of a run.
-   character(len=13), parameter :: file_names(4) = [character(len=13) :: &
-      'force.csv', 'levels.csv', 'summary.nml', 'effective.nml']
+   !> Files of an impact.
+   character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
 
    !> File of models that have more to tell.
    character(len=*), parameter :: channel_file = 'channels.csv'
 
+   !> The full input, which tells whose results a directory holds.
+   character(len=*), parameter :: input_file = 'effective.nml'
+
    !> Figures that the driver may have added; they show the results that they were drawn from.
-   character(len=10), parameter :: figure_names(4) = [character(len=10) :: &
-      'force.png', 'force.svg', 'levels.png', 'levels.svg']
+   character(len=13), parameter :: figure_names(9) = [character(len=13) :: 'force.png', 'force.svg', 'levels.png', &
+      'levels.svg', 'motion.png', 'motion.svg', 'motion.gif', 'modes.png', 'modes.svg']
+
+   !> What a case gives.
+   type :: results_type
+      !> The force, where an impact is asked for.
+      type(force_history_type) :: history
+      !> Snapshots, where the model has some.
+      type(motion_type) :: motion
+      !> Free modes, where they are asked for.
+      type(free_modes_type) :: modes
+   end type results_type
 
    !> What a run leaves for its caller.
    type :: outcome_type
@@ -37,8 +56,8 @@ module thud_run
       character(len=:), allocatable :: table
       !> A remark for the user, empty where there is none.
       character(len=:), allocatable :: remark
-      !> The source conforms to the limits.
-      logical :: conforms = .false.
+      !> The source conforms to the limits, or there is no impact to judge.
+      logical :: conforms = .true.
    end type outcome_type
 
 contains
@@ -54,54 +73,169 @@ contains
       !> The run failed; nothing was written.
       type(error_type), allocatable, intent(out) :: error
       type(case_type) :: case
-      type(force_history_type) :: history
-      type(criterion_type) :: criteria(criterion_count)
-      type(band_type), allocatable :: bands(:)
-      real(wp), allocatable :: elastic_level(:), floor_level(:)
-      character(len=:), allocatable :: input
-      type(text_file_type), allocatable :: files(:)
-      logical :: differs
-      integer :: first, i
+      type(results_type) :: results
 
       call load_case(path, case, error)
       if (allocated(error)) return
+      call store_case(case, output, results, outcome, error)
+      if (allocated(error)) then
+         error%message = path//': '//error%message
+      else if (outcome%remark /= '') then
+         outcome%remark = path//': '//outcome%remark
+      end if
+   end subroutine run_case
+
+   !> Computes a case and writes its results.
+   subroutine store_case(case, output, results, outcome, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Directory for the results; empty for `outputs/<name of the case>`.
+      character(len=*), intent(in) :: output
+      !> The results.
+      type(results_type), intent(out) :: results
+      !> Table, verdict and place of the results.
+      type(outcome_type), intent(out) :: outcome
+      !> The run failed; nothing was written.
+      type(error_type), allocatable, intent(out) :: error
+      type(text_file_type), allocatable :: files(:)
+      character(len=:), allocatable :: input
+      logical :: differs
+
       input = get_case_text(case)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      call check_owner(outcome%directory, [character(len=13) :: file_names, channel_file], 'effective.nml', input, &
-         differs, error)
-      if (.not. allocated(error)) call solve_case(case, history, error)
-      if (.not. allocated(error)) call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
+      outcome%remark = ''
+      call check_owner(outcome%directory, [character(len=13) :: file_names, channel_file, input_file, modes_names, &
+         motion_names], input_file, input, differs, error)
+      if (.not. allocated(error)) call check_space(case, outcome%directory, error)
+      if (.not. allocated(error)) call compute_case(case, results, error)
+      if (.not. allocated(error)) call describe(case, results, files, outcome, error)
       if (.not. allocated(error)) then
-         outcome%conforms = all(conforms(criteria))
-         outcome%table = get_table(case, history, elastic_level, floor_level, criteria)
-         ! The octaves come first and serve the verdict also where only thirds are asked for.
-         first = merge(octave_count, 0, case%bands == 'third') + 1
-         allocate (files(size(file_names) + merge(1, 0, allocated(history%channel))))
-         files(:size(file_names))%name = file_names
-         files(1)%content = get_force_csv(history)
-         files(2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
-            trim(case%level_force))
-         files(3)%content = get_summary(case, history, criteria)
-         files(4)%content = input
-         if (allocated(history%channel)) then
-            files(size(files))%name = channel_file
-            files(size(files))%content = get_channels_csv(history)
-         end if
+         files(1)%name = input_file
+         files(1)%content = input
          call write_files(outcome%directory, files, error)
       end if
-      if (.not. allocated(error)) then
-         outcome%remark = ''
-         if (differs) then
-            outcome%remark = path//': replaces the results of another input of the same name in '//outcome%directory
-            do i = 1, size(figure_names)
-               call remove_file(outcome%directory//'/'//trim(figure_names(i)))
-            end do
-            if (.not. allocated(history%channel)) call remove_file(outcome%directory//'/'//channel_file)
-         end if
+      if (allocated(error)) return
+      call remove_stale(outcome%directory, files, differs)
+      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
+   end subroutine store_case
+
+   !> Complains where snapshots would fill the disk.
+   subroutine check_space(case, directory, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Directory for the results.
+      character(len=*), intent(in) :: directory
+      !> Names the bytes that are wanted and those that are free.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: wanted, free
+
+      if (.not. case%has_impact .or. case%model /= 'finite_element') return
+      associate (options => case%options%finite_element)
+         wanted = estimate_motion_bytes(options%mesh%polar_elements, options%mesh%radial_elements, &
+            get_frame_count(options, case%sampling))
+         free = get_free_bytes(directory)
+         if (wanted <= free) return
+         error = input_error('&output: snapshot_interval = '//to_text(options%snapshot_interval)//' s makes files of up to ' &
+            //to_text(wanted)//' bytes, and '//directory//' has room for '//to_text(free) &
+            //'; allowed: a longer interval, or 0 for no snapshots')
+      end associate
+   end subroutine check_space
+
+   !> Computes what a case asks for.
+   subroutine compute_case(case, results, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> The results.
+      type(results_type), intent(out) :: results
+      !> A computation failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%has_modes) call get_free_modes(case%ball, case%options%finite_element%mesh, case%modes%count, results%modes, &
+         error)
+      if (allocated(error) .or. .not. case%has_impact) return
+      call solve_model(trim(case%model), case%options, case%ball, case%drop, case%sampling, results%history, &
+         results%motion, error)
+   end subroutine compute_case
+
+   !> Table, verdict and files of results.
+   subroutine describe(case, results, files, outcome, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its results.
+      type(results_type), intent(in) :: results
+      !> The files, behind a first one that is still to be filled: [n_file].
+      type(text_file_type), allocatable, intent(out) :: files(:)
+      !> Gets table and verdict.
+      type(outcome_type), intent(inout) :: outcome
+      !> A level cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(criterion_type) :: criteria(criterion_count)
+      type(band_type), allocatable :: bands(:)
+      type(text_file_type) :: modes_files(size(modes_names))
+      type(text_file_type) :: impact_files(size(file_names) + 1)
+      type(text_file_type), allocatable :: motion_files(:)
+      real(wp), allocatable :: elastic_level(:), floor_level(:)
+      integer :: first
+
+      allocate (files(1))
+      outcome%table = 'thud '//version//'   case '//trim(case%name)
+      if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
+      outcome%table = outcome%table//newline
+      if (case%has_modes) then
+         call get_modes_files(results%modes, modes_files)
+         files = [files, modes_files]
+         outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
-      if (allocated(error)) error%message = path//': '//error%message
-   end subroutine run_case
+      if (.not. case%has_impact) return
+      associate (history => results%history)
+         call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
+         if (allocated(error)) return
+         outcome%conforms = all(conforms(criteria))
+         outcome%table = outcome%table//newline//get_table(case, history, elastic_level, floor_level, criteria)
+         ! The octaves come first and serve the verdict also where only thirds are asked for.
+         first = merge(octave_count, 0, case%bands == 'third') + 1
+         impact_files%name = [character(len=13) :: file_names, channel_file]
+         impact_files(1)%content = get_force_csv(history)
+         impact_files(2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
+            trim(case%level_force))
+         impact_files(3)%content = get_summary(case, history, criteria)
+         if (allocated(history%channel)) impact_files(4)%content = get_channels_csv(history)
+         files = [files, impact_files(:merge(4, 3, allocated(history%channel)))]
+      end associate
+      if (results%motion%n_frame == 0) return
+      allocate (motion_files(results%motion%n_frame + size(motion_names)))
+      call get_motion_files(results%motion, motion_files)
+      files = [files, motion_files]
+   end subroutine describe
+
+   !> Removes files that an earlier run of the case has left and this one has not replaced.
+   subroutine remove_stale(directory, files, differs)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Files that were just written: [n_file].
+      type(text_file_type), intent(in) :: files(:)
+      !> The input was another one; figures show its results.
+      logical, intent(in) :: differs
+      character(len=16) :: known(size(file_names) + 1 + size(modes_names) + size(motion_names))
+      integer :: i
+      logical :: done
+
+      known = [character(len=16) :: file_names, channel_file, modes_names, motion_names]
+      do i = 1, size(known)
+         if (.not. any(files%name == known(i))) call remove_file(directory//'/'//trim(known(i)))
+      end do
+      i = count(index(files%name, 'motion_') == 1)
+      do
+         i = i + 1
+         call remove_file(directory//'/'//trim(get_frame_name(i)), done)
+         if (.not. done) exit
+      end do
+      if (.not. differs) return
+      do i = 1, size(figure_names)
+         call remove_file(directory//'/'//trim(figure_names(i)))
+      end do
+   end subroutine remove_stale
 
    !> Reads a case from a namelist file.
    subroutine load_case(path, case, error)
@@ -117,18 +251,6 @@ contains
       if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine load_case
-
-   !> Force history of a case.
-   subroutine solve_case(case, history, error)
-      !> The case.
-      type(case_type), intent(in) :: case
-      !> Its force history.
-      type(force_history_type), intent(out) :: history
-      !> The model failed.
-      type(error_type), allocatable, intent(out) :: error
-
-      call solve_model(trim(case%model), case%options, case%ball, case%drop, case%sampling, history, error)
-   end subroutine solve_case
 
    !> Levels and criteria of a force history.
    subroutine judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
@@ -163,10 +285,10 @@ contains
       if (allocated(error)) return
       if (case%level_force == 'elastic') then
          levels = elastic_level(:octave_count)
-         n_peak = get_peak_count(history%elastic_force)
+         n_peak = get_peak_count(history%elastic_force, history%sample_rate)
       else
          levels = floor_level(:octave_count)
-         n_peak = get_peak_count(history%floor_force)
+         n_peak = get_peak_count(history%floor_force, history%sample_rate)
       end if
       criteria = get_criteria(limits, levels, history%contact_time, history%restitution, n_peak, case%ball%mass, &
          case%drop%height)

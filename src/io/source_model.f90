@@ -4,6 +4,9 @@ module thud_source_model
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
+   use thud_finite_element, only: solve_finite_element
+   use thud_finite_element_options, only: check_finite_element, finite_element_groups, finite_element_type, &
+      get_finite_element_fields
    use thud_force_history, only: force_history_type
    use thud_hollow_sphere, only: get_hollow_sphere_fields, hollow_sphere_type, solve_hollow_sphere
    use thud_hunt_crossley, only: check_hunt_crossley, get_hunt_crossley_fields, hunt_crossley_type, solve_hunt_crossley
@@ -11,16 +14,17 @@ module thud_source_model
       solve_measured_modes
    use thud_modal_ball, only: solve_modal_ball
    use thud_modal_ball_options, only: check_modal_ball, get_modal_ball_fields, modal_ball_type
+   use thud_motion, only: motion_type
    use thud_sampling, only: sampling_type
    use thud_text, only: join_quoted, quoted
    implicit none (type, external)
    private
 
-   public :: check_model, get_model_fields, model_names, model_options_type, solve_model
+   public :: check_model, get_model_fields, get_owner, model_names, model_options_type, solve_model
 
    !> Names of the models; the options of each stand in the namelist group of its name.
-   character(len=24), parameter :: model_names(4) = [character(len=24) :: &
-      'hollow_sphere', 'modal_ball', 'measured_modes', 'hunt_crossley']
+   character(len=24), parameter :: model_names(5) = [character(len=24) :: &
+      'hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley']
 
    !> Options of every model.
    type :: model_options_type
@@ -28,6 +32,8 @@ module thud_source_model
       type(hollow_sphere_type) :: hollow_sphere
       !> The modes of the sphere.
       type(modal_ball_type) :: modal_ball
+      !> Finite elements.
+      type(finite_element_type) :: finite_element
       !> Measured modes.
       type(measured_modes_type) :: measured_modes
       !> Lumped source.
@@ -45,9 +51,22 @@ contains
 
       fields = [get_hollow_sphere_fields(options%hollow_sphere), &
          get_modal_ball_fields(options%modal_ball), &
+         get_finite_element_fields(options%finite_element), &
          get_measured_modes_fields(options%measured_modes), &
          get_hunt_crossley_fields(options%hunt_crossley)]
    end function get_model_fields
+
+   !> Model that a group of options belongs to.
+   pure elemental function get_owner(group) result(model)
+      !> Namelist group.
+      character(len=*), intent(in) :: group
+      !> The model, blank for a group that every model uses.
+      character(len=24) :: model
+
+      model = ''
+      if (any(model_names == group)) model = group
+      if (any(finite_element_groups == group)) model = 'finite_element'
+   end function get_owner
 
    !> Complains about options of the chosen model that do not fit each other.
    subroutine check_model(model, options, ball, error)
@@ -63,6 +82,8 @@ contains
       select case (model)
       case ('modal_ball')
          call check_modal_ball(options%modal_ball, error)
+      case ('finite_element')
+         call check_finite_element(options%finite_element, ball, error)
       case ('measured_modes')
          call check_measured_modes(options%measured_modes, ball, error)
       case ('hunt_crossley')
@@ -74,7 +95,7 @@ contains
    end subroutine check_model
 
    !> Force history of one drop by the chosen model.
-   subroutine solve_model(model, options, ball, drop, sampling, history, error)
+   subroutine solve_model(model, options, ball, drop, sampling, history, motion, error)
       !> Name of the model.
       character(len=*), intent(in) :: model
       !> Options of every model.
@@ -87,6 +108,8 @@ contains
       type(sampling_type), intent(in) :: sampling
       !> The history.
       type(force_history_type), intent(out) :: history
+      !> Snapshots of the deformed ball, of models that have some.
+      type(motion_type), intent(out) :: motion
       !> The model failed.
       type(error_type), allocatable, intent(out) :: error
 
@@ -95,6 +118,8 @@ contains
          call solve_hollow_sphere(ball, drop, options%hollow_sphere, sampling, history, error)
       case ('modal_ball')
          call solve_modal_ball(ball, drop, options%modal_ball, sampling, history, error)
+      case ('finite_element')
+         call solve_finite_element(ball, drop, options%finite_element, sampling, history, motion, error)
       case ('measured_modes')
          call solve_measured_modes(drop, options%measured_modes, sampling, history, error)
       case ('hunt_crossley')

@@ -5,10 +5,11 @@ module thud_source_limits
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_text, only: join_quoted, quoted
+   use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
 
-   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits
+   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, recorded_band
    public :: criterion_count, source_limits_type, source_names
 
    !> Heavy/soft impact sources with limits in the standards.
@@ -21,6 +22,10 @@ module thud_source_limits
    !> The standards ask for a single peak without defining one; ripples of a few percent do not
    !> make a second impact.
    real(wp), parameter :: peak_prominence = 0.1_wp
+
+   !> Upper edge of the band that force plates are read in, Hz (paper section 3); the standards' limits
+   !> end at 707 Hz.
+   real(wp), parameter :: recorded_band = 1250.0_wp
 
    !> Smallest and largest conforming values of one source.
    type :: source_limits_type
@@ -147,17 +152,21 @@ contains
       met = criterion%value >= criterion%lower .and. criterion%value <= criterion%upper
    end function conforms
 
-   !> Number of peaks of a force: maxima with a drop on both sides, see `peak_prominence`.
-   pure function get_peak_count(force) result(peak_count)
+   !> Number of peaks of a force, as far as it is recorded: maxima with a drop on both sides, see
+   !> `peak_prominence` and `recorded_band`.
+   function get_peak_count(whole_force, sample_rate) result(peak_count)
       !> Force, N, that starts and ends at zero: [n_sample].
-      real(wp), intent(in) :: force(:)
+      real(wp), intent(in) :: whole_force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
       !> Peaks.
       integer :: peak_count
-      real(wp) :: extreme, threshold
+      real(wp) :: extreme, threshold, force(size(whole_force))
       logical :: rising
       integer :: i
 
       peak_count = 0
+      call get_low_pass(whole_force, sample_rate, recorded_band, force)
       threshold = peak_prominence*maxval(force)
       extreme = 0.0_wp
       rising = .true.

@@ -34,6 +34,10 @@ module thud_force_history
       character(len=part_name_length), allocatable :: channel_name(:)
       !> Its values: [n_sample, n_channel].
       real(wp), allocatable :: channel(:, :)
+      !> Names, with units, of numbers that the model chose or found: [n_fact].
+      character(len=part_name_length), allocatable :: fact_name(:)
+      !> These numbers: [n_fact].
+      real(wp), allocatable :: fact(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Time from first touch to release, s.
@@ -73,6 +77,7 @@ contains
       allocate (history%deflection(n_sample), history%velocity(n_sample), history%elastic_force(n_sample), &
          history%floor_force(n_sample), source=0.0_wp)
       allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
+      allocate (history%fact_name(0), history%fact(0))
    end function new_force_history
 
 end module thud_force_history

@@ -1,0 +1,157 @@
+!> Files of the finite elements: free modes, and snapshots of an impact.
+module thud_mesh_files
+   use thud_file, only: text_file_type
+   use thud_free_modes, only: free_modes_type
+   use thud_kinds, only: wp
+   use thud_motion, only: motion_type
+   use thud_text, only: fixed, newline, to_text
+   use thud_vtu, only: biquadratic_quadrilateral, get_pvd, get_vtu, quadrilateral
+   implicit none (type, external)
+   private
+
+   public :: estimate_motion_bytes, get_frame_name, get_modes_files, get_motion_files, modes_names, motion_names
+
+   !> Files of free modes.
+   character(len=9), parameter :: modes_names(2) = [character(len=9) :: 'modes.csv', 'modes.vtu']
+
+   !> Files of an impact beside its snapshots.
+   character(len=12), parameter :: motion_names(2) = [character(len=12) :: 'motion.pvd', 'pressure.csv']
+
+contains
+
+   !> Table and shapes of free modes.
+   subroutine get_modes_files(modes, files)
+      !> The modes.
+      type(free_modes_type), intent(in) :: modes
+      !> The files: [2].
+      type(text_file_type), intent(out) :: files(:)
+      character(len=48) :: name(size(modes%frequency))
+      real(wp) :: vector(2, size(modes%mesh%r), size(modes%frequency))
+      integer :: i
+
+      files%name = modes_names
+      files(1)%content = 'mode,harmonic,frequency_Hz,pole_participation'//newline &
+         //'rigid,1,'//to_text(modes%rigid_frequency)//',1'//newline
+      do i = 1, size(modes%frequency)
+         files(1)%content = files(1)%content//to_text(i)//','//to_text(modes%harmonic(i))//',' &
+            //to_text(modes%frequency(i))//','//to_text(modes%participation(i))//newline
+         name(i) = 'mode '//to_text(i)//', '//trim(fixed(modes%frequency(i), 3))//' Hz'
+         vector(:, :, i) = reshape(modes%shape(:, :, :, i), [2, size(modes%mesh%r)])
+      end do
+      call get_vtu(get_points(modes%mesh%r, modes%mesh%z), get_cells(modes%mesh%n_polar, modes%mesh%n_radial, 2), &
+         biquadratic_quadrilateral, name, vector, [character(len=1) ::], reshape([real(wp) ::], [size(modes%mesh%r), 0]), &
+         files(2)%content)
+   end subroutine get_modes_files
+
+   !> Name of the file of a snapshot.
+   pure function get_frame_name(i) result(name)
+      !> Number of the snapshot.
+      integer, intent(in) :: i
+      !> The name.
+      character(len=16) :: name
+
+      write (name, '("motion_", i5.5, ".vtu")') i
+   end function get_frame_name
+
+   !> Bytes that the files of the snapshots will take, about.
+   pure function estimate_motion_bytes(n_polar, n_radial, n_frame) result(bytes)
+      !> Elements from pole to pole.
+      integer, intent(in) :: n_polar
+      !> Elements through the wall.
+      integer, intent(in) :: n_radial
+      !> Snapshots.
+      integer, intent(in) :: n_frame
+      !> The bytes.
+      real(wp) :: bytes
+
+      ! Three vectors and two scalars a node; four corners, an offset and a type an element.
+      bytes = real(n_frame, wp)*(2000 + 88*real((n_polar + 1)*(n_radial + 1), wp) + 41*real(n_polar*n_radial, wp))
+   end function estimate_motion_bytes
+
+   !> Snapshots, their list, and the pressures on the floor.
+   subroutine get_motion_files(motion, files)
+      !> The snapshots.
+      type(motion_type), intent(in) :: motion
+      !> The files: [n_frame + 2].
+      type(text_file_type), intent(out) :: files(:)
+      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), pressure(size(vector, 2), 1)
+      integer :: i, n_polar, n_radial
+
+      n_polar = ubound(motion%start, 1)
+      n_radial = ubound(motion%start, 2)
+      do i = 1, motion%n_frame
+         files(i)%name = get_frame_name(i)
+         vector(:, :, 1) = get_points(motion%position(:, :, 1, i) - motion%start(:, :, 1), &
+            motion%position(:, :, 2, i) - motion%start(:, :, 2))
+         vector(:, :, 2) = get_points(motion%velocity(:, :, 1, i), motion%velocity(:, :, 2, i))
+         pressure = 0.0_wp
+         pressure(size(pressure, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
+         call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), get_cells(n_polar, n_radial, 1), &
+            quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, ['contact_pressure'], pressure, &
+            files(i)%content)
+      end do
+      files(motion%n_frame + 1:)%name = motion_names
+      call get_pvd(files(:motion%n_frame)%name, motion%time(:motion%n_frame), files(motion%n_frame + 1)%content)
+      call get_pressure_csv(motion, files(motion%n_frame + 2)%content)
+   end subroutine get_motion_files
+
+   !> Pressures on the floor, one line for each snapshot and node that touches it.
+   subroutine get_pressure_csv(motion, text)
+      !> The snapshots.
+      type(motion_type), intent(in) :: motion
+      !> Text of `pressure.csv`.
+      character(len=:), allocatable, intent(out) :: text
+      integer :: i, j
+
+      text = 'time_s,radius_m,pressure_Pa'//newline
+      do i = 1, motion%n_frame
+         do j = 0, ubound(motion%contact_pressure, 1)
+            if (.not. motion%contact_pressure(j, i) > 0.0_wp) cycle
+            text = text//to_text(motion%time(i))//','//to_text(motion%position(j, ubound(motion%position, 2), 1, i))//',' &
+               //to_text(motion%contact_pressure(j, i))//newline
+         end do
+      end do
+   end subroutine get_pressure_csv
+
+   !> Nodes one after the other, those of a ring side by side.
+   pure function get_points(r, z) result(point)
+      !> First component: [n_line, n_ring].
+      real(wp), intent(in) :: r(:, :)
+      !> Second component: the same shape.
+      real(wp), intent(in) :: z(:, :)
+      !> The components: [2, n_line*n_ring].
+      real(wp) :: point(2, size(r))
+
+      point(1, :) = reshape(r, [size(r)])
+      point(2, :) = reshape(z, [size(z)])
+   end function get_points
+
+   !> Nodes of the elements, around each of them as VTK has them.
+   pure function get_cells(n_polar, n_radial, order) result(cell)
+      !> Elements from pole to pole.
+      integer, intent(in) :: n_polar
+      !> Elements through the wall.
+      integer, intent(in) :: n_radial
+      !> Order of the elements.
+      integer, intent(in) :: order
+      !> Numbers of the nodes: [4 or 9, n_element].
+      integer :: cell((order + 1)**2, n_polar*n_radial)
+      integer :: i, j, line, first
+
+      line = order*n_polar + 1
+      do i = 1, n_radial
+         do j = 1, n_polar
+            first = 1 + order*(j - 1) + line*order*(i - 1)
+            associate (corners => [first, first + order*line, first + order*line + order, first + order])
+               if (order == 1) then
+                  cell(:, j + n_polar*(i - 1)) = corners
+               else
+                  cell(:, j + n_polar*(i - 1)) = [corners, first + line, first + 2*line + 1, first + line + 2, first + 1, &
+                     first + line + 1]
+               end if
+            end associate
+         end do
+      end do
+   end function get_cells
+
+end module thud_mesh_files

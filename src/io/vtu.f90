@@ -1,0 +1,119 @@
+!> Unstructured grids as ParaView and VTK read them: VTU files with appended raw data, and the
+!> PVD files that put them in the order of time.
+module thud_vtu
+   use, intrinsic :: iso_c_binding, only: c_int64_t, c_int8_t
+   use thud_kinds, only: wp
+   use thud_text, only: newline, to_text
+   implicit none (type, external)
+   private
+
+   public :: biquadratic_quadrilateral, get_pvd, get_vtu, quadrilateral
+
+   !> Types of cells: four and nine nodes.
+   integer, parameter :: quadrilateral = 9, biquadratic_quadrilateral = 28
+
+contains
+
+   !> A grid with vectors and scalars at its points. The plane of r and z is that of x and y.
+   subroutine get_vtu(point, cell, cell_type, vector_name, vector, scalar_name, scalar, text)
+      !> Positions r and z of the points, m: [2, n_point].
+      real(wp), intent(in) :: point(:, :)
+      !> Points of each cell, from 1: [n_corner, n_cell].
+      integer, intent(in) :: cell(:, :)
+      !> Type of all cells.
+      integer, intent(in) :: cell_type
+      !> Names of the vectors: [n_vector].
+      character(len=*), intent(in) :: vector_name(:)
+      !> Components r and z of the vectors: [2, n_point, n_vector].
+      real(wp), intent(in) :: vector(:, :, :)
+      !> Names of the scalars: [n_scalar].
+      character(len=*), intent(in) :: scalar_name(:)
+      !> The scalars: [n_point, n_scalar].
+      real(wp), intent(in) :: scalar(:, :)
+      !> Content of the file.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: data
+      integer :: i, n_cell
+
+      n_cell = size(cell, 2)
+      data = ''
+      text = '<?xml version="1.0"?>'//newline &
+         //'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">'//newline &
+         //'<UnstructuredGrid><Piece NumberOfPoints="'//to_text(size(point, 2))//'" NumberOfCells="'//to_text(n_cell)//'">' &
+         //newline//'<Points>'//newline
+      call add_array('Points', 'Float64', 3, get_bytes(in_space(point)), text, data)
+      text = text//'</Points>'//newline//'<Cells>'//newline
+      call add_array('connectivity', 'Int64', 1, transfer(int(cell - 1, c_int64_t), [0_c_int8_t]), text, data)
+      call add_array('offsets', 'Int64', 1, transfer(int([(i*size(cell, 1), i=1, n_cell)], c_int64_t), [0_c_int8_t]), text, data)
+      call add_array('types', 'UInt8', 1, [(int(cell_type, c_int8_t), i=1, n_cell)], text, data)
+      text = text//'</Cells>'//newline//'<PointData>'//newline
+      do i = 1, size(vector_name)
+         call add_array(trim(vector_name(i)), 'Float64', 3, get_bytes(in_space(vector(:, :, i))), text, data)
+      end do
+      do i = 1, size(scalar_name)
+         call add_array(trim(scalar_name(i)), 'Float64', 1, get_bytes(scalar(:, i)), text, data)
+      end do
+      text = text//'</PointData>'//newline//'</Piece></UnstructuredGrid>'//newline//'<AppendedData encoding="raw">_'//data &
+         //'</AppendedData>'//newline//'</VTKFile>'//newline
+   end subroutine get_vtu
+
+   !> Announces an array in the head and adds its bytes to the data.
+   subroutine add_array(name, type, n_component, bytes, text, data)
+      !> Name of the array.
+      character(len=*), intent(in) :: name
+      !> Type of its numbers.
+      character(len=*), intent(in) :: type
+      !> Numbers of each point or cell.
+      integer, intent(in) :: n_component
+      !> The numbers: [n_byte].
+      integer(c_int8_t), intent(in) :: bytes(:)
+      !> Head of the file.
+      character(len=:), allocatable, intent(inout) :: text
+      !> Data of the file.
+      character(len=:), allocatable, intent(inout) :: data
+
+      text = text//'<DataArray type="'//type//'" Name="'//name//'" NumberOfComponents="'//to_text(n_component) &
+         //'" format="appended" offset="'//to_text(len(data))//'"/>'//newline
+      data = data//transfer([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes], repeat(' ', 8 + size(bytes)))
+   end subroutine add_array
+
+   !> The bytes of numbers.
+   pure function get_bytes(numbers) result(bytes)
+      !> The numbers: [n].
+      real(wp), intent(in) :: numbers(:)
+      !> Their bytes: [8*n].
+      integer(c_int8_t) :: bytes(8*size(numbers))
+
+      bytes = transfer(numbers, bytes)
+   end function get_bytes
+
+   !> Vectors of the plane in space.
+   pure function in_space(plane) result(space)
+      !> Components r and z: [2, n].
+      real(wp), intent(in) :: plane(:, :)
+      !> Components r, z and 0, one vector after the other: [3*n].
+      real(wp) :: space(3*size(plane, 2))
+
+      space = 0.0_wp
+      space(1::3) = plane(1, :)
+      space(2::3) = plane(2, :)
+   end function in_space
+
+   !> A list of files in the order of time.
+   subroutine get_pvd(name, time, text)
+      !> Names of the files: [n].
+      character(len=*), intent(in) :: name(:)
+      !> Their times, s: [n].
+      real(wp), intent(in) :: time(:)
+      !> Content of the file.
+      character(len=:), allocatable, intent(out) :: text
+      integer :: i
+
+      text = '<?xml version="1.0"?>'//newline//'<VTKFile type="Collection" version="1.0">'//newline//'<Collection>'//newline
+      do i = 1, size(name)
+         text = text//'<DataSet timestep="'//to_text(time(i))//'" file="'//trim(name(i))//'"/>'//newline
+      end do
+      text = text//'</Collection>'//newline//'</VTKFile>'//newline
+   end subroutine get_pvd
+
+end module thud_vtu
