@@ -18,15 +18,19 @@ from thud.case import (
     Drop,
     Levels,
     Limits,
+    Modes,
     Sampling,
     read_case,
     write_case,
 )
 from thud.errors import InputError, NumericalError, ThudError
+from thud.free_modes import FreeModes, free_modes, loss_factors
 from thud.impact import Impact, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
-from thud.models import HollowSphere, HuntCrossley, MeasuredModes, ModalBall
+from thud.models import FiniteElement, HollowSphere, HuntCrossley, MeasuredModes, ModalBall
+from thud.motion import Motion
 from thud.recording import Recording
+from thud.results import read_results
 
 __version__ = version()
 
@@ -37,6 +41,8 @@ __all__ = [
     "Conformity",
     "Criterion",
     "Drop",
+    "FiniteElement",
+    "FreeModes",
     "HollowSphere",
     "HuntCrossley",
     "Impact",
@@ -45,14 +51,19 @@ __all__ = [
     "Limits",
     "MeasuredModes",
     "ModalBall",
+    "Modes",
+    "Motion",
     "NumericalError",
     "Recording",
     "Sampling",
     "ThudError",
     "force_exposure_levels",
+    "free_modes",
     "get_bands",
     "judge",
+    "loss_factors",
     "read_case",
+    "read_results",
     "solve",
     "solve_case",
     "write_case",
@@ -60,7 +71,13 @@ __all__ = [
 
 
 # What needs matplotlib or plotly is imported when it is first asked for: they take their time.
-_LATE = {"plot": None, "comparison": None, "compare": "comparison", "read_all": "comparison"}
+_LATE = {
+    "plot": None,
+    "mesh_plot": None,
+    "comparison": None,
+    "compare": "comparison",
+    "read_all": "comparison",
+}
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import f90nml
@@ -12,7 +12,7 @@ import numpy as np
 from thud._library import call, door, text
 from thud.checks import replace_file, require_kind
 from thud.errors import InputError
-from thud.models import LISTS, MODELS, HollowSphere, ModelOptions
+from thud.models import LISTS, MODELS, FiniteElement, HollowSphere, ModelOptions, group_of
 
 if TYPE_CHECKING:
     from typing import Self
@@ -120,6 +120,23 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class Modes:
+    """Free modes that are asked for.
+
+    Attributes
+    ----------
+    count : int
+        Number of elastic modes.
+    radial_elements, polar_elements : int
+        Elements through the wall and from pole to pole (group ``&mesh``).
+    """
+
+    count: int = 6
+    radial_elements: int = FiniteElement.radial_elements
+    polar_elements: int = FiniteElement.polar_elements
+
+
+@dataclass(frozen=True)
 class Case:
     """Everything that one run needs.
 
@@ -127,8 +144,10 @@ class Case:
     ----------
     name : str
         Name of the case, also of its output directory.
-    model : HollowSphere, ModalBall, MeasuredModes or HuntCrossley
-        The source model, by its options.
+    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley or None
+        The source model, by its options; None where no impact is asked for.
+    modes : Modes or None
+        The free modes that are asked for.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -136,10 +155,11 @@ class Case:
     name: str = "python"
     ball: Ball = field(default_factory=Ball)
     drop: Drop = field(default_factory=Drop)
-    model: ModelOptions = field(default_factory=HollowSphere)
+    model: ModelOptions | None = field(default_factory=HollowSphere)
     sampling: Sampling = field(default_factory=Sampling)
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
+    modes: Modes | None = None
 
     def to_namelist(self) -> f90nml.Namelist:
         """Return the case as a namelist with every key.
@@ -149,16 +169,33 @@ class Case:
         InputError
             Where a value is neither a number nor text, nor a list of numbers where one is due.
         """
-        groups = {group: getattr(self, group) for group in _GROUPS}
         for group, kind in _GROUPS.items():
-            require_kind(group, groups[group], kind)
-        require_kind("model", self.model, ModelOptions)
-        groups[self.model.name] = self.model
-        name = _plain("case", "name", self.name)
-        namelist = f90nml.Namelist({"case": {"name": name}, "model": {"name": self.model.name}})
+            require_kind(group, getattr(self, group), kind)
+        require_kind("model", self.model, ModelOptions | None)
+        require_kind("modes", self.modes, Modes | None)
+        groups: dict[str, dict[str, object]] = {
+            "case": {"name": self.name},
+            "ball": vars(self.ball),
+        }
+        if self.modes:
+            groups["modes"] = {"count": self.modes.count}
+            groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
+        if self.model:
+            groups["model"] = {"name": self.model.name}
+            groups |= {group: vars(getattr(self, group)) for group in _GROUPS}
+            for option in fields(self.model):
+                values = groups.setdefault(group_of(self.model.name, option), {})
+                value = getattr(self.model, option.name)
+                if values.setdefault(option.name, value) != value:
+                    message = (
+                        f"&mesh: {option.name} = {value} of the model is not that of the modes, "
+                        f"{values[option.name]}; allowed: one mesh for both"
+                    )
+                    raise InputError(message)
+        namelist = f90nml.Namelist()
         for group, options in groups.items():
-            values = {key: _plain(group, key, value) for key, value in vars(options).items()}
-            namelist[group] = {key: value for key, value in values.items() if value != []}
+            plain = {key: _plain(group, key, value) for key, value in options.items()}
+            namelist[group] = {key: value for key, value in plain.items() if value != []}
         return namelist
 
     @classmethod
@@ -167,17 +204,22 @@ class Case:
         groups = {
             group: kind(**namelist[group]) for group, kind in _GROUPS.items() if group in namelist
         }
-        model = namelist.get("model", {}).get("name", HollowSphere.name)
-        options = dict(namelist.get(model, {}))
-        for key, default in MODELS[model]().__dict__.items():
-            if isinstance(default, tuple) and key in options:
-                entries = options[key]
-                options[key] = tuple(entries) if isinstance(entries, list) else (entries,)
-        return cls(
-            name=namelist.get("case", {}).get("name", cls.name),
-            model=MODELS[model](**options),
-            **groups,
-        )
+        model = modes = None
+        if "modes" in namelist:
+            modes = Modes(**namelist["modes"], **namelist.get("mesh", {}))
+        if "model" in namelist or not modes:
+            name = namelist.get("model", {}).get("name", HollowSphere.name)
+            options = {}
+            for option in fields(MODELS[name]):
+                given = namelist.get(group_of(name, option), {})
+                if option.name in given:
+                    entries = given[option.name]
+                    if option.name in LISTS:
+                        entries = tuple(entries) if isinstance(entries, list) else (entries,)
+                    options[option.name] = entries
+            model = MODELS[name](**options)
+        title = namelist.get("case", {}).get("name", cls.name)
+        return cls(name=title, model=model, modes=modes, **groups)
 
 
 _GROUPS: dict[str, type[Any]] = {
@@ -187,6 +229,9 @@ _GROUPS: dict[str, type[Any]] = {
     "levels": Levels,
     "limits": Limits,
 }
+
+# Keys of the mesh, which free modes and finite elements share.
+_MESH = ("radial_elements", "polar_elements")
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
@@ -252,5 +297,5 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
         Where the file cannot be written.
     """
     content = case_text(case)
-    call(door.count_samples, content)
+    call(door.get_sizes, content)
     replace_file(path, content)

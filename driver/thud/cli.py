@@ -84,6 +84,9 @@ def _parser() -> argparse.ArgumentParser:
         "-q", "--quiet", action="store_true", help="show nothing but errors and remarks"
     )
     run.add_argument("--no-figures", action="store_true", help="results only")
+    run.add_argument(
+        "--animation", action="store_true", help="also motion.gif, of cases with snapshots"
+    )
 
     compare = commands.add_parser("compare", help="models and recordings of one drop on one page")
     compare.set_defaults(command=_compare)
@@ -149,19 +152,29 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     # The library pads its answer with blanks; a directory of the user's may end with them.
     folder = Path(output or os.fsdecode(directory.rstrip()))
     if not options.no_figures:
-        impact = thud.solve_case(case)
-        name = case.name.replace("_", " ")
-        source = case.limits.source
-        _draw(
-            folder,
-            {
-                "force": lambda: thud.plot.force_history({name: impact}, force=None),
-                "levels": lambda: thud.plot.levels({name: impact}, source=source),
-            },
-        )
+        _draw(folder, _case_figures(case, folder))
+    if options.animation:
+        thud.mesh_plot.animate(thud.read_results(folder), folder / "motion.gif")
     if not options.quiet:
         tqdm.write(f"{text(table)}\n  Results: {folder}\n")
     return bool(conforming)
+
+
+def _case_figures(case: thud.Case, folder: Path) -> dict[str, Callable[[], Figure]]:
+    """Return the figures of a case whose results are in a directory."""
+    figures: dict[str, Callable[[], Figure]] = {}
+    if case.modes:
+        modes = thud.free_modes(case.ball, **vars(case.modes))
+        figures["modes"] = lambda: thud.mesh_plot.mode_shapes(modes)
+    if case.model:
+        impact = thud.read_results(folder)
+        name = case.name.replace("_", " ")
+        source = case.limits.source
+        figures["force"] = lambda: thud.plot.force_history({name: impact}, force=None)
+        figures["levels"] = lambda: thud.plot.levels({name: impact}, source=source)
+        if impact.motion:
+            figures["motion"] = lambda: thud.mesh_plot.motion(impact)
+    return figures
 
 
 def _require_output(output: str | None) -> None:

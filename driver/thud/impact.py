@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ from thud.checks import require_kind
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
 from thud.models import new_model
+from thud.motion import Motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -40,6 +41,10 @@ class Impact:
         The parts that the model tells apart, N.
     channels : dict of str to ndarray, shape (n_sample,)
         Whatever else the model has to tell, such as the contact radius; the names end with units.
+    facts : dict of str to float
+        Numbers that the model chose or found, such as the bulk modulus; SI units.
+    motion : Motion or None
+        Snapshots of the deformed ball, of models that have some.
     sample_rate : float
         Samples per second, Hz.
     impact_velocity : float
@@ -68,6 +73,8 @@ class Impact:
     floor_force: NDArray[np.float64]
     parts: dict[str, NDArray[np.float64]]
     channels: dict[str, NDArray[np.float64]]
+    facts: dict[str, float]
+    motion: Motion | None
     sample_rate: float
     impact_velocity: float
     contact_time: float
@@ -96,7 +103,7 @@ class Impact:
 
     def _part(self, name: str) -> NDArray[np.float64]:
         if name not in self.parts:
-            message = f"the model {self.case.model.name!r} has no {name}; it has {list(self.parts)}"
+            message = f"this model has no {name}; it has {list(self.parts)}"
             raise AttributeError(message)
         return self.parts[name]
 
@@ -143,7 +150,7 @@ class Impact:
             self.levels(force=kind),
             self.contact_time,
             self.restitution,
-            peak_count(self.force(kind)),
+            peak_count(self.force(kind), self.sample_rate),
             self.case.ball.mass,
             self.case.drop.height,
             source or self.case.limits.source,
@@ -168,7 +175,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         By default the rubber ball of the paper, from 1 m.
     model
         ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
-        one), ``"measured_modes"`` or ``"hunt_crossley"``.
+        one), ``"finite_element"``, ``"measured_modes"`` or ``"hunt_crossley"``.
     sample_rate
         Samples per second, Hz.
     duration
@@ -176,8 +183,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     **options
-        Options of the model, see `HollowSphere`, `ModalBall`, `MeasuredModes` and
-        `HuntCrossley`; such as ``momentum_flux="retarding"``.
+        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`
+        and `HuntCrossley`; such as ``momentum_flux="retarding"``.
 
     Returns
     -------
@@ -204,20 +211,42 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
 def solve_case(case: Case) -> Impact:
     """Compute the impact of a case; see `solve`."""
     require_kind("case", case, Case)
-    content = case_text(case)
-    (n_sample,) = call(door.count_samples, content)
-    deflection, velocity, part, channel, elastic, floor, part_names, channel_names, scalars = call(
-        door.solve, content, n_sample
-    )
+    if case.model is None:
+        message = "&model is missing; allowed: a case with a source model"
+        raise InputError(message)
+    # Modes beside the impact have their own function.
+    content = case_text(replace(case, modes=None))
+    sizes = call(door.get_sizes, content)
+    found = call(door.solve, content, *sizes)
+    deflection, velocity, part, channel, elastic, floor, fact = found[:7]
+    part_names, channel_names, fact_names, scalars = found[7:11]
     sample_rate = float(scalars[0])
     return Impact(
         case,
-        np.arange(n_sample) / sample_rate,
+        np.arange(sizes[0]) / sample_rate,
         deflection,
         velocity,
         elastic,
         floor,
         dict(zip(words(part_names), part.T, strict=False)),
         dict(zip(words(channel_names), channel.T, strict=False)),
+        dict(zip(words(fact_names), map(float, fact), strict=False)),
+        _motion(*found[11:]),
         *map(float, scalars),
+    )
+
+
+def _motion(count: int, time: NDArray[np.float64], *fields: NDArray[np.float64]) -> Motion | None:
+    """Return the snapshots of the library, which have room for more."""
+    if not count:
+        return None
+    start, position, velocity, contact_pressure, cavity_pressure = fields
+    # Snapshots first, then nodes from pole to pole, nodes through the wall, r and z.
+    return Motion(
+        time[:count],
+        start,
+        np.moveaxis(position, -1, 0)[:count],
+        np.moveaxis(velocity, -1, 0)[:count],
+        contact_pressure.T[:count],
+        cavity_pressure[:count],
     )

@@ -144,19 +144,40 @@ def force_exposure_levels(
     return result
 
 
-def peak_count(force: ArrayLike) -> int:
+def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
+    """Return what a force plate records of a force: the part below 1.25 kHz (paper, section 3).
+
+    Parameters
+    ----------
+    force : ndarray, shape (n_sample,)
+        Force, N, that starts and ends at zero.
+    sample_rate : float
+        Samples per second, Hz.
+
+    Returns
+    -------
+    ndarray, shape (n_sample,)
+        The part, N.
+    """
+    recorded: NDArray[np.float64] = level_door.record_force(force, sample_rate)
+    return recorded
+
+
+def peak_count(force: ArrayLike, sample_rate: float) -> int:
     """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
 
     Parameters
     ----------
     force : array_like, shape (n_sample,)
-        Force, N, that starts and ends at zero.
+        Force, N, that starts and ends at zero; the part below 1.25 kHz counts.
+    sample_rate : float
+        Samples per second, Hz.
     """
     record = _record(force)
     if not np.isfinite(record).all():
         message = "force holds a value that is not finite; allowed: real numbers, N"
         raise InputError(message)
-    return int(level_door.count_peaks(record))
+    return int(level_door.count_peaks(record, _number("sample_rate", sample_rate)))
 
 
 def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards

@@ -1,15 +1,16 @@
-"""Source models by their options: dataclasses that mirror the namelist group of each model."""
+"""Source models by their options: dataclasses that mirror the namelist groups of each model."""
 
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
 from thud.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from typing import Any
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,67 @@ class ModalBall:
     static_families: Sequence[int] = ()
 
 
+def _key(group: str, default: Any) -> Any:  # noqa: ANN401 - a field of any type
+    """Return a field that stands in a namelist group of its own name."""
+    return field(default=default, metadata={"group": group})
+
+
+@dataclass(frozen=True)
+class FiniteElement:
+    """Options of the transient finite-element model.
+
+    Attributes
+    ----------
+    bounces : int
+        Contacts to be followed.
+    flight_before, flight_after : float
+        Free flight before first touch and after the last contact, s.
+    step_safety : float
+        Part of the limit of stability that a step uses.
+    radial_elements, polar_elements : int
+        Elements through the wall and from pole to pole (group ``&mesh``).
+    law : str
+        ``"neo_hookean"`` or ``"mooney_rivlin"`` (group ``&material``, as all up to `prony_time`).
+    mooney_share : float
+        Part of the shear modulus with the second invariant, of a Mooney-Rivlin solid.
+    bulk_ratio : float
+        Most bulk modulus over shear modulus; less where Poisson's ratio says so.
+    viscosity : str
+        ``"none"``, ``"kelvin_voigt"``, ``"constant_loss"`` (10 to 1000 Hz) or ``"prony"``.
+    loss_factor : float
+        Loss factor, of Kelvin-Voigt at `loss_frequency`.
+    loss_frequency : float
+        Frequency at which the ball's modulus of elasticity is the storage modulus, Hz.
+    prony_share, prony_time : sequence of float
+        Moduli over the long-term modulus, and relaxation times, s.
+    treatment : str
+        ``"impulse"`` or ``"penalty"``: how the floor holds the ball (group ``&contact``).
+    penalty_ratio : float
+        Stiffness of the penalty over that of the elements above it, per area.
+    snapshot_interval : float
+        Time between snapshots of the deformed ball, s; 0 for none (group ``&output``).
+    """
+
+    name: ClassVar[str] = "finite_element"
+    bounces: int = 1
+    flight_before: float = 0.0
+    flight_after: float = 0.0
+    step_safety: float = 0.85
+    radial_elements: int = _key("mesh", 8)
+    polar_elements: int = _key("mesh", 64)
+    law: str = _key("material", "neo_hookean")
+    mooney_share: float = _key("material", 0.2)
+    bulk_ratio: float = _key("material", 200.0)
+    viscosity: str = _key("material", "kelvin_voigt")
+    loss_factor: float = _key("material", 0.2)
+    loss_frequency: float = _key("material", 74.0)
+    prony_share: Sequence[float] = _key("material", ())
+    prony_time: Sequence[float] = _key("material", ())
+    treatment: str = _key("contact", "impulse")
+    penalty_ratio: float = _key("contact", 3.0)
+    snapshot_interval: float = _key("output", 1e-3)
+
+
 @dataclass(frozen=True)
 class MeasuredModes:
     """Options of the model of measured modes (after Park et al. 2010), one entry per mode.
@@ -113,10 +175,10 @@ class HuntCrossley:
     restitution: float = 0.0
 
 
-ModelOptions = HollowSphere | ModalBall | MeasuredModes | HuntCrossley
+ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley
 
 MODELS: dict[str, type[ModelOptions]] = {
-    kind.name: kind for kind in (HollowSphere, ModalBall, MeasuredModes, HuntCrossley)
+    kind.name: kind for kind in (HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley)
 }
 
 # The keys that take lists of numbers.
@@ -126,6 +188,12 @@ LISTS = {
     for option in dataclasses.fields(kind)
     if option.default == ()
 }
+
+
+def group_of(model: str, option: dataclasses.Field[Any]) -> str:
+    """Return the namelist group of an option of a model."""
+    group: str = option.metadata.get("group", model)
+    return group
 
 
 def new_model(name: str, options: dict[str, object]) -> ModelOptions:

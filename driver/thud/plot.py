@@ -18,7 +18,7 @@ from matplotlib.ticker import NullLocator
 from thud.checks import replace_file, require_kind
 from thud.errors import InputError
 from thud.impact import FORCES, Impact
-from thud.levels import get_bands, octave_limits
+from thud.levels import get_bands, octave_limits, record_force
 from thud.recording import Recording
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
+    from numpy.typing import NDArray
 
 Curve = TypeVar("Curve", bound=Impact | Recording)
 
@@ -35,10 +36,12 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 WIDTH = 3.5
 SIZE = 8
+# Part of the largest force above which what a force plate does not record is drawn too.
+UNSEEN = 0.02
 FORMATS = ("pdf", "png", "svg")
 
 
-def _axes(height: float) -> tuple[Figure, Axes]:
+def empty_axes(height: float) -> tuple[Figure, Axes]:
     """Return an empty figure of column width and its axes."""
     figure = Figure(figsize=(WIDTH, height), dpi=300, layout="constrained")
     return figure, _dress(figure.add_subplot())
@@ -69,7 +72,7 @@ def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") 
     Figure
         Time in ms, force in kN.
     """
-    figure, axes = _axes(2.5)
+    figure, axes = empty_axes(2.5)
     _draw_forces(axes, impacts, force)
     _add_legend(axes, impacts)
     return figure
@@ -99,7 +102,7 @@ def levels(
     Figure
         Octave bands in Hz, force exposure level in dB re 1 N.
     """
-    figure, axes = _axes(2.8)
+    figure, axes = empty_axes(2.8)
     _draw_tolerance(axes, source)
     place = np.arange(5)
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
@@ -132,14 +135,28 @@ def _literal(label: str) -> str:
 
 
 def _draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
-    """Draw forces against time, with their axes."""
+    """Draw forces against time as they are recorded; thin and grey, all that is computed."""
+    most = 0.0
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
-        axes.plot(1e3 * impact.time, 1e-3 * impact.force(kind), label=name, **_style(i))
+        whole = impact.force(kind)
+        recorded = record_force(whole, impact.sample_rate)
+        if np.abs(whole - recorded).max() > UNSEEN * whole.max():
+            axes.plot(1e3 * impact.time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1)
+        axes.plot(1e3 * impact.time, 1e-3 * recorded, label=name, **_style(i))
+        most = max(most, recorded.max())
     axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
-    axes.set_ylim(bottom=0)
+    axes.set_ylim(0, 1.1e-3 * most)
     axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
     name = force.capitalize() if force else "Blocked"
     axes.set_ylabel(f"{name} force, kN", fontsize=SIZE)
+
+
+def add_curves(
+    axes: Axes, curves: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+) -> None:
+    """Draw curves of x and y by their names, told apart by colour and line."""
+    for i, (name, (x, y)) in enumerate(curves.items()):
+        axes.plot(x, y, label=_literal(name), **_style(i))
 
 
 def _add_legend(axes: Axes, impacts: Mapping[str, Impact]) -> None:
@@ -179,7 +196,7 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
     Figure
         Octave bands in Hz, change of the force exposure level in dB.
     """
-    figure, axes = _axes(2.8)
+    figure, axes = empty_axes(2.8)
     axes.axhline(0, color="0.45", linewidth=0.8)
     base = reference.levels(force=force)
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):

@@ -224,7 +224,8 @@ contains
       history%peak_floor_force = history%peak_force
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)
-         history%fact_name = [character(len=24) :: 'shear_modulus_Pa', 'bulk_modulus_Pa', 'shortest_step_s', 'deepest_sink_m']
+         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'shortest_step', 'deepest_sink']
+         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 'm']
          history%fact = [material%shear_modulus, material%bulk_modulus, run%shortest_interval, run%sink]
       end associate
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)

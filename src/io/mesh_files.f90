@@ -74,7 +74,7 @@ contains
       type(motion_type), intent(in) :: motion
       !> The files: [n_frame + 2].
       type(text_file_type), intent(out) :: files(:)
-      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), pressure(size(vector, 2), 1)
+      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), pressure(size(vector, 2), 2)
       integer :: i, n_polar, n_radial
 
       n_polar = ubound(motion%start, 1)
@@ -86,9 +86,10 @@ contains
          vector(:, :, 2) = get_points(motion%velocity(:, :, 1, i), motion%velocity(:, :, 2, i))
          pressure = 0.0_wp
          pressure(size(pressure, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
+         pressure(:n_polar + 1, 2) = motion%cavity_pressure(i)
          call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), get_cells(n_polar, n_radial, 1), &
-            quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, ['contact_pressure'], pressure, &
-            files(i)%content)
+            quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
+            [character(len=16) :: 'contact_pressure', 'cavity_pressure'], pressure, files(i)%content)
       end do
       files(motion%n_frame + 1:)%name = motion_names
       call get_pvd(files(:motion%n_frame)%name, motion%time(:motion%n_frame), files(motion%n_frame + 1)%content)

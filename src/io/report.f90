@@ -131,7 +131,7 @@ contains
          //line('impact_velocity', to_text(history%impact_velocity), 'm/s') &
          //line('restitution', to_text(history%restitution), '') &
          //line('impulse', to_text(history%impulse), 'N s, of the floor force') &
-         //fact_lines(history)//'/'//newline//newline//'&checks'//newline &
+         //'/'//newline//newline//fact_group(history)//'&checks'//newline &
          //line('impulse_residual', to_text(history%impulse_residual), 'of the change of momentum') &
          //line('energy_residual', to_text(history%energy_residual), 'of the energy at first touch') &
          //'/'//newline//newline//'&verdict'//newline &
@@ -186,34 +186,35 @@ contains
          //' to the limits of the '//trim(case%source)//' (levels: '//trim(case%level_method)//').'//newline
    end function get_table
 
-   !> The same as lines of a namelist.
-   function fact_lines(history) result(lines)
+   !> Numbers that the model chose or found as a namelist group.
+   function fact_group(history) result(text)
       !> The history.
       type(force_history_type), intent(in) :: history
-      !> One line each.
-      character(len=:), allocatable :: lines
+      !> The group; empty where there are none.
+      character(len=:), allocatable :: text
       integer :: i
 
-      lines = ''
+      text = ''
+      if (size(history%fact) == 0) return
+      text = '&facts'//newline
       do i = 1, size(history%fact_name)
-         lines = lines//line(trim(history%fact_name(i)), to_text(history%fact(i)), '')
+         text = text//line(trim(history%fact_name(i)), to_text(history%fact(i)), trim(history%fact_unit(i)))
       end do
-   end function fact_lines
+      text = text//'/'//newline//newline
+   end function fact_group
 
-   !> Numbers that the model chose or found.
+   !> The same as rows of the table.
    function facts(history) result(rows)
       !> The history.
       type(force_history_type), intent(in) :: history
       !> One row each.
       character(len=:), allocatable :: rows
-      integer :: i, cut
+      integer :: i
 
       rows = ''
       do i = 1, size(history%fact_name)
-         ! Names end with their units.
-         cut = index(trim(history%fact_name(i)), '_', back=.true.)
-         rows = rows//'  '//padded(spaced(history%fact_name(i)(:cut - 1)), 20)//right(short_scientific(history%fact(i)), 10) &
-            //' '//trim(history%fact_name(i)(cut + 1:))//newline
+         rows = rows//'  '//padded(spaced(history%fact_name(i)), 20)//right(short_scientific(history%fact(i)), 10)//' ' &
+            //trim(history%fact_unit(i))//newline
       end do
    end function facts
 

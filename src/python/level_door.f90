@@ -5,11 +5,12 @@ module thud_level_door
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, source_limits_type
+      get_source_limits, recorded_band, source_limits_type
+   use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
 
-   public :: count_peaks, force_exposure, get_bands, judge
+   public :: count_peaks, force_exposure, get_bands, judge, record_force
 
 contains
 
@@ -72,18 +73,36 @@ contains
    end subroutine force_exposure
 
    !> Number of peaks of a force.
-   subroutine count_peaks(force, n_sample, n_peak)
+   subroutine count_peaks(force, n_sample, sample_rate, n_peak)
       !f2py threadsafe
       !f2py integer, intent(hide), depend(force) :: n_sample = len(force)
       !> Number of samples.
       integer, intent(in) :: n_sample
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(n_sample)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
       !> Number of peaks.
       integer, intent(out) :: n_peak
 
-      n_peak = get_peak_count(force)
+      n_peak = get_peak_count(force, sample_rate)
    end subroutine count_peaks
+
+   !> A force as force plates record it: the part below 1.25 kHz.
+   subroutine record_force(force, n_sample, sample_rate, recorded)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(force) :: n_sample = len(force)
+      !> Number of samples.
+      integer, intent(in) :: n_sample
+      !> Force, N: [n_sample].
+      real(wp), intent(in) :: force(n_sample)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> The part, N: [n_sample].
+      real(wp), intent(out) :: recorded(n_sample)
+
+      call get_low_pass(force, sample_rate, recorded_band, recorded)
+   end subroutine record_force
 
    !> Criteria of a source and which of them are met.
    subroutine judge(source, levels, contact_time, restitution, n_peak, mass, drop_height, names, units, value, lower, &

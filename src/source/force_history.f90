@@ -34,8 +34,10 @@ module thud_force_history
       character(len=part_name_length), allocatable :: channel_name(:)
       !> Its values: [n_sample, n_channel].
       real(wp), allocatable :: channel(:, :)
-      !> Names, with units, of numbers that the model chose or found: [n_fact].
+      !> Names of numbers that the model chose or found: [n_fact].
       character(len=part_name_length), allocatable :: fact_name(:)
+      !> Their SI units: [n_fact].
+      character(len=8), allocatable :: fact_unit(:)
       !> These numbers: [n_fact].
       real(wp), allocatable :: fact(:)
       !> Velocity towards the floor at first touch, m/s.
@@ -77,7 +79,7 @@ contains
       allocate (history%deflection(n_sample), history%velocity(n_sample), history%elastic_force(n_sample), &
          history%floor_force(n_sample), source=0.0_wp)
       allocate (history%part(n_sample, size(part_name)), source=0.0_wp)
-      allocate (history%fact_name(0), history%fact(0))
+      allocate (history%fact_name(0), history%fact_unit(0), history%fact(0))
    end function new_force_history
 
 end module thud_force_history

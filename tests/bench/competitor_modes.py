@@ -106,32 +106,26 @@ def scikit_fem_modes(mesh: skfem.MeshQuad2 | None = None) -> np.ndarray:
         stiffness[free][:, free], MODES + 1, mass[free][:, free],
         sigma=SHIFT, return_eigenvectors=False,
     )  # fmt: skip
-    return np.sqrt(np.sort(values)[1:]) / (2 * np.pi)
+    frequencies: np.ndarray = np.sqrt(np.sort(values)[1:]) / (2 * np.pi)
+    return frequencies
 
 
 def calculix_deck() -> str:
     """Return the input of CalculiX: CAX8R elements and a *FREQUENCY step."""
-    numbers = np.zeros((2 * ALONG + 1, 2 * THROUGH + 1), dtype=int)
-    exists = np.ones_like(numbers, dtype=bool)
-    exists[1::2, 1::2] = False
-    numbers[exists] = np.arange(1, exists.sum() + 1)
-    angle, radius = np.meshgrid(
-        np.linspace(0, np.pi, 2 * ALONG + 1),
-        np.linspace(RADIUS - WALL, RADIUS, 2 * THROUGH + 1),
-        indexing="ij",
-    )
-    places = place(angle[exists], radius[exists]).T
+    points = [(i, j) for i in range(2 * ALONG + 1) for j in range(2 * THROUGH + 1)]
+    numbers = {p: k for k, p in enumerate((p for p in points if p[0] * p[1] % 2 == 0), 1)}
+    i, j = np.array(list(numbers)).T
+    places = place(np.pi * i / (2 * ALONG), RADIUS - WALL + WALL * j / (2 * THROUGH)).T
     # The eight nodes in steps of angle and radius: counterclockwise, corners first.
     steps = ((0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0))
     corners = [(i, j) for i in range(0, 2 * ALONG, 2) for j in range(0, 2 * THROUGH, 2)]
     elements = [[numbers[i + a, j + b] for a, b in steps] for i, j in corners]
-    axis = numbers[[0, -1]].ravel()
     return "\n".join([
         "*NODE, NSET=ALL",
         *(f"{i}, {x:.12g}, {y:.12g}" for i, (x, y) in enumerate(places, 1)),
         "*ELEMENT, TYPE=CAX8R, ELSET=BALL",
         *(f"{i}, " + ", ".join(map(str, e)) for i, e in enumerate(elements, 1)),
-        "*NSET, NSET=AXIS", *(f"{i}," for i in axis),
+        "*NSET, NSET=AXIS", *(f"{i}," for i, (x, _) in enumerate(places, 1) if x == 0),
         "*BOUNDARY", "AXIS, 1, 1",
         "*MATERIAL, NAME=RUBBER",
         "*ELASTIC", f"{MODULUS}, {POISSON}",
@@ -154,6 +148,8 @@ def calculix_modes(directory: Path) -> np.ndarray:
     ------
     CompetitorMissingError
         If ccx is not installed.
+    RuntimeError
+        If ccx prints too few modes.
     """
     executable = shutil.which("ccx")
     if executable is None:
@@ -169,4 +165,7 @@ def calculix_modes(directory: Path) -> np.ndarray:
         fields = line.split()
         if len(fields) == 5 and fields[0].isdigit():
             frequencies.append(float(fields[3]))
+    if len(frequencies) <= MODES:
+        message = f"ccx printed {len(frequencies)} modes"
+        raise RuntimeError(message)
     return np.array(frequencies[1 : MODES + 1])

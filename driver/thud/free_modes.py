@@ -1,0 +1,128 @@
+"""Free modes of the ball by finite elements (paper, figure 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._library import call, door
+from thud.case import Ball, Case, Modes, case_text
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.models import FiniteElement
+
+
+@dataclass(frozen=True, eq=False)
+class FreeModes:
+    """Axisymmetric elastic modes without twist, in ascending order; the rigid motion is left out.
+
+    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
+    components are the distance from the axis and the height.
+
+    Attributes
+    ----------
+    ball : Ball
+        The ball.
+    frequency : ndarray, shape (n_mode,)
+        Natural frequencies of the elastic modes, Hz.
+    harmonic : ndarray, shape (n_mode,)
+        Order of the Legendre polynomial that dominates at the outer surface.
+    participation : ndarray, shape (n_mode,)
+        Mass of the ball times the squared amplitude of the lowest point at unit modal mass: how
+        strongly a contact there drives the mode; 1 for the rigid motion.
+    rigid_frequency : float
+        What the frequency of the rigid motion came out as, Hz; exactly it is 0.
+    start : ndarray, shape (n_line, n_ring, 2)
+        Nodes around the centre of the ball, m; nine to an element.
+    shape : ndarray, shape (n_mode, n_line, n_ring, 2)
+        Displacements, the largest of length 1, the lowest point moving upwards.
+    """
+
+    ball: Ball
+    frequency: NDArray[np.float64]
+    harmonic: NDArray[np.int32]
+    participation: NDArray[np.float64]
+    rigid_frequency: float
+    start: NDArray[np.float64]
+    shape: NDArray[np.float64]
+
+
+def free_modes(
+    ball: Ball | None = None,
+    count: int = Modes.count,
+    *,
+    radial_elements: int = Modes.radial_elements,
+    polar_elements: int = Modes.polar_elements,
+) -> FreeModes:
+    """Compute the lowest free modes of a ball.
+
+    Parameters
+    ----------
+    ball
+        By default the rubber ball of the paper. Poisson's ratio may be 1/2.
+    count
+        Number of elastic modes; the rigid motion does not count.
+    radial_elements, polar_elements
+        Elements through the wall and from pole to pole.
+
+    Returns
+    -------
+    FreeModes
+        Frequencies, harmonics, participations and shapes.
+
+    Raises
+    ------
+    InputError
+        Names group, key, value and allowed range.
+    NumericalError
+        Where the modes cannot be computed.
+    """
+    case = Case(
+        ball=Ball() if ball is None else ball,
+        model=None,
+        modes=Modes(count, radial_elements, polar_elements),
+    )
+    content = case_text(case)
+    call(door.get_sizes, content)
+    size = (2 * polar_elements + 1, 2 * radial_elements + 1)
+    frequency, harmonic, participation, rigid_frequency, r, z, shape = call(
+        door.free_modes, content, count, *size
+    )
+    return FreeModes(
+        case.ball,
+        frequency,
+        harmonic,
+        participation,
+        float(rigid_frequency),
+        np.stack((r, z), axis=-1),
+        np.moveaxis(shape, (-1, 0), (0, -1)),
+    )
+
+
+def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float64]:
+    """Return the loss factor of the material of a finite-element model in shear.
+
+    Parameters
+    ----------
+    model
+        The model; its options of the group ``&material`` count.
+    frequency : array_like, shape (n,)
+        Frequencies, Hz.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Loss modulus over storage modulus.
+    """
+    wanted = np.ascontiguousarray(frequency, dtype=np.float64)
+    if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
+        message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
+        raise InputError(message)
+    (factors,) = call(door.loss_factors, case_text(Case(model=model)), wanted)
+    result: NDArray[np.float64] = factors
+    return result

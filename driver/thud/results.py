@@ -1,0 +1,115 @@
+"""Results of a run, read back from its directory."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import f90nml
+import numpy as np
+
+from thud.case import Case
+from thud.errors import InputError
+from thud.impact import Impact
+from thud.motion import Motion
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+SCALARS = (
+    *("impact_velocity", "contact_time", "peak_force", "peak_floor_force", "max_deflection"),
+    *("restitution", "impulse"),
+)
+
+
+def read_results(directory: str | os.PathLike[str]) -> Impact:
+    """Read the impact that ``thud`` or ``thud-driver run`` has written, every digit of it.
+
+    Parameters
+    ----------
+    directory
+        Directory of the results of one case.
+
+    Returns
+    -------
+    Impact
+        The same as `solve_case` gives.
+
+    Raises
+    ------
+    InputError
+        Where the directory does not hold the results of an impact.
+    """
+    folder = Path(directory)
+    try:
+        case = Case.from_namelist(f90nml.read(folder / "effective.nml"))
+        numbers = f90nml.read(folder / "summary.nml")
+        force = _table(folder / "force.csv")
+        channels = folder / "channels.csv"
+        found = _table(channels) if channels.exists() else {}
+        motion = _read_motion(folder, case) if (folder / "motion.pvd").exists() else None
+    except (OSError, ValueError, KeyError) as error:
+        message = f"{folder}: cannot be read ({error}); allowed: the results of an impact"
+        raise InputError(message) from error
+    time = force.pop("time_s")
+    named = {name.rsplit("_", 1)[0]: values for name, values in force.items()}
+    return Impact(
+        case,
+        time,
+        named.pop("deflection"),
+        force["velocity_m_per_s"],
+        named.pop("elastic_force"),
+        named.pop("floor_force"),
+        {name: values for name, values in named.items() if name != "velocity_m_per"},
+        {name: values for name, values in found.items() if name != "time_s"},
+        dict(numbers.get("facts", {})),
+        motion,
+        case.sampling.sample_rate,
+        *(numbers["summary"][name] for name in SCALARS),
+        numbers["checks"]["impulse_residual"],
+        numbers["checks"]["energy_residual"],
+    )
+
+
+def _table(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of a file by their names."""
+    with path.open(encoding="utf-8") as file:
+        names = file.readline().strip().split(",")
+        return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
+
+
+def _read_motion(folder: Path, case: Case) -> Motion:
+    """Return the snapshots that a list of VTU files names."""
+    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', (folder / "motion.pvd").read_text())
+    size = (case.model.radial_elements + 1, case.model.polar_elements + 1)  # type: ignore[union-attr]
+    shots = [_read_vtu(folder / name) for _, name in entries]
+    plane = {
+        name: np.stack([shot[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for shot in shots])
+        for name in ("Points", "displacement", "velocity")
+    }
+    return Motion(
+        np.array([float(time) for time, _ in entries]),
+        plane["Points"][0] - plane["displacement"][0],
+        plane["Points"],
+        plane["velocity"],
+        np.stack([shot["contact_pressure"].reshape(size)[-1] for shot in shots]),
+        np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
+    )
+
+
+def _read_vtu(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Return the arrays of real numbers of a VTU file with appended raw data."""
+    content = path.read_bytes()
+    head, data = content.split(b'<AppendedData encoding="raw">_', 1)
+    arrays = {}
+    for kind, name, offset in re.findall(
+        r'<DataArray type="(\w+)" Name="(.*?)" .*?offset="(\d+)"', head.decode()
+    ):
+        at = int(offset)
+        if kind == "Float64":
+            size = int(np.frombuffer(data, "<u8", 1, at)[0])
+            arrays[name] = np.frombuffer(data, "<f8", size // 8, at + 8)
+    return arrays
