@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +16,7 @@ import thud
 from thud._library import call, door, text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from matplotlib.figure import Figure
 
@@ -146,7 +148,10 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
-    directory, table, remark, conforming = call(door.run, os.fsencode(path), os.fsencode(output))
+    with _interruptible():
+        directory, table, remark, conforming = call(
+            door.run, os.fsencode(path), os.fsencode(output), not options.quiet
+        )
     if text(remark):
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     # The library pads its answer with blanks; a directory of the user's may end with them.
@@ -158,6 +163,19 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     if not options.quiet:
         tqdm.write(f"{text(table)}\n  Results: {folder}\n")
     return bool(conforming)
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let an interrupt end the process at once; Python would wait for the end of the library's call.
+
+    Nothing is lost: results are written as a whole, or not at all.
+    """
+    usual = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
 
 
 def _case_figures(case: thud.Case, folder: Path) -> dict[str, Callable[[], Figure]]:

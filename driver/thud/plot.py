@@ -125,7 +125,8 @@ def _curves(impacts: Mapping[str, Curve], force: str | None) -> Iterator[tuple[s
             yield _literal(name), impact, force
         else:
             prefix = f"{name}, " if len(impacts) > 1 else ""
-            for kind in FORCES:
+            same = np.array_equal(impact.force("elastic"), impact.force("floor"))
+            for kind in FORCES[1:] if same else FORCES:
                 yield _literal(f"{prefix}{kind} force"), impact, kind
 
 
@@ -143,9 +144,9 @@ def _draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) ->
         if np.abs(whole - recorded).max() > UNSEEN * whole.max():
             axes.plot(1e3 * impact.time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1)
         axes.plot(1e3 * impact.time, 1e-3 * recorded, label=name, **_style(i))
-        most = max(most, recorded.max())
+        most = max(most, whole.max())
     axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
-    axes.set_ylim(0, 1.1e-3 * most)
+    axes.set_ylim(0, 1.05e-3 * most)
     axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
     name = force.capitalize() if force else "Blocked"
     axes.set_ylabel(f"{name} force, kN", fontsize=SIZE)

@@ -15,6 +15,7 @@ module thud_finite_element
    use thud_kinds, only: wp
    use thud_material, only: material_type, new_material
    use thud_motion, only: motion_type, new_motion, take_snapshot
+   use thud_progress, only: report_progress
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -168,6 +169,7 @@ contains
       if (size(motion%time) > 0) stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
+         if (mod(i - 1, look_interval) == 0) call report_progress(time, sampling%duration)
          if (mod(i - 1, look_interval) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
          if (n_step > most_steps) then
             error = numerical_error(trim(place(time))//' the step must be less than '//to_text(interval/most_steps) &

@@ -4,6 +4,7 @@ module thud_command_line
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
    use thud_posix, only: ignore_signals, print_text, standard_error, standard_output
+   use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
    use thud_text, only: newline, quoted
    implicit none (type, external)
@@ -47,7 +48,9 @@ contains
       else if (allocated(request%information)) then
          call say(standard_output, request%information, exit_code)
       else
+         if (.not. request%quiet) call begin_progress()
          call run_case(request%case_file, request%output, outcome, error)
+         call end_progress()
          if (allocated(error)) then
             call say(standard_error, 'thud: '//error%message, exit_code)
             exit_code = error%code

@@ -35,7 +35,7 @@ contains
       do i = 1, size(modes%frequency)
          files(1)%content = files(1)%content//to_text(i)//','//to_text(modes%harmonic(i))//',' &
             //to_text(modes%frequency(i))//','//to_text(modes%participation(i))//newline
-         name(i) = 'mode '//to_text(i)//', '//trim(fixed(modes%frequency(i), 3))//' Hz'
+         name(i) = 'mode '//to_text(i)//', '//fixed(modes%frequency(i), 3)//' Hz'
          vector(:, :, i) = reshape(modes%shape(:, :, :, i), [2, size(modes%mesh%r)])
       end do
       call get_vtu(get_points(modes%mesh%r, modes%mesh%z), get_cells(modes%mesh%n_polar, modes%mesh%n_radial, 2), &

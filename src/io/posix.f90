@@ -6,7 +6,7 @@ module thud_posix
    private
 
    public :: directory_exists, get_free_bytes, ignore_signals, is_empty_directory, lock_directory, lock_type
-   public :: make_directory, print_text
+   public :: is_terminal, make_directory, print_text
    public :: remove_file, rename_file, standard_error, standard_output, unlock_directory
 
    !> Descriptors of the process.
@@ -42,6 +42,13 @@ module thud_posix
          integer(c_long), intent(out) :: buffer(*)
          integer(c_int) :: status
       end function c_statvfs
+
+      function c_isatty(descriptor) bind(c, name='isatty') result(yes)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: yes
+      end function c_isatty
 
       function c_mkdir(path, mode) bind(c, name='mkdir') result(status)
          import :: c_char, c_int
@@ -207,6 +214,16 @@ contains
       status = c_closedir(directory)
       if (status /= 0) entries = -1
    end function count_entries
+
+   !> Whether somebody sees what is written.
+   function is_terminal(descriptor) result(yes)
+      !> `standard_output` or `standard_error`.
+      integer, intent(in) :: descriptor
+      !> The descriptor is a terminal.
+      logical :: yes
+
+      yes = c_isatty(int(descriptor, c_int)) == 1
+   end function is_terminal
 
    !> Makes a directory and those above it.
    subroutine make_directory(path, done)

@@ -254,10 +254,10 @@ contains
 
       text = '  free modes     frequency   harmonic   participation'//newline &
          //'                       Hz                of the pole'//newline &
-         //'   rigid        '//right(trim(fixed(modes%rigid_frequency, 3)), 9)//right('1', 11)//right('1.000', 16)//newline
+         //'   rigid        '//right(fixed(modes%rigid_frequency, 3), 9)//right('1', 11)//right('1.000', 16)//newline
       do i = 1, size(modes%frequency)
-         text = text//right(to_text(i), 6)//right(trim(fixed(modes%frequency(i), 3)), 19) &
-            //right(to_text(modes%harmonic(i)), 11)//right(trim(fixed(modes%participation(i), 3)), 16)//newline
+         text = text//right(to_text(i), 6)//right(fixed(modes%frequency(i), 3), 19) &
+            //right(to_text(modes%harmonic(i)), 11)//right(fixed(modes%participation(i), 3), 16)//newline
       end do
    end function get_modes_table
 

@@ -11,6 +11,7 @@ module thud_door
    use thud_finite_element, only: get_frame_count
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
+   use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: compute_case, load_case, outcome_type, results_type, run_case
    use thud_sampling, only: get_sample_count
    implicit none (type, external)
@@ -305,11 +306,13 @@ contains
    end subroutine loss_factors
 
    !> Runs a namelist file as the executable does.
-   subroutine run(path, output, directory, table, remark, conforming, status, message)
+   subroutine run(path, output, progress, directory, table, remark, conforming, status, message)
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> Output directory, empty for the default.
       character(len=*), intent(in) :: output
+      !> 1 to show progress on a terminal.
+      integer, intent(in) :: progress
       !> Directory of the results.
       character(len=4096), intent(out) :: directory
       !> Table for the screen.
@@ -329,7 +332,9 @@ contains
       table = ''
       remark = ''
       conforming = 0
+      if (progress == 1) call begin_progress()
       call run_case(path, output, outcome, error)
+      call end_progress()
       call tell(error, status, message)
       if (status /= 0) return
       directory = outcome%directory

@@ -1,0 +1,45 @@
+!> Reports on long work. The library only tells how far it is; who runs it may show that.
+module thud_progress
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: report_progress, set_progress_handler
+
+   abstract interface
+      !> Shows how far the work is.
+      subroutine handler(done, whole)
+         import :: wp
+         implicit none (type, external)
+         !> Time that has been computed, s.
+         real(wp), intent(in) :: done
+         !> Time that there is to compute at most, s.
+         real(wp), intent(in) :: whole
+      end subroutine handler
+   end interface
+
+   !> Who shows it; nobody unless the executable or the driver asks for it.
+   procedure(handler), pointer :: show => null()
+
+contains
+
+   !> Says who shows the progress from now on.
+   subroutine set_progress_handler(new_handler)
+      !> The procedure; without it, nobody.
+      procedure(handler), optional :: new_handler
+
+      show => null()
+      if (present(new_handler)) show => new_handler
+   end subroutine set_progress_handler
+
+   !> Tells how far the work is.
+   subroutine report_progress(done, whole)
+      !> Time that has been computed, s.
+      real(wp), intent(in) :: done
+      !> Time that there is to compute at most, s.
+      real(wp), intent(in) :: whole
+
+      if (associated(show)) call show(done, whole)
+   end subroutine report_progress
+
+end module thud_progress

@@ -1,0 +1,56 @@
+!> Progress of long work as a line on the screen, where there is one.
+module thud_progress_line
+   use, intrinsic :: iso_fortran_env, only: int64
+   use thud_kinds, only: wp
+   use thud_posix, only: is_terminal, print_text, standard_error
+   use thud_progress, only: set_progress_handler
+   use thud_text, only: fixed
+   implicit none (type, external)
+   private
+
+   public :: begin_progress, end_progress
+
+   !> Time without a line, at the beginning and between two lines, s.
+   real(wp), parameter :: patience = 0.5_wp
+
+   !> Clock at the beginning or at the latest line, and its ticks in a second.
+   integer(int64) :: latest = 0, rate = 1
+
+   !> A line is on the screen.
+   logical :: shown = .false.
+
+contains
+
+   !> Shows progress from now on.
+   subroutine begin_progress()
+      if (.not. is_terminal(standard_error)) return
+      call system_clock(latest, rate)
+      shown = .false.
+      call set_progress_handler(print_line)
+   end subroutine begin_progress
+
+   !> Shows no progress any more, and wipes the line.
+   subroutine end_progress()
+      logical :: done
+
+      call set_progress_handler()
+      if (shown) call print_text(standard_error, achar(13)//repeat(' ', 60)//achar(13), done)
+      shown = .false.
+   end subroutine end_progress
+
+   !> Prints the line.
+   subroutine print_line(done, whole)
+      !> Time that has been computed, s.
+      real(wp), intent(in) :: done
+      !> Time that there is to compute at most, s.
+      real(wp), intent(in) :: whole
+      integer(int64) :: now
+
+      call system_clock(now)
+      if (real(now - latest, wp) < patience*real(rate, wp)) return
+      latest = now
+      call print_text(standard_error, achar(13)//'thud: '//fixed(1.0e3_wp*done, 1)//' of at most ' &
+         //fixed(1.0e3_wp*whole, 1)//' ms computed', shown)
+   end subroutine print_line
+
+end module thud_progress_line
