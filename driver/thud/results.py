@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -101,15 +102,10 @@ def _read_motion(folder: Path, case: Case) -> Motion:
 
 
 def _read_vtu(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of real numbers of a VTU file with appended raw data."""
-    content = path.read_bytes()
-    head, data = content.split(b'<AppendedData encoding="raw">_', 1)
-    arrays = {}
-    for kind, name, offset in re.findall(
-        r'<DataArray type="(\w+)" Name="(.*?)" .*?offset="(\d+)"', head.decode()
-    ):
-        at = int(offset)
-        if kind == "Float64":
-            size = int(np.frombuffer(data, "<u8", 1, at)[0])
-            arrays[name] = np.frombuffer(data, "<f8", size // 8, at + 8)
-    return arrays
+    """Return the arrays of real numbers of a VTU file as thud writes it."""
+    arrays = re.findall(
+        r'<DataArray type="Float64" Name="(.*?)".*?>(.*?)</DataArray>',
+        path.read_text(encoding="ascii"),
+    )
+    # The length of the data stands before them, in eight bytes.
+    return {name: np.frombuffer(base64.b64decode(data), "<f8", offset=8) for name, data in arrays}

@@ -64,8 +64,8 @@ contains
       !> The bytes.
       real(wp) :: bytes
 
-      ! Three vectors and two scalars a node; four corners, an offset and a type an element.
-      bytes = real(n_frame, wp)*(2000 + 88*real((n_polar + 1)*(n_radial + 1), wp) + 41*real(n_polar*n_radial, wp))
+      ! Three vectors and two scalars a node; four corners, an offset and a type an element; in base 64.
+      bytes = real(n_frame, wp)*(2000 + 4*(88*real((n_polar + 1)*(n_radial + 1), wp) + 41*real(n_polar*n_radial, wp))/3)
    end function estimate_motion_bytes
 
    !> Snapshots, their list, and the pressures on the floor.

@@ -1,4 +1,4 @@
-!> Unstructured grids as ParaView and VTK read them: VTU files with appended raw data, and the
+!> Unstructured grids as ParaView and VTK read them: VTU files with data in base 64, and the
 !> PVD files that put them in the order of time.
 module thud_vtu
    use, intrinsic :: iso_c_binding, only: c_int64_t, c_int8_t
@@ -32,33 +32,30 @@ contains
       real(wp), intent(in) :: scalar(:, :)
       !> Content of the file.
       character(len=:), allocatable, intent(out) :: text
-      character(len=:), allocatable :: data
       integer :: i, n_cell
 
       n_cell = size(cell, 2)
-      data = ''
       text = '<?xml version="1.0"?>'//newline &
          //'<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">'//newline &
          //'<UnstructuredGrid><Piece NumberOfPoints="'//to_text(size(point, 2))//'" NumberOfCells="'//to_text(n_cell)//'">' &
          //newline//'<Points>'//newline
-      call add_array('Points', 'Float64', 3, get_bytes(in_space(point)), text, data)
+      call add_array('Points', 'Float64', 3, get_bytes(in_space(point)), text)
       text = text//'</Points>'//newline//'<Cells>'//newline
-      call add_array('connectivity', 'Int64', 1, transfer(int(cell - 1, c_int64_t), [0_c_int8_t]), text, data)
-      call add_array('offsets', 'Int64', 1, transfer(int([(i*size(cell, 1), i=1, n_cell)], c_int64_t), [0_c_int8_t]), text, data)
-      call add_array('types', 'UInt8', 1, [(int(cell_type, c_int8_t), i=1, n_cell)], text, data)
+      call add_array('connectivity', 'Int64', 1, transfer(int(cell - 1, c_int64_t), [0_c_int8_t]), text)
+      call add_array('offsets', 'Int64', 1, transfer(int([(i*size(cell, 1), i=1, n_cell)], c_int64_t), [0_c_int8_t]), text)
+      call add_array('types', 'UInt8', 1, [(int(cell_type, c_int8_t), i=1, n_cell)], text)
       text = text//'</Cells>'//newline//'<PointData>'//newline
       do i = 1, size(vector_name)
-         call add_array(trim(vector_name(i)), 'Float64', 3, get_bytes(in_space(vector(:, :, i))), text, data)
+         call add_array(trim(vector_name(i)), 'Float64', 3, get_bytes(in_space(vector(:, :, i))), text)
       end do
       do i = 1, size(scalar_name)
-         call add_array(trim(scalar_name(i)), 'Float64', 1, get_bytes(scalar(:, i)), text, data)
+         call add_array(trim(scalar_name(i)), 'Float64', 1, get_bytes(scalar(:, i)), text)
       end do
-      text = text//'</PointData>'//newline//'</Piece></UnstructuredGrid>'//newline//'<AppendedData encoding="raw">_'//data &
-         //'</AppendedData>'//newline//'</VTKFile>'//newline
+      text = text//'</PointData>'//newline//'</Piece></UnstructuredGrid>'//newline//'</VTKFile>'//newline
    end subroutine get_vtu
 
-   !> Announces an array in the head and adds its bytes to the data.
-   subroutine add_array(name, type, n_component, bytes, text, data)
+   !> Adds an array.
+   subroutine add_array(name, type, n_component, bytes, text)
       !> Name of the array.
       character(len=*), intent(in) :: name
       !> Type of its numbers.
@@ -67,15 +64,37 @@ contains
       integer, intent(in) :: n_component
       !> The numbers: [n_byte].
       integer(c_int8_t), intent(in) :: bytes(:)
-      !> Head of the file.
+      !> Content of the file.
       character(len=:), allocatable, intent(inout) :: text
-      !> Data of the file.
-      character(len=:), allocatable, intent(inout) :: data
 
+      ! The length of the data stands before them.
       text = text//'<DataArray type="'//type//'" Name="'//name//'" NumberOfComponents="'//to_text(n_component) &
-         //'" format="appended" offset="'//to_text(len(data))//'"/>'//newline
-      data = data//transfer([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes], repeat(' ', 8 + size(bytes)))
+         //'" format="binary">'//encode([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes])//'</DataArray>'//newline
    end subroutine add_array
+
+   !> Bytes in base 64 (RFC 4648).
+   pure function encode(bytes) result(text)
+      !> The bytes: [n].
+      integer(c_int8_t), intent(in) :: bytes(:)
+      !> Four letters for each three bytes, the last group filled up.
+      character(len=4*((size(bytes) + 2)/3)) :: text
+      character(len=*), parameter :: letters = 'ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/'
+      integer :: group, i, k, n, digit
+
+      n = size(bytes)
+      do i = 1, n, 3
+         group = 0
+         do k = i, i + 2
+            group = 256*group
+            if (k <= n) group = group + modulo(int(bytes(k)), 256)
+         end do
+         do k = 0, 3
+            digit = mod(group/64**(3 - k), 64) + 1
+            text(4*((i - 1)/3) + k + 1:4*((i - 1)/3) + k + 1) = letters(digit:digit)
+         end do
+      end do
+      if (mod(n, 3) > 0) text(len(text) - 2 + mod(n, 3):) = repeat('=', 3 - mod(n, 3))
+   end function encode
 
    !> The bytes of numbers.
    pure function get_bytes(numbers) result(bytes)
