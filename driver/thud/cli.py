@@ -167,7 +167,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Let an interrupt end the process at once; Python would wait for the end of the library's call.
+    """Let an interrupt end the process at once; Python would wait for the end of the call.
 
     Nothing is lost: results are written as a whole, or not at all.
     """

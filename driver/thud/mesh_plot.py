@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,9 +65,7 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
     for axes, frequency, harmonic, shape in zip(
         panels, modes.frequency, modes.harmonic, modes.shape, strict=False
     ):
-        _draw_section(
-            axes, modes.start + AMPLITUDE * radius * shape, np.hypot(*shape.T).T, scale
-        )
+        _draw_section(axes, modes.start + AMPLITUDE * radius * shape, np.hypot(*shape.T).T, scale)
         _draw_outline(axes, modes.start)
         axes.set_title(f"{frequency:.1f} Hz, n = {harmonic}", fontsize=SIZE, pad=2)
         axes.set_xlim(-0.05 * radius, 1.35 * radius)
@@ -223,7 +220,8 @@ def _draw_section(
     corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     a, b, c, d = (corner.ravel() for corner in corners)
     triangles = np.concatenate([np.stack((a, b, c), 1), np.stack((a, c, d), 1)])
-    mesh = Triangulation(*place.reshape(-1, 2).T, triangles)
+    r, z = place.reshape(-1, 2).T
+    mesh = Triangulation(r, z, triangles)
     axes.tripcolor(
         mesh, value.ravel(), shading="gouraud", cmap=COLOURS, norm=scale, rasterized=True
     )
@@ -242,8 +240,6 @@ def _draw_outline(axes: Axes, place: NDArray[np.float64]) -> None:
 def _add_colour_bar(figure: Figure, panels: Any, scale: Normalize, label: str) -> None:  # noqa: ANN401 - axes or an array of them
     """Add the scale of the colours below the panels."""
     colours = mpl.cm.ScalarMappable(scale, COLOURS)
-    bar = figure.colorbar(
-        colours, ax=panels, location="bottom", shrink=0.7, aspect=30, pad=0.02
-    )
+    bar = figure.colorbar(colours, ax=panels, location="bottom", shrink=0.7, aspect=30, pad=0.02)
     bar.set_label(label, fontsize=SIZE)
     bar.ax.tick_params(labelsize=SIZE)

@@ -178,7 +178,8 @@ class HuntCrossley:
 ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley
 
 MODELS: dict[str, type[ModelOptions]] = {
-    kind.name: kind for kind in (HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley)
+    kind.name: kind
+    for kind in (HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley)
 }
 
 # The keys that take lists of numbers.

@@ -68,10 +68,9 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         {name: values for name, values in found.items() if name != "time_s"},
         dict(numbers.get("facts", {})),
         motion,
-        case.sampling.sample_rate,
-        *(numbers["summary"][name] for name in SCALARS),
-        numbers["checks"]["impulse_residual"],
-        numbers["checks"]["energy_residual"],
+        sample_rate=case.sampling.sample_rate,
+        **{name: numbers["summary"][name] for name in SCALARS},
+        **numbers["checks"],
     )
 
 

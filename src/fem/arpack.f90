@@ -31,7 +31,8 @@ module thud_arpack
          integer, intent(in) :: n, nev, ncv, ldv, ldz, lworkl
          logical, intent(inout) :: select(ncv)
          real(wp), intent(in) :: sigma, tol
-         integer, intent(inout) :: iparam(7), ipntr(11), info
+         integer, intent(inout) :: info
+         integer, intent(inout) :: iparam(7), ipntr(11)
          real(wp), intent(inout) :: d(nev), z(ldz, nev), resid(n), v(ldv, ncv), workd(2*n), workl(lworkl)
       end subroutine dseupd
    end interface

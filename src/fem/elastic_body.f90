@@ -100,7 +100,8 @@ contains
       type(body_state_type), intent(out) :: state
       real(wp) :: f(body%mesh%n_polar, n_component, n_point), rate(body%mesh%n_polar, n_component, n_point)
       real(wp) :: stress(body%mesh%n_polar, n_component, n_point), cofactor(body%mesh%n_polar, n_component, n_point)
-      real(wp) :: jacobian(body%mesh%n_polar, n_point), volume
+      real(wp) :: volume
+      real(wp) :: jacobian(body%mesh%n_polar, n_point)
       integer :: i, k, n
 
       n = body%mesh%n_polar
@@ -122,8 +123,8 @@ contains
                   state%dissipation)
             end if
             do k = 1, size(material%branch_time)
-               call add_branch_stress(n, material%branch_modulus(k), material%branch_time(k), interval, keep, row%weight, f, &
-                  cofactor, jacobian, body%flow(:, :, :, k, i), stress, state%strain_energy, state%dissipation)
+               call add_branch_stress(n, material%branch_modulus(k), material%branch_time(k), interval, keep, row%weight, &
+                  f, cofactor, jacobian, body%flow(:, :, :, k, i), stress, state%strain_energy, state%dissipation)
             end do
             call add_nodal_forces(row, n, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
          end associate

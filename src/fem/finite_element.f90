@@ -195,7 +195,7 @@ contains
             call follow_contact(run, contacts, time, interval/n_step, history)
             call drift(run, interval/n_step)
          end do
-         if (contacts%n_over < options%bounces) cycle
+         if (contacts%n_over < options%bounces) cycle samples
          if (time > contacts%latest + max(contacts%quiet, options%flight_after)) exit samples
       end do samples
       if (contacts%n_over < options%bounces) then
@@ -235,11 +235,12 @@ contains
       call check_contact_samples(sampling, history%contact_time, error)
       if (allocated(error)) return
       if (.not. history%energy_residual <= most_energy_residual) then
-         error = numerical_error('&finite_element: the balance of energy misses by '//to_text(history%energy_residual) &
-            //' of the energy at first touch; allowed: up to '//to_text(most_energy_residual)//', a smaller step_safety helps')
+         error = numerical_error('&finite_element: the balance of energy misses by ' &
+            //to_text(history%energy_residual)//' of the energy at first touch; allowed: up to ' &
+            //to_text(most_energy_residual)//', a smaller step_safety helps')
       else if (run%sink > most_sink*ball%wall_thickness) then
-         error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink)//' mm into the floor; allowed: ' &
-            //'up to '//to_text(most_sink)//' of the wall, a higher penalty_ratio helps')
+         error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink) &
+            //' mm into the floor; allowed: up to '//to_text(most_sink)//' of the wall, a higher penalty_ratio helps')
       end if
    end subroutine finish
 
@@ -318,7 +319,8 @@ contains
       real(wp) :: residual
 
       if (run%state%failure == cavity_closed) then
-         error = numerical_error(trim(place(time))//' the cavity has no volume left; allowed: a lower height, a stiffer ball')
+         error = numerical_error(trim(place(time))//' the cavity has no volume left; ' &
+            //'allowed: a lower height, a stiffer ball')
       else if (run%state%failure /= no_failure) then
          error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
             //to_text(run%state%least_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')

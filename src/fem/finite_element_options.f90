@@ -14,7 +14,7 @@ module thud_finite_element_options
    public :: check_finite_element, finite_element_groups, finite_element_type, get_finite_element_fields
 
    !> Groups of the options.
-   character(len=*), parameter :: finite_element_groups(5) = [character(len=16) :: &
+   character(len=*), parameter :: finite_element_groups(*) = [character(len=16) :: &
       'finite_element', 'mesh', 'material', 'contact', 'output']
 
    !> Options of the model.

@@ -15,8 +15,8 @@ module thud_floor_contact
    implicit none (type, external)
    private
 
-   public :: contact_options_type, floor_contact_type, get_contact_fields, get_nodal_areas, get_penalty_forces, new_floor_contact, &
-      stop_at_floor
+   public :: contact_options_type, floor_contact_type, get_contact_fields, get_nodal_areas, get_penalty_forces, &
+      new_floor_contact, stop_at_floor
 
    !> What the group asks for.
    type :: contact_options_type

@@ -121,9 +121,11 @@ contains
       real(wp), allocatable, intent(out) :: vector(:, :)
       !> The method does not converge.
       type(error_type), allocatable, intent(out) :: error
+      integer, parameter :: n_parameter = 11
       real(wp), allocatable :: resid(:), basis(:, :), workd(:), workl(:), product(:)
       logical, allocatable :: select(:)
-      integer :: iparam(11), ipntr(11), ido, info, ncv, n, i
+      integer :: ido, info, ncv, n, i
+      integer :: iparam(n_parameter), ipntr(n_parameter)
 
       n = matrices%n
       ncv = min(n, max(2*count + 6, 20))

@@ -108,7 +108,9 @@ contains
          n_turn = first_turns
          associate (material => run%body%material, mesh => run%body%mesh)
             wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
-            width = min(mesh%r(mesh%n_polar/2, 1) - mesh%r(mesh%n_polar/2, 0), pi/real(mesh%n_polar, wp)*mesh%r(mesh%n_polar/2, 0))
+            associate (inner => mesh%r(mesh%n_polar/2, 0), next => mesh%r(mesh%n_polar/2, 1))
+               width = min(next - inner, pi/real(mesh%n_polar, wp)*inner)
+            end associate
          end associate
          n_step = max(least, ceiling(min(interval*wave/width, 1.0e8_wp)))
       end if

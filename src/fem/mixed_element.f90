@@ -42,7 +42,8 @@ contains
       real(wp), intent(out) :: mass(n_node, n_node)
       real(wp) :: strain(4*n_point, 2*n_node), shape(n_point, n_node), pressure(n_dilatation, n_dilatation)
       real(wp) :: point(n_line), weight(n_line), value(n_node), gradient(n_node, 2), jacobian(2, 2)
-      real(wp) :: divergence(2*n_node), hoop(n_node), determinant, radius, volume, root, basis(n_dilatation)
+      real(wp) :: determinant, radius, volume, root
+      real(wp) :: divergence(2*n_node), hoop(n_node), basis(n_dilatation)
       integer :: i, j, k, row, info
 
       call get_gauss_points(point, weight)

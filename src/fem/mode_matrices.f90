@@ -125,11 +125,13 @@ contains
       real(wp), intent(in) :: density
       !> Gets stiffness - shift*mass, mass and dilatations.
       type(mode_matrices_type), intent(inout) :: matrices
-      real(wp) :: distortion(2*n_node, 2*n_node), mass(n_node, n_node), inertia, volume
+      real(wp) :: volume
+      real(wp) :: distortion(2*n_node, 2*n_node), mass(n_node, n_node), inertia(2*n_node, 2*n_node)
       integer :: a, b, i, j, element, row, column
 
       allocate (matrices%factor(0:matrices%n_band, matrices%n), matrices%mass(0:matrices%n_band, matrices%n), source=0.0_wp)
       allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%place, 2)))
+      inertia = 0.0_wp
       element = 0
       do j = 0, ubound(mesh%r, 1) - 2, 2
          do i = 0, ubound(mesh%r, 2) - 2, 2
@@ -138,17 +140,17 @@ contains
                call get_mixed_element(reshape(transpose(mesh%r(j:j + 2, i:i + 2)), [n_node]), &
                   reshape(transpose(mesh%z(j:j + 2, i:i + 2)), [n_node]), shear_modulus, density, distortion, dilatation, &
                   mass)
+               inertia(1::2, 1::2) = mass
+               inertia(2::2, 2::2) = mass
                do b = 1, 2*n_node
                   do a = b, 2*n_node
                      row = max(place(a), place(b))
                      column = min(place(a), place(b))
                      if (row > matrices%n) cycle
-                     inertia = 0.0_wp
-                     if (mod(a - b, 2) == 0) inertia = mass((a + 1)/2, (b + 1)/2)
                      volume = dot_product(dilatation(:, a), dilatation(:, b))
                      matrices%factor(row - column, column) = matrices%factor(row - column, column) &
-                        + distortion(a, b) + matrices%bulk_modulus*volume - matrices%shift*inertia
-                     matrices%mass(row - column, column) = matrices%mass(row - column, column) + inertia
+                        + distortion(a, b) + matrices%bulk_modulus*volume - matrices%shift*inertia(a, b)
+                     matrices%mass(row - column, column) = matrices%mass(row - column, column) + inertia(a, b)
                   end do
                end do
             end associate

@@ -64,7 +64,8 @@ contains
       real(wp), allocatable, intent(out) :: time(:)
       !> A modulus would have to be negative.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), turn(n_branch), omega
+      real(wp) :: omega
+      real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), turn(n_branch)
       integer :: i, info
 
       allocate (share(n_branch))

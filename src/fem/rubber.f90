@@ -98,7 +98,8 @@ contains
       real(wp), intent(out) :: stress(n, n_component, n_point)
       !> Gets the strain energy added, J.
       real(wp), intent(inout) :: energy
-      real(wp) :: pressure(n), root(n), modulus, invariant, factor, total
+      real(wp) :: modulus, invariant, factor, total
+      real(wp) :: pressure(n), root(n)
       integer :: c, g, j
 
       pressure = -volume
@@ -146,7 +147,8 @@ contains
       real(wp), intent(inout) :: stress(n, n_component)
       !> Gets the energy added, J.
       real(wp), intent(inout) :: energy
-      real(wp) :: c(n_symmetric), first, second, scale, volumetric
+      real(wp) :: first, second, scale, volumetric
+      real(wp) :: c(n_symmetric)
       integer :: j
 
       !$omp simd private(c, first, second, scale, volumetric) reduction(+:energy)
@@ -245,7 +247,8 @@ contains
       real(wp), intent(inout) :: power
       real(wp), dimension(n) :: root, shrink, determinant
       real(wp), dimension(n, n_symmetric) :: c, half
-      real(wp) :: inverse(n_symmetric), trace, square, coupling, factor, scale
+      real(wp) :: trace, square, coupling, factor, scale
+      real(wp) :: inverse(n_symmetric)
       integer :: g, j, k
 
       do g = 1, n_point

@@ -61,13 +61,14 @@ contains
       !> above. Huge where there are no forces.
       real(wp), intent(out) :: growth
       real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
-      real(wp) :: mass(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2), step, thickness
+      real(wp) :: step, thickness
+      real(wp) :: mass(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2)
       type(body_state_type) :: state
       integer :: last, turn
 
       last = body%mesh%n_radial
       mass = spread(body%mass, 3, 2)
-      thickness = minval(hypot(body%mesh%r(:, 1:) - body%mesh%r(:, :last - 1), body%mesh%z(:, 1:) - body%mesh%z(:, :last - 1)))
+      thickness = body%mesh%z(0, 0) - body%mesh%z(0, 1)
       growth = huge(growth)
       call get_internal_forces(body, position, velocity, interval, .false., here, state)
       if (state%failure /= no_failure) return

@@ -88,7 +88,8 @@ contains
       logical :: used
 
       used = case%has_modes .and. any(groups_of_modes == group)
-      if (case%has_impact .and. group /= 'modes') used = used .or. any([character(len=24) :: '', case%model] == get_owner(group))
+      if (.not. case%has_impact .or. group == 'modes') return
+      used = used .or. get_owner(group) == '' .or. get_owner(group) == case%model
    end function is_used
 
    !> The keys that do something, without lists that have no entries.

@@ -26,7 +26,9 @@ contains
       !> The files: [2].
       type(text_file_type), intent(out) :: files(:)
       character(len=48) :: name(size(modes%frequency))
+      character(len=1) :: no_name(0)
       real(wp) :: vector(2, size(modes%mesh%r), size(modes%frequency))
+      real(wp) :: no_scalar(size(modes%mesh%r), 0)
       integer :: i
 
       files%name = modes_names
@@ -39,8 +41,7 @@ contains
          vector(:, :, i) = reshape(modes%shape(:, :, :, i), [2, size(modes%mesh%r)])
       end do
       call get_vtu(get_points(modes%mesh%r, modes%mesh%z), get_cells(modes%mesh%n_polar, modes%mesh%n_radial, 2), &
-         biquadratic_quadrilateral, name, vector, [character(len=1) ::], reshape([real(wp) ::], [size(modes%mesh%r), 0]), &
-         files(2)%content)
+         biquadratic_quadrilateral, name, vector, no_name, no_scalar, files(2)%content)
    end subroutine get_modes_files
 
    !> Name of the file of a snapshot.
@@ -87,8 +88,8 @@ contains
          pressure = 0.0_wp
          pressure(size(pressure, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
          pressure(:n_polar + 1, 2) = motion%cavity_pressure(i)
-         call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), get_cells(n_polar, n_radial, 1), &
-            quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
+         call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), &
+            get_cells(n_polar, n_radial, 1), quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
             [character(len=16) :: 'contact_pressure', 'cavity_pressure'], pressure, files(i)%content)
       end do
       files(motion%n_frame + 1:)%name = motion_names

@@ -1,6 +1,7 @@
 !> The few calls of the operating system that Fortran lacks (POSIX.1-2008).
 module thud_posix
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_intptr_t, c_long, c_null_char, c_null_ptr, c_ptr, &
+      c_size_t
    use thud_kinds, only: wp
    implicit none (type, external)
    private
@@ -276,7 +277,8 @@ contains
       real(wp) :: bytes
       ! The 64-bit `struct statvfs` of Linux begins with block size, fragment size, blocks, free
       ! blocks, and blocks free for this user.
-      integer(c_long) :: buffer(64)
+      integer, parameter :: plenty = 64
+      integer(c_long) :: buffer(plenty)
       integer :: i
 
       bytes = huge(bytes)

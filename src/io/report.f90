@@ -182,7 +182,8 @@ contains
          //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
          //scalar_row('largest deflection', history%max_deflection*1000, 3, 'mm') &
          //scalar_row('impulse', history%impulse, 3, 'N s') &
-         //facts(history)//newline//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
+         //facts(history)//newline &
+         //'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
          //' to the limits of the '//trim(case%source)//' (levels: '//trim(case%level_method)//').'//newline
    end function get_table
 

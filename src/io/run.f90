@@ -6,9 +6,9 @@ module thud_run
    use thud_error, only: error_type, input_error
    use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, &
       write_files
+   use thud_finite_element, only: get_frame_count
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
-   use thud_finite_element, only: get_frame_count
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_frame_name, get_modes_files, get_motion_files, modes_names, &
@@ -35,7 +35,7 @@ module thud_run
    character(len=*), parameter :: input_file = 'effective.nml'
 
    !> Figures that the driver may have added; they show the results that they were drawn from.
-   character(len=13), parameter :: figure_names(9) = [character(len=13) :: 'force.png', 'force.svg', 'levels.png', &
+   character(len=13), parameter :: figure_names(*) = [character(len=13) :: 'force.png', 'force.svg', 'levels.png', &
       'levels.svg', 'motion.png', 'motion.svg', 'motion.gif', 'modes.png', 'modes.svg']
 
    !> What a case gives.
@@ -136,8 +136,8 @@ contains
             get_frame_count(options, case%sampling))
          free = get_free_bytes(directory)
          if (wanted <= free) return
-         error = input_error('&output: snapshot_interval = '//to_text(options%snapshot_interval)//' s makes files of up to ' &
-            //to_text(wanted)//' bytes, and '//directory//' has room for '//to_text(free) &
+         error = input_error('&output: snapshot_interval = '//to_text(options%snapshot_interval) &
+            //' s makes files of up to '//to_text(wanted)//' bytes, and '//directory//' has room for '//to_text(free) &
             //'; allowed: a longer interval, or 0 for no snapshots')
       end associate
    end subroutine check_space

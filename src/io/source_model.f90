@@ -23,7 +23,7 @@ module thud_source_model
    public :: check_model, get_model_fields, get_owner, model_names, model_options_type, solve_model
 
    !> Names of the models; the options of each stand in the namelist group of its name.
-   character(len=24), parameter :: model_names(5) = [character(len=24) :: &
+   character(len=24), parameter :: model_names(*) = [character(len=24) :: &
       'hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley']
 
    !> Options of every model.

@@ -69,7 +69,8 @@ contains
 
       ! The length of the data stands before them.
       text = text//'<DataArray type="'//type//'" Name="'//name//'" NumberOfComponents="'//to_text(n_component) &
-         //'" format="binary">'//encode([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes])//'</DataArray>'//newline
+         //'" format="binary">'//encode([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes]) &
+         //'</DataArray>'//newline
    end subroutine add_array
 
    !> Bytes in base 64 (RFC 4648).

@@ -161,7 +161,8 @@ contains
       real(wp), intent(in) :: sample_rate
       !> Peaks.
       integer :: peak_count
-      real(wp) :: extreme, threshold, force(size(whole_force))
+      real(wp) :: extreme, threshold
+      real(wp) :: force(size(whole_force))
       logical :: rising
       integer :: i
 

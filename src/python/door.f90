@@ -209,7 +209,7 @@ contains
       !> The names: [n].
       character(len=*), intent(in) :: names(:)
       !> The list; blank where there are none.
-      character(len=*), intent(out) :: list
+      character(len=512), intent(out) :: list
       integer :: i
 
       list = ''

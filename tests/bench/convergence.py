@@ -6,9 +6,7 @@ import thud
 
 FLAGSHIP = thud.Ball(youngs_modulus=2.08e6)
 STUDIES = {
-    "mesh": [
-        {"radial_elements": n, "polar_elements": 8 * n} for n in (4, 6, 8, 12, 16, 24)
-    ],
+    "mesh": [{"radial_elements": n, "polar_elements": 8 * n} for n in (4, 6, 8, 12, 16, 24)],
     "mesh, around": [{"polar_elements": n} for n in (96, 128, 192)],
     "bulk modulus": [{"bulk_ratio": r} for r in (49.67, 100, 200, 499.7, 1000, 2000)],
     "step": [{"step_safety": s} for s in (0.95, 0.85, 0.4, 0.2, 0.1)],
@@ -31,9 +29,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|---|---|")
     for study, runs in STUDIES.items():
         for options in runs:
-            found = thud.solve(
-                FLAGSHIP, model="finite_element", snapshot_interval=0, **options
-            )
+            found = thud.solve(FLAGSHIP, model="finite_element", snapshot_interval=0, **options)
             value = ", ".join(f"{v}" for v in options.values())
             levels = " | ".join(f"{level:.2f}" for level in found.levels())
             print(
