@@ -136,20 +136,24 @@ def _literal(label: str) -> str:
 
 
 def _draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
-    """Draw forces against time as they are recorded; thin and grey, all that is computed."""
+    """Draw forces against time as force plates record them; thin and grey, what is above that."""
     most = 0.0
+    band = ""
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
         whole = impact.force(kind)
         recorded = record_force(whole, impact.sample_rate)
         if np.abs(whole - recorded).max() > UNSEEN * whole.max():
             axes.plot(1e3 * impact.time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1)
-        axes.plot(1e3 * impact.time, 1e-3 * recorded, label=name, **_style(i))
+            shown, band = recorded, " below 1.25 kHz"
+        else:
+            shown = whole
+        axes.plot(1e3 * impact.time, 1e-3 * shown, label=name, **_style(i))
         most = max(most, whole.max())
     axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
     axes.set_ylim(0, 1.05e-3 * most)
     axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
     name = force.capitalize() if force else "Blocked"
-    axes.set_ylabel(f"{name} force, kN", fontsize=SIZE)
+    axes.set_ylabel(f"{name} force{band}, kN", fontsize=SIZE)
 
 
 def add_curves(

@@ -8,10 +8,10 @@ module thud_finite_element
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_finite_element_options, only: finite_element_type
+   use thud_finite_element_options, only: finite_element_type, get_frame_count, get_stride
    use thud_force_history, only: force_history_type, new_force_history
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
-      new_impact_run
+      most_steps, new_impact_run
    use thud_kinds, only: wp
    use thud_material, only: material_type, new_material
    use thud_motion, only: motion_type, new_motion, take_snapshot
@@ -21,7 +21,7 @@ module thud_finite_element
    implicit none (type, external)
    private
 
-   public :: get_frame_count, solve_finite_element
+   public :: solve_finite_element
 
    !> Part of the energy at first touch by which the balance may miss.
    real(wp), parameter :: most_energy_residual = 0.005_wp
@@ -32,11 +32,8 @@ module thud_finite_element
    !> Part of the wall that the surface may sink into the floor.
    real(wp), parameter :: most_sink = 0.01_wp
 
-   !> Most memory for snapshots, bytes.
-   real(wp), parameter :: most_motion_bytes = 2.0e9_wp
-
-   !> Most steps in a sampling interval.
-   integer, parameter :: most_steps = 100000
+   !> Most steps of elements in a run; they take about half an hour.
+   real(wp), parameter :: most_work = 2.0e10_wp
 
    !> Samples between two looks at the step.
    integer, parameter :: look_interval = 12
@@ -89,12 +86,6 @@ contains
             //' s is longer than the fall; allowed: up to '//to_text(history%impact_velocity/drop%gravity)//' s')
          return
       end if
-      if (get_motion_bytes(options, sampling) > most_motion_bytes) then
-         error = input_error('&output: snapshot_interval = '//to_text(options%snapshot_interval)//' s makes ' &
-            //to_text(get_frame_count(options, sampling))//' snapshots, more than the memory is meant to hold; allowed: a ' &
-            //'longer interval, or 0 for none')
-         return
-      end if
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
       run = new_impact_run(ball, options, material, drop%gravity, gap, speed)
@@ -103,43 +94,6 @@ contains
       call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, motion, error)
       if (.not. allocated(error)) call finish(ball, run, sampling, speed, history, error)
    end subroutine solve_finite_element
-
-   !> Most snapshots of a run.
-   pure function get_frame_count(options, sampling) result(n_frame)
-      !> The options.
-      type(finite_element_type), intent(in) :: options
-      !> Sampling of the record.
-      type(sampling_type), intent(in) :: sampling
-      !> The number.
-      integer :: n_frame
-
-      n_frame = 0
-      if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
-   end function get_frame_count
-
-   !> Memory that the snapshots of a run take.
-   pure function get_motion_bytes(options, sampling) result(bytes)
-      !> The options.
-      type(finite_element_type), intent(in) :: options
-      !> Sampling of the record.
-      type(sampling_type), intent(in) :: sampling
-      !> The bytes.
-      real(wp) :: bytes
-
-      bytes = 32.0_wp*(options%mesh%radial_elements + 1)*(options%mesh%polar_elements + 1)*get_frame_count(options, sampling)
-   end function get_motion_bytes
-
-   !> Samples between two snapshots.
-   pure function get_stride(options, sampling) result(stride)
-      !> The options, with snapshots.
-      type(finite_element_type), intent(in) :: options
-      !> Sampling of the record.
-      type(sampling_type), intent(in) :: sampling
-      !> The number, at least 1.
-      integer :: stride
-
-      stride = max(1, nint(options%snapshot_interval*sampling%sample_rate))
-   end function get_stride
 
    !> Marches until the ball has left for good.
    subroutine march(run, start, contacts, options, sampling, history, motion, error)
@@ -171,9 +125,11 @@ contains
          time = (i - 1)*interval
          if (mod(i - 1, look_interval) == 0) call report_progress(time, sampling%duration)
          if (mod(i - 1, look_interval) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
-         if (n_step > most_steps) then
-            error = numerical_error(trim(place(time))//' the step must be less than '//to_text(interval/most_steps) &
-               //' s to be stable; allowed: a coarser mesh, a lower bulk_ratio, less viscosity')
+         if (n_step > most_steps .or. real(n_step, wp)*n_sample*size(run%position)/2 > most_work) then
+            error = numerical_error(trim(place(time))//' stability asks for steps below ' &
+               //to_text(interval/n_step)//' s, too many for '//to_text(sampling%duration)//' s of ' &
+               //to_text(size(run%position)/2)//' nodes; allowed: a shorter duration, fewer elements, ' &
+               //'a lower bulk_ratio, less viscosity')
             return
          end if
          do k = 0, n_step - 1

@@ -1,17 +1,23 @@
 !> Options of the finite-element model, group by group.
 module thud_finite_element_options
    use thud_ball, only: ball_type
-   use thud_error, only: error_type
+   use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_floor_contact, only: contact_options_type, get_contact_fields
    use thud_kinds, only: wp
    use thud_material, only: check_material, get_material_fields, material_options_type
    use thud_mesh, only: get_mesh_fields, mesh_options_type
    use thud_new_field, only: integer_field, real_field
+   use thud_sampling, only: get_sample_count, sampling_type
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: check_finite_element, finite_element_groups, finite_element_type, get_finite_element_fields
+   public :: get_frame_count, get_stride
+
+   !> Most memory for snapshots, bytes.
+   real(wp), parameter :: most_motion_bytes = 2.0e9_wp
 
    !> Groups of the options.
    character(len=*), parameter :: finite_element_groups(*) = [character(len=16) :: &
@@ -62,16 +68,50 @@ contains
          'time between snapshots of the deformed ball; 0: none', 0.0_wp, 10.0_wp)]
    end function get_finite_element_fields
 
-   !> Complains about options that do not fit each other or the ball.
-   subroutine check_finite_element(options, ball, error)
+   !> Complains about options that do not fit each other, the ball or the memory.
+   subroutine check_finite_element(options, ball, sampling, error)
       !> The options, each inside its own range.
       type(finite_element_type), intent(in) :: options
       !> The ball.
       type(ball_type), intent(in) :: ball
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
+      real(wp) :: bytes
 
       call check_material(options%material, ball, error)
+      if (allocated(error)) return
+      ! Positions and velocities of each node.
+      bytes = 32.0_wp*(options%mesh%radial_elements + 1)*(options%mesh%polar_elements + 1)*get_frame_count(options, sampling)
+      if (bytes > most_motion_bytes) error = input_error('&output: snapshot_interval = ' &
+         //to_text(options%snapshot_interval)//' s makes '//to_text(get_frame_count(options, sampling)) &
+         //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
    end subroutine check_finite_element
+
+   !> Most snapshots of a run.
+   pure function get_frame_count(options, sampling) result(n_frame)
+      !> The options.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> The number.
+      integer :: n_frame
+
+      n_frame = 0
+      if (options%snapshot_interval > 0.0_wp) n_frame = 1 + get_sample_count(sampling)/get_stride(options, sampling)
+   end function get_frame_count
+
+   !> Samples between two snapshots.
+   pure function get_stride(options, sampling) result(stride)
+      !> The options, with snapshots.
+      type(finite_element_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> The number, at least 1.
+      integer :: stride
+
+      stride = max(1, nint(options%snapshot_interval*sampling%sample_rate))
+   end function get_stride
 
 end module thud_finite_element_options

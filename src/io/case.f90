@@ -168,7 +168,7 @@ contains
       end do
       if (case%has_modes) call check_modes(case%modes, case%options%finite_element%mesh, error)
       if (allocated(error) .or. .not. case%has_impact) return
-      call check_model(case%model, case%options, case%ball, error)
+      call check_model(case%model, case%options, case%ball, case%sampling, error)
    end subroutine check_options
 
    !> Complains about groups that are missing, unknown or given twice.

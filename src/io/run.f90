@@ -6,7 +6,7 @@ module thud_run
    use thud_error, only: error_type, input_error
    use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, &
       write_files
-   use thud_finite_element, only: get_frame_count
+   use thud_finite_element_options, only: get_frame_count
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_free_modes, only: free_modes_type, get_free_modes

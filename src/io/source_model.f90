@@ -69,13 +69,15 @@ contains
    end function get_owner
 
    !> Complains about options of the chosen model that do not fit each other.
-   subroutine check_model(model, options, ball, error)
+   subroutine check_model(model, options, ball, sampling, error)
       !> Name of the model.
       character(len=*), intent(in) :: model
       !> The options, each inside its own range.
       type(model_options_type), intent(in) :: options
       !> The ball.
       type(ball_type), intent(in) :: ball
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
 
@@ -83,7 +85,7 @@ contains
       case ('modal_ball')
          call check_modal_ball(options%modal_ball, error)
       case ('finite_element')
-         call check_finite_element(options%finite_element, ball, error)
+         call check_finite_element(options%finite_element, ball, sampling, error)
       case ('measured_modes')
          call check_measured_modes(options%measured_modes, ball, error)
       case ('hunt_crossley')

@@ -8,7 +8,7 @@ module thud_door
    use thud_case, only: case_type, describe_keys, get_case_text, read_case
    use thud_constants, only: program_version => version
    use thud_error, only: error_type, tell
-   use thud_finite_element, only: get_frame_count
+   use thud_finite_element_options, only: get_frame_count
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
    use thud_progress_line, only: begin_progress, end_progress

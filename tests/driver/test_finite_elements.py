@@ -1,0 +1,251 @@
+"""Finite elements from end to end: files, figures, results read back, sentences on bad input."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import f90nml
+import meshio
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    CaseFile = Callable[..., Path]
+
+COARSE = {"radial_elements": 2, "polar_elements": 16}
+MESH = "&mesh radial_elements = 2, polar_elements = 16 /\n"
+IMPACT = f"&ball /\n&drop /\n&model name = 'finite_element' /\n{MESH}"
+MODES = f"&ball /\n&modes count = 3 /\n{MESH}"
+
+
+@pytest.fixture(autouse=True)
+def in_empty_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def impact() -> thud.Impact:
+    return thud.solve(model="finite_element", **COARSE)
+
+
+def same(one: object, other: object) -> bool:
+    """Return whether two results agree in every bit."""
+    if dataclasses.is_dataclass(one):
+        names = [field.name for field in dataclasses.fields(one)]
+        return all(same(getattr(one, name), getattr(other, name)) for name in names)
+    if isinstance(one, dict):
+        assert isinstance(other, dict)
+        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+    return np.array_equal(one, other)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["rubber_ball_fe", "rubber_ball_100cm"])
+def test_results_are_read_back_to_the_last_bit(run: Callable[..., object], name: str) -> None:
+    run(REPOSITORY / f"inputs/{name}.nml")
+    found = thud.read_results(f"outputs/{name}")
+    assert same(found, thud.solve_case(found.case))
+
+
+def test_results_that_are_none_are_told(tmp_path: Path) -> None:
+    with pytest.raises(thud.InputError, match="allowed: the results of an impact"):
+        thud.read_results(tmp_path)
+
+
+def test_snapshots_are_grids_for_anybody(impact: thud.Impact, case_file: CaseFile) -> None:
+    assert cli.main(["run", "-q", "--no-figures", str(case_file(IMPACT))]) == 0
+    assert impact.motion
+    listed = re.findall(
+        'timestep="(.*?)" file="(.*?)"', Path("outputs/case/motion.pvd").read_text()
+    )
+    assert [float(time) for time, _ in listed] == impact.motion.time.tolist()
+    for i, (_, name) in enumerate(listed):
+        grid = meshio.read(f"outputs/case/{name}")
+        place = impact.motion.position[i].swapaxes(0, 1).reshape(-1, 2)
+        np.testing.assert_array_equal(grid.points, np.column_stack((place, 0 * place[:, 0])))
+        corners = grid.points[grid.cells_dict["quad"]][..., :2]
+        x, y = np.moveaxis(corners, -1, 0)
+        areas = np.sum(x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1), axis=1) / 2
+        assert (areas > 0).all()
+        velocity = impact.motion.velocity[i].swapaxes(0, 1).reshape(-1, 2)
+        np.testing.assert_array_equal(grid.point_data["velocity"][:, :2], velocity)
+        pressure = grid.point_data["contact_pressure"].reshape(3, 17)
+        np.testing.assert_array_equal(pressure[-1], impact.motion.contact_pressure[i])
+        assert not pressure[:-1].any()
+
+
+def test_mode_shapes_are_grids_for_anybody(case_file: CaseFile) -> None:
+    assert cli.main(["run", "-q", str(case_file(MODES))]) == 0
+    modes = thud.free_modes(count=3, **COARSE)
+    grid = meshio.read("outputs/case/modes.vtu")
+    assert grid.cells_dict["quad9"].shape == (32, 9)
+    for i, (name, shape) in enumerate(grid.point_data.items()):
+        assert name == f"mode {i + 1}, {modes.frequency[i]:.3f} Hz"
+        np.testing.assert_array_equal(shape[:, :2], modes.shape[i].swapaxes(0, 1).reshape(-1, 2))
+    table = np.genfromtxt("outputs/case/modes.csv", delimiter=",", names=True, dtype=None)
+    assert table["mode"].tolist() == ["rigid", "1", "2", "3"]
+    np.testing.assert_array_equal(table["frequency_Hz"][1:], modes.frequency)
+    assert abs(table["frequency_Hz"][0]) < 0.01
+    assert table["harmonic"].tolist() == [1, 2, 3, 4]
+
+
+def test_modes_alone_need_no_drop(
+    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["run", str(case_file(MODES)), "--check"]) == 0
+    assert sorted(path.name for path in (tmp_path / "outputs/case").iterdir()) == [
+        "effective.nml", "modes.csv", "modes.png", "modes.svg", "modes.vtu",
+    ]  # fmt: skip
+    assert "free modes" in capsys.readouterr().out
+    effective = f90nml.read("outputs/case/effective.nml")
+    assert sorted(effective) == ["ball", "case", "mesh", "modes"]
+
+
+def test_modes_and_impact_come_from_one_file(case_file: CaseFile, tmp_path: Path) -> None:
+    case = thud.read_case(case_file(IMPACT + "&modes count = 2 /\n"))
+    assert case.modes == thud.Modes(2, **COARSE)
+    assert cli.main(["run", "-q", str(tmp_path / "case.nml")]) == 0
+    names = {path.name for path in (tmp_path / "outputs/case").iterdir()}
+    assert {"modes.csv", "modes.png", "force.csv", "force.png", "motion.png"} < names
+    again = thud.read_case(tmp_path / "outputs/case/effective.nml")
+    assert again == case
+    with pytest.raises(thud.InputError, match="one mesh for both"):
+        dataclasses.replace(case, modes=thud.Modes()).to_namelist()
+
+
+def test_a_shorter_run_leaves_nothing_of_a_longer_one(case_file: CaseFile, tmp_path: Path) -> None:
+    folder = tmp_path / "outputs/case"
+    assert cli.main(["run", "-q", str(case_file(IMPACT)), "--animation"]) == 0
+    assert (folder / "motion.gif").read_bytes()[:4] == b"GIF8"
+    assert len(list(folder.glob("motion_*.vtu"))) > 20
+    output = "&output snapshot_interval = 5e-3 /\n"
+    assert cli.main(["run", "-q", "--no-figures", str(case_file(IMPACT + output))]) == 0
+    shots = sorted(path.name for path in folder.glob("motion*"))
+    listed = re.findall('file="(.*?)"', (folder / "motion.pvd").read_text())
+    assert shots == ["motion.pvd", *listed]
+    none = "&output snapshot_interval = 0 /\n"
+    assert cli.main(["run", "-q", "--no-figures", str(case_file(IMPACT + none))]) == 0
+    assert not list(folder.glob("motion*"))
+    assert not (folder / "pressure.csv").exists()
+
+
+def test_channels_keep_the_balance_of_energy(impact: thud.Impact) -> None:
+    kept = np.flatnonzero(impact.channels["kinetic_energy_J"])
+    total = sum(values[kept] for name, values in impact.channels.items() if "energy_J" in name)
+    assert abs(total - total[0]).max() < 0.005 * 2.5 * 9.81
+    assert impact.energy_residual < 0.005
+    assert impact.impulse_residual < 1e-8
+    assert impact.channels["contact_radius_m"].max() < 0.089
+    assert impact.facts["bulk_modulus"] == pytest.approx(200 * 1.6e6 / 3)
+    np.testing.assert_allclose(
+        impact.floor_force.sum() / impact.sample_rate, impact.impulse, rtol=1e-12
+    )
+
+
+def test_figures_show_what_they_should(impact: thud.Impact, tmp_path: Path) -> None:
+    motion = thud.mesh_plot.motion(impact)
+    panels = [axes for axes in motion.axes if axes.get_title()]
+    times = [float(axes.get_title().removesuffix(" ms")) for axes in panels]
+    assert len(times) == 9
+    assert times == sorted(times)
+    assert times[-1] == pytest.approx(1e3 * impact.contact_time, abs=0.6)
+    modes = thud.free_modes(count=4, **COARSE)
+    titles = [axes.get_title() for axes in thud.mesh_plot.mode_shapes(modes).axes]
+    assert titles[:4] == [
+        f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
+    ]
+    laws = {law: thud.FiniteElement(viscosity=law) for law in ("kelvin_voigt", "constant_loss")}
+    (axes,) = thud.mesh_plot.loss_factor(laws).axes
+    assert axes.get_xlabel() == "Frequency, Hz"
+    rising, constant = (line.get_ydata() for line in axes.lines)
+    assert rising[-1] / rising[0] == pytest.approx(100)
+    np.testing.assert_allclose(constant, 0.2, rtol=3e-3)
+    for figure in (motion, thud.mesh_plot.mode_shapes(modes)):
+        assert figure.get_figwidth() == pytest.approx(3.5)
+        thud.plot.save(figure, tmp_path / "figure.png")
+
+
+def test_figures_without_snapshots_are_told(tmp_path: Path) -> None:
+    with pytest.raises(thud.InputError, match="snapshot_interval > 0"):
+        thud.mesh_plot.motion(thud.solve())
+    with pytest.raises(thud.InputError, match=r"allowed: \.gif"):
+        thud.mesh_plot.animate(thud.solve(), tmp_path / "ball.mp4")
+
+
+BAD = {
+    "&mesh radial_elements = 0 /": "&mesh: radial_elements = 0",
+    "&mesh polar_elements = 7 /": "&mesh: polar_elements = 7",
+    "&material prony_share = -0.1, prony_time = 1e-3, viscosity = 'prony' /": "prony_share",
+    "&material prony_share = 0.1, prony_time = 0, viscosity = 'prony' /": "prony_time",
+    "&material prony_share = 0.1, 0.2, prony_time = 1e-3, viscosity = 'prony' /": "same number",
+    "&material viscosity = 'prony' /": "the same number of both",
+    "&material prony_share = 0.1, prony_time = 1e-3 /": "do nothing with viscosity",
+    "&material viscosity = 'constant_loss', loss_factor = 1 /": "no Prony series",
+    "&material bulk_ratio = 1e9 /": "&material: bulk_ratio",
+    "&contact treatment = 'glue' /": "&contact: treatment",
+    "&finite_element flight_before = 0.9 /": "longer than the fall",
+    "&finite_element bounces = 3 /": "after contact 3",
+    "&finite_element step_safety = 1.5 /": "&finite_element: step_safety",
+    "&sampling duration = 0.01 /": "&sampling: duration = 0.01 s ends less than",
+    "&output snapshot_interval = 1e-9 / &sampling sample_rate = 1e7, duration = 0.4 /": "snapshots",
+    "&modes count = 100 /": "&modes: count = 100",
+    "&hollow_sphere momentum_flux = 'none' /": "&hollow_sphere in line",
+}
+
+
+@pytest.mark.parametrize("group", BAD)
+def test_bad_input_gets_one_sentence(group: str) -> None:
+    mesh = "" if "&mesh" in group else MESH
+    text = f"&ball /\n&drop /\n&model name = 'finite_element' /\n{mesh}{group}\n"
+    check_refusal(text, BAD[group])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("&ball /\n&modes /\n&drop /\n", "&drop in line 3 does nothing with &modes alone"),
+        ("&modes /\n", "&ball is missing"),
+        ("&ball /\n&modes /\n&model /\n", "&drop is missing"),
+        ("&ball /\n&drop /\n&model /\n&mesh /\n", "&mesh in line 4 does nothing"),
+        (IMPACT.replace("&ball", "&ball gauge_pressure = 1e4"), "&ball: gauge_pressure"),
+        (IMPACT.replace("&ball", "&ball youngs_modulus = 1e3"), "ms after the start"),
+        (IMPACT.replace("&drop", "&drop height = 1e3"), "ms after the start"),
+        (IMPACT.replace("&ball", "&ball youngs_modulus = 1e13"), "stability asks for steps"),
+    ],
+)
+def test_impossible_cases_get_one_sentence(text: str, words: str) -> None:
+    check_refusal(text, words)
+
+
+def check_refusal(text: str, words: str) -> None:
+    Path("case.nml").write_text(text, encoding="utf-8")
+    with pytest.raises(thud.ThudError) as caught:
+        thud.solve_case(thud.read_case("case.nml"))
+    sentence = str(caught.value)
+    assert words in sentence
+    assert "allowed: " in sentence
+    assert "\n" not in sentence
+
+
+def test_snapshots_larger_than_the_disk_are_refused_before_the_run(
+    run: Callable[..., object], case_file: CaseFile
+) -> None:
+    # The file system of processes has no room at all.
+    output = "&output snapshot_interval = 1e-3 /\n"
+    result = run(case_file(IMPACT + output), "--output", "/proc/thud")
+    assert result.returncode == 1  # type: ignore[attr-defined]
+    assert "has room for 0" in result.stderr  # type: ignore[attr-defined]
+
+
+def test_free_modes_do_not_depend_on_what_was_computed_before() -> None:
+    first = thud.free_modes(count=3, **COARSE)
+    thud.free_modes(count=9, radial_elements=3, polar_elements=24)
+    assert same(first, thud.free_modes(count=3, **COARSE))
