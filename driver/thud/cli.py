@@ -109,7 +109,9 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--source", choices=("rubber_ball", "tyre"), default="rubber_ball")
     compare.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors")
 
-    figures = commands.add_parser("figures", help="draw figures 2 and 3 of the paper")
+    figures = commands.add_parser(
+        "figures", help="draw the figures of the paper and of the documentation"
+    )
     figures.set_defaults(command=_figures)
     figures.add_argument(
         "-o",
@@ -203,24 +205,11 @@ def _require_output(output: str | None) -> None:
 
 
 def _figures(options: argparse.Namespace) -> int:
-    """Draw the figures of the paper."""
-    heights = {f"{height:.2f} m": height for height in (0.1, 1.0, 1.6)}
-    choices = ("momentum_balance", "retarding", "conservative", "none")
+    """Draw the figures of the paper and of the documentation."""
+    from thud.figures import get_figures  # noqa: PLC0415 - matplotlib takes its time
+
     options.output.mkdir(parents=True, exist_ok=True)
-    _draw(
-        options.output,
-        {
-            "figure2_force_history": lambda: thud.plot.force_history(
-                {name: thud.solve(drop=thud.Drop(height)) for name, height in heights.items()}
-            ),
-            "figure3_levels": lambda: thud.plot.levels({"hollow sphere": thud.solve()}),
-            "modal_families": _draw_families,
-            "momentum_flux": lambda: thud.plot.levels(
-                {choice: thud.solve(momentum_flux=choice) for choice in choices}, "elastic"
-            ),
-        },
-        quiet=options.quiet,
-    )
+    _draw(options.output, get_figures(), quiet=options.quiet)
     if not options.quiet:
         print(f"Figures: {options.output}")
     return 0
@@ -240,16 +229,6 @@ def _compare(options: argparse.Namespace) -> int:
             print("   ".join(cell.ljust(width) for cell, width in cells).rstrip())
         print(f"Page: {paths[-1]}")
     return 0
-
-
-def _draw_families() -> Figure:
-    """Draw which modes carry which octave: families that answer statically, one at a time."""
-    shown = range(2, 7)
-    still = {f"n = {n} static": thud.solve(model="modal_ball", static_families=[n]) for n in shown}
-    every = list(range(thud.ModalBall.harmonics + 1))
-    still["all static"] = thud.solve(model="modal_ball", static_families=every)
-    figure: Figure = thud.plot.level_changes(thud.solve(model="modal_ball"), still)
-    return figure
 
 
 def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:

@@ -167,6 +167,8 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
     axes.set_xlabel("Frequency, Hz", fontsize=SIZE)
     axes.set_ylabel("Loss factor", fontsize=SIZE)
     axes.legend(fontsize=SIZE, frameon=False)

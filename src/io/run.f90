@@ -15,10 +15,11 @@ module thud_run
       motion_names
    use thud_motion, only: motion_type
    use thud_posix, only: get_free_bytes, remove_file
-   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_modes_table, get_summary, get_table
+   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    use thud_source_model, only: solve_model
+   use thud_table, only: get_modes_table, get_table
    use thud_text, only: newline, to_text
    implicit none (type, external)
    private
