@@ -194,6 +194,11 @@ def _case_figures(case: thud.Case, folder: Path) -> dict[str, Callable[[], Figur
         figures["levels"] = lambda: thud.plot.levels({name: impact}, source=source)
         if impact.motion:
             figures["motion"] = lambda: thud.mesh_plot.motion(impact)
+        model = case.model
+        if isinstance(model, thud.FiniteElement) and model.viscosity != "none":
+            figures["loss_factor"] = lambda: thud.mesh_plot.loss_factor(
+                {model.viscosity.replace("_", " "): model}
+            )
     return figures
 
 

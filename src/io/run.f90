@@ -36,8 +36,8 @@ module thud_run
    character(len=*), parameter :: input_file = 'effective.nml'
 
    !> Figures that the driver may have added; they show the results that they were drawn from.
-   character(len=13), parameter :: figure_names(*) = [character(len=13) :: 'force.png', 'force.svg', 'levels.png', &
-      'levels.svg', 'motion.png', 'motion.svg', 'motion.gif', 'modes.png', 'modes.svg']
+   character(len=15), parameter :: figure_names(*) = [character(len=15) :: 'force.png', 'force.svg', 'levels.png', &
+      'levels.svg', 'motion.png', 'motion.svg', 'motion.gif', 'loss_factor.png', 'loss_factor.svg', 'modes.png', 'modes.svg']
 
    !> What a case gives.
    type :: results_type
