@@ -209,7 +209,8 @@ contains
       real(wp), intent(in) :: cosine(:)
       !> The order.
       integer :: harmonic
-      real(wp), dimension(0:most_harmonic) :: value, first, second, coefficient
+      ! Higher orders look like lower ones on so few points.
+      real(wp), dimension(0:min(most_harmonic, (size(normal) - 1)/2)) :: value, first, second, coefficient
       integer :: i
 
       coefficient = 0.0_wp
@@ -218,7 +219,7 @@ contains
          coefficient = coefficient + value*normal(i)*sqrt(max(0.0_wp, 1 - cosine(i)**2))
       end do
       ! Share of each order in the mean square over the sphere.
-      harmonic = maxloc([((2*i + 1)*coefficient(i)**2, i=0, most_harmonic)], dim=1) - 1
+      harmonic = maxloc([((2*i + 1)*coefficient(i)**2, i=0, ubound(coefficient, 1))], dim=1) - 1
    end function get_harmonic
 
 end module thud_free_modes

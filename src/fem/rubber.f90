@@ -20,6 +20,9 @@ module thud_rubber
    !> give all digits.
    real(wp), parameter :: start_from = 0.4_wp, start_to = 2.5_wp
 
+   !> Steps over the relaxation time beyond which a branch has no memory left.
+   real(wp), parameter :: most_steps_over_time = 100.0_wp
+
 contains
 
    !> Cofactors of the deformation gradient, J F^-T, and its determinant J.
@@ -245,12 +248,13 @@ contains
       real(wp), intent(inout) :: energy
       !> Gets the power dissipated added, W.
       real(wp), intent(inout) :: power
-      real(wp), dimension(n) :: root, shrink, determinant
+      real(wp), dimension(n) :: root, shrink, determinant, excess
       real(wp), dimension(n, n_symmetric) :: c, half
-      real(wp) :: trace, square, coupling, factor, scale
+      real(wp) :: trace, square, coupling, factor, scale, ratio
       real(wp) :: inverse(n_symmetric)
       integer :: g, j, k
 
+      ratio = min(interval/time, most_steps_over_time)
       do g = 1, n_point
          call get_inverse_cube_root(n, jacobian(:, g), root)
          shrink = root**2
@@ -261,7 +265,7 @@ contains
             c(j, 3) = shrink(j)*f(j, 5, g)**2
             c(j, 4) = shrink(j)*(f(j, 1, g)*f(j, 2, g) + f(j, 3, g)*f(j, 4, g))
          end do
-         half = flow(:, :, g) + (exp(interval/(2*time)) - 1)*c
+         half = flow(:, :, g) + (exp(ratio/2) - 1)*c
          determinant = (half(:, 1)*half(:, 2) - half(:, 4)**2)*half(:, 3)
          call get_inverse_cube_root(n, determinant, root)
          !$omp simd private(inverse, trace, square, coupling, factor, scale) reduction(+:energy, power)
@@ -273,6 +277,7 @@ contains
             inverse(3) = scale*(half(j, 1)*half(j, 2) - half(j, 4)**2)
             inverse(4) = -scale*half(j, 4)*half(j, 3)
             trace = c(j, 1)*inverse(1) + c(j, 2)*inverse(2) + c(j, 3)*inverse(3) + 2*c(j, 4)*inverse(4)
+            excess(j) = trace/3 - 1
             square = (c(j, 1)*inverse(1) + c(j, 4)*inverse(4))**2 + (c(j, 2)*inverse(2) + c(j, 4)*inverse(4))**2 &
                + (c(j, 3)*inverse(3))**2 &
                + 2*(c(j, 1)*inverse(4) + c(j, 4)*inverse(2))*(c(j, 4)*inverse(1) + c(j, 2)*inverse(4))
@@ -291,7 +296,8 @@ contains
             power = power + weight(j, g)*modulus/(2*time)*(square - trace**2/3)
          end do
          if (.not. keep) cycle
-         half = flow(:, :, g) + (exp(interval/time) - 1)*c
+         ! At large strain the rate of the norm counts too, in the second order of the step.
+         half = flow(:, :, g) + spread(exp(ratio) - 1 + excess*ratio**2/2, 2, n_symmetric)*c
          determinant = (half(:, 1)*half(:, 2) - half(:, 4)**2)*half(:, 3)
          call get_inverse_cube_root(n, determinant, root)
          do k = 1, n_symmetric
