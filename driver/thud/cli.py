@@ -6,6 +6,7 @@ import argparse
 import os
 import signal
 import sys
+import threading
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -173,6 +174,9 @@ def _interruptible() -> Iterator[None]:
 
     Nothing is lost: results are written as a whole, or not at all.
     """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     usual = signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         yield

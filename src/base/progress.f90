@@ -39,7 +39,11 @@ contains
       !> Time that there is to compute at most, s.
       real(wp), intent(in) :: whole
 
-      if (associated(show)) call show(done, whole)
+      procedure(handler), pointer :: current
+
+      ! Another thread may change it meanwhile.
+      current => show
+      if (associated(current)) call current(done, whole)
    end subroutine report_progress
 
 end module thud_progress

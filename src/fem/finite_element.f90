@@ -1,42 +1,37 @@
 !> The transient impact by finite elements at large strain (paper section 4.2, figure 5).
 !>
 !> Each sampling interval holds as many equal steps as stability asks for. Impulses of the floor are
-!> added up around each sample: the force is their mean over the interval, nothing aliases, and the
-!> impulse of the record is that of the run.
+!> added up around each sample: the force is their mean over the interval, and the impulse of the
+!> record is that of the run.
 module thud_finite_element
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
    use thud_finite_element_options, only: finite_element_type, get_frame_count, get_stride
-   use thud_force_history, only: force_history_type, new_force_history
+   use thud_force_history, only: force_history_type
+   use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
       most_steps, new_impact_run
    use thud_kinds, only: wp
    use thud_material, only: material_type, new_material
    use thud_motion, only: motion_type, new_motion, take_snapshot
    use thud_progress, only: report_progress
-   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_sampling, only: sampling_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: solve_finite_element
 
-   !> Part of the energy at first touch by which the balance may miss.
-   real(wp), parameter :: most_energy_residual = 0.005_wp
-
    !> Part of it at which a running computation is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
-
-   !> Part of the wall that the surface may sink into the floor.
-   real(wp), parameter :: most_sink = 0.01_wp
 
    !> Most steps of elements in a run; they take about half an hour.
    real(wp), parameter :: most_work = 2.0e10_wp
 
-   !> Samples between two looks at the step.
-   integer, parameter :: look_interval = 12
+   !> Time between two looks at the step, s: the ball deforms little meanwhile.
+   real(wp), parameter :: look_interval = 0.25e-3_wp
 
    !> The contacts of a run.
    type :: contacts_type
@@ -73,12 +68,7 @@ contains
       type(contacts_type) :: contacts
       real(wp) :: speed, gap
 
-      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
-      history%impact_velocity = get_impact_velocity(drop)
-      history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
-         'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'dissipated_energy_J', &
-         'least_volume_ratio']
-      allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
+      history = new_impact_record(sampling, get_impact_velocity(drop))
       speed = history%impact_velocity - drop%gravity*options%flight_before
       gap = speed*options%flight_before + drop%gravity*options%flight_before**2/2
       if (speed < 0.0_wp) then
@@ -92,7 +82,7 @@ contains
       contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
       motion = new_motion(run%position, get_frame_count(options, sampling))
       call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, motion, error)
-      if (.not. allocated(error)) call finish(ball, run, sampling, speed, history, error)
+      if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
    end subroutine solve_finite_element
 
    !> Marches until the ball has left for good.
@@ -114,17 +104,18 @@ contains
       !> The ball cannot be computed, or the record is too short.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, time, share, first_energy
-      integer :: i, k, n_step, n_sample, stride
+      integer :: i, k, n_step, n_sample, stride, look, latest
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
       n_step = 0
+      look = max(1, nint(look_interval*sampling%sample_rate))
       stride = huge(stride)
       if (size(motion%time) > 0) stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
-         if (mod(i - 1, look_interval) == 0) call report_progress(time, sampling%duration)
-         if (mod(i - 1, look_interval) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
+         if (mod(i - 1, look) == 0) call report_progress(time, sampling%duration)
+         if (mod(i - 1, look) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
          if (n_step > most_steps .or. real(n_step, wp)*n_sample*size(run%position)/2 > most_work) then
             error = numerical_error(trim(place(time))//' stability asks for steps below ' &
                //to_text(interval/n_step)//' s, too many for '//to_text(sampling%duration)//' s of ' &
@@ -134,14 +125,19 @@ contains
          end if
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
+            ! The next contact is not asked for.
+            if (contacts%n_over >= options%bounces .and. will_touch(run, interval/n_step)) exit samples
             call kick(run, interval/n_step)
             if (i + k == 1) first_energy = get_energy(run)
             call check_run(run, time, first_energy, history, error)
             if (allocated(error)) return
             if (k == 0) then
-               call record(run, i, start, history)
-               if (mod(i - 1, stride) == 0) call take_snapshot(motion, time, run%position, run%velocity, run%floor_force, &
-                  run%state%gas_pressure)
+               call record_sample(run, i, start, history)
+               latest = i
+               ! Pressures are means over the sampling interval, as the force is.
+               if (mod(i - 1, stride) == 0) call take_snapshot(motion, time, run%position, run%velocity, &
+                  run%node_impulse/interval, run%state%gas_pressure)
+               run%node_impulse = 0.0_wp
             end if
             ! The part of the impulse that lies nearer to the next sample.
             share = min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp))
@@ -157,48 +153,24 @@ contains
       if (contacts%n_over < options%bounces) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
             //to_text(contacts%quiet)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
+         return
       end if
+      call continue_flight(run, latest, start, history)
    end subroutine march
 
-   !> Peaks of the impact, and the checks of the balances.
-   subroutine finish(ball, run, sampling, speed, history, error)
+   !> Whether a node may reach the floor in the next step.
+   pure function will_touch(run, step) result(touches)
       !> The ball.
-      type(ball_type), intent(in) :: ball
-      !> The run.
       type(impact_run_type), intent(in) :: run
-      !> Sampling of the record.
-      type(sampling_type), intent(in) :: sampling
-      !> Velocity downwards at the start, m/s.
-      real(wp), intent(in) :: speed
-      !> The history; its samples are complete.
-      type(force_history_type), intent(inout) :: history
-      !> A balance does not close.
-      type(error_type), allocatable, intent(out) :: error
-      real(wp) :: gain
+      !> Length of the step, s.
+      real(wp), intent(in) :: step
+      !> It may.
+      logical :: touches
 
-      history%part(:, 1) = history%floor_force
-      history%elastic_force = history%floor_force
-      history%peak_force = maxval(history%floor_force)
-      history%peak_floor_force = history%peak_force
-      history%max_deflection = maxval(history%deflection)
-      associate (material => run%body%material)
-         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'shortest_step', 'deepest_sink']
-         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 'm']
-         history%fact = [material%shear_modulus, material%bulk_modulus, run%shortest_interval, run%sink]
+      associate (last => ubound(run%position, 2))
+         touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity)) < 0.0_wp
       end associate
-      gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
-      history%impulse_residual = abs(history%impulse - gain)/gain
-      call check_contact_samples(sampling, history%contact_time, error)
-      if (allocated(error)) return
-      if (.not. history%energy_residual <= most_energy_residual) then
-         error = numerical_error('&finite_element: the balance of energy misses by ' &
-            //to_text(history%energy_residual)//' of the energy at first touch; allowed: up to ' &
-            //to_text(most_energy_residual)//', a smaller step_safety helps')
-      else if (run%sink > most_sink*ball%wall_thickness) then
-         error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink) &
-            //' mm into the floor; allowed: up to '//to_text(most_sink)//' of the wall, a higher penalty_ratio helps')
-      end if
-   end subroutine finish
+   end function will_touch
 
    !> Beginning of a sentence on what happened when.
    function place(time) result(text)
@@ -238,27 +210,6 @@ contains
          history%restitution = speed/history%impact_velocity
       end if
    end subroutine follow_contact
-
-   !> Writes one sample of everything but the force.
-   subroutine record(run, i, start, history)
-      !> The ball, between kick and drift.
-      type(impact_run_type), intent(in) :: run
-      !> Number of the sample.
-      integer, intent(in) :: i
-      !> Height of the centre of mass at first touch, m.
-      real(wp), intent(in) :: start
-      !> The history.
-      type(force_history_type), intent(inout) :: history
-
-      history%deflection(i) = start - get_mean_height(run)
-      history%velocity(i) = -get_mean_velocity(run)
-      associate (r => run%position(:, ubound(run%position, 2), 1))
-         history%channel(i, 1) = maxval(r, mask=run%floor_force > 0.0_wp)
-         if (.not. any(run%floor_force > 0.0_wp)) history%channel(i, 1) = 0.0_wp
-      end associate
-      history%channel(i, 2:) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, run%state%gas_energy, &
-         run%potential, run%spring + run%stopped, run%dissipated, run%state%least_jacobian]
-   end subroutine record
 
    !> Complains about a ball that cannot be computed any further.
    subroutine check_run(run, time, first_energy, history, error)

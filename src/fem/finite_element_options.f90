@@ -17,7 +17,13 @@ module thud_finite_element_options
    public :: get_frame_count, get_stride
 
    !> Most memory for snapshots, bytes.
-   real(wp), parameter :: most_motion_bytes = 2.0e9_wp
+   real(wp), parameter :: most_motion_bytes = 4.0e8_wp
+
+   !> Least sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
+   real(wp), parameter :: least_rate = 16000.0_wp
+
+   !> Least number of elements through the wall that bend as the wall does.
+   integer, parameter :: least_radial = 2
 
    !> Groups of the options.
    character(len=*), parameter :: finite_element_groups(*) = [character(len=16) :: &
@@ -82,6 +88,16 @@ contains
 
       call check_material(options%material, ball, error)
       if (allocated(error)) return
+      if (options%mesh%radial_elements < least_radial) then
+         error = input_error('&mesh: radial_elements = '//to_text(options%mesh%radial_elements) &
+            //' is not allowed with finite_element; allowed: from '//to_text(least_radial))
+         return
+      end if
+      if (sampling%sample_rate < least_rate) then
+         error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate) &
+            //' Hz is not allowed with finite_element; allowed: from '//to_text(least_rate)//' Hz')
+         return
+      end if
       ! Positions and velocities of each node.
       bytes = 32.0_wp*(options%mesh%radial_elements + 1)*(options%mesh%polar_elements + 1)*get_frame_count(options, sampling)
       if (bytes > most_motion_bytes) error = input_error('&output: snapshot_interval = ' &

@@ -72,7 +72,8 @@ contains
       end associate
    end function new_floor_contact
 
-   !> Areas of a surface that belong to its nodes: halves of the frustums beside them.
+   !> Areas of a surface that belong to its nodes: integrals of their shape functions over the frustums
+   !> beside them, as for forces of a pressure.
    pure function get_nodal_areas(r, z) result(area)
       !> Distances of the nodes from the axis, m: [0:n].
       real(wp), intent(in) :: r(0:)
@@ -86,8 +87,8 @@ contains
       area = 0.0_wp
       do j = 1, ubound(r, 1)
          width = hypot(r(j) - r(j - 1), z(j) - z(j - 1))
-         area(j - 1) = area(j - 1) + pi*width*(3*r(j - 1) + r(j))/4
-         area(j) = area(j) + pi*width*(r(j - 1) + 3*r(j))/4
+         area(j - 1) = area(j - 1) + pi*width*(2*r(j - 1) + r(j))/3
+         area(j) = area(j) + pi*width*(r(j - 1) + 2*r(j))/3
       end do
    end function get_nodal_areas
 

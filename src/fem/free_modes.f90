@@ -23,6 +23,9 @@ module thud_free_modes
    !> Most restarts of the Lanczos method; a few are needed.
    integer, parameter :: most_restarts = 300
 
+   !> Stands for a failure of the operator where ARPACK tells its own.
+   integer, parameter :: volume_lost = -1000
+
    !> Highest harmonic that a mode is looked for in.
    integer, parameter :: most_harmonic = 64
 
@@ -125,6 +128,7 @@ contains
       real(wp), allocatable :: resid(:), basis(:, :), workd(:), workl(:), product(:)
       logical, allocatable :: select(:)
       integer :: ido, info, ncv, n, i
+      logical :: failed
       integer :: iparam(n_parameter), ipntr(n_parameter)
 
       n = matrices%n
@@ -132,10 +136,12 @@ contains
       allocate (resid(n), basis(n, ncv), workd(3*n), workl(ncv*(ncv + 8)), product(n), select(ncv), eigenvalue(count))
       ! Always the same start, one that no mode is orthogonal to.
       resid = [(1.0_wp + modulo(0.618_wp*i, 1.0_wp), i=1, n)]
+      ipntr = 1
       iparam = 0
       iparam([1, 3, 7]) = [1, most_restarts, 3]
       ido = 0
       info = 1
+      failed = .false.
       ! ARPACK keeps its state in static memory: one thread at a time.
       !$omp critical (arpack)
       turns: do
@@ -145,10 +151,10 @@ contains
             select case (ido)
             case (-1)
                call apply_mass(matrices, x, product)
-               call apply_inverse(matrices, product, y)
+               call apply_inverse(matrices, product, y, failed)
             case (1)
                product = workd(ipntr(3):ipntr(3) + n - 1)
-               call apply_inverse(matrices, product, y)
+               call apply_inverse(matrices, product, y, failed)
             case (2)
                call apply_mass(matrices, x, product)
                y = product
@@ -156,7 +162,9 @@ contains
                exit turns
             end select
          end associate
+         if (failed) exit turns
       end do turns
+      if (failed) info = volume_lost
       allocate (vector(n, count))
       if (info == 0) call dseupd(.true., 'A', select, eigenvalue, vector, n, matrices%shift, 'G', n, 'LM', count, &
          eigenvalue_tolerance, resid, ncv, basis, n, iparam(1:7), ipntr, workd, workl, size(workl), info)

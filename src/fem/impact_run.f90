@@ -50,6 +50,10 @@ module thud_impact_run
       real(wp) :: dissipated = 0.0_wp, stopped = 0.0_wp
       !> Time that the velocities have been driven for, s.
       real(wp) :: time = 0.0_wp
+      !> Energy lost by stopped nodes that the next step books, J.
+      real(wp) :: half_stop = 0.0_wp
+      !> Impulses of the floor on the nodes of the outer surface since the latest sample, N s: [0:n_polar].
+      real(wp), allocatable :: node_impulse(:)
       !> Length of the step before, s; 0 at the start.
       real(wp) :: last_interval = 0.0_wp
       !> Shortest step, s.
@@ -88,7 +92,7 @@ contains
          run%velocity(:, :, 2) = -speed
          allocate (run%mass(0:mesh%n_polar, 0:mesh%n_radial, 2), source=spread(run%body%mass, 3, 2))
          allocate (run%direction(0:mesh%n_polar, 0:mesh%n_radial, 2), source=get_first_direction(run%body))
-         allocate (run%floor_force(0:mesh%n_polar), source=0.0_wp)
+         allocate (run%floor_force(0:mesh%n_polar), run%node_impulse(0:mesh%n_polar), source=0.0_wp)
       end associate
    end function new_impact_run
 
@@ -127,7 +131,7 @@ contains
          ratio = growth/(safety*most_growth)
          ! Growth rises with the first to the second power of the step: take the worse.
          if (ratio <= 1.0_wp) then
-            n_step = max(least, ceiling(n_step*sqrt(ratio)))
+            n_step = max(least, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit
          end if
          n_step = ceiling(n_step*min(ratio, 2.0_wp))
@@ -158,9 +162,12 @@ contains
       run%velocity(:, :, 2) = run%velocity(:, :, 2) - span*run%gravity
       call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2), interval, run%velocity(:, last, 2), &
          impulse)
-      run%stopped = run%stopped - dot_product(impulse, before(:, last, 2) + run%velocity(:, last, 2))/2
+      ! Half of the work of the stops comes with the velocities after them, in the next step.
+      run%stopped = run%stopped + run%half_stop - dot_product(impulse, before(:, last, 2))/2
+      run%half_stop = -dot_product(impulse, run%velocity(:, last, 2))/2
       run%floor_force = run%floor_force + impulse/span
       run%impulse = span*sum(run%floor_force)
+      run%node_impulse = run%node_impulse + span*run%floor_force
       run%kinetic = sum(run%mass*before*run%velocity)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation

@@ -24,7 +24,7 @@ module thud_material
       character(len=name_length) :: law = 'neo_hookean'
       !> Part of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
       real(wp) :: mooney_share = 0.2_wp
-      !> Most bulk modulus over shear modulus; Poisson's ratio may ask for less.
+      !> Most bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
       real(wp) :: bulk_ratio = 200.0_wp
       !> Law of viscosity: `none`, `kelvin_voigt`, `constant_loss` or `prony`.
       character(len=name_length) :: viscosity = 'kelvin_voigt'
@@ -122,17 +122,16 @@ contains
       type(material_type), intent(out) :: material
       !> No Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: storage_modulus, omega
+      real(wp) :: storage_modulus, poisson_ratio, omega
       real(wp), allocatable :: share(:)
 
       omega = 2*pi*options%loss_frequency
       material%density = get_density(ball)
       if (options%law == 'mooney_rivlin') material%mooney_share = options%mooney_share
-      storage_modulus = ball%youngs_modulus/(2*(1 + ball%poisson_ratio))
-      material%bulk_modulus = options%bulk_ratio*storage_modulus
-      if (ball%poisson_ratio < 0.5_wp) then
-         material%bulk_modulus = min(material%bulk_modulus, ball%youngs_modulus/(3*(1 - 2*ball%poisson_ratio)))
-      end if
+      ! The modulus of elasticity is kept, which is what is measured.
+      poisson_ratio = min(ball%poisson_ratio, (3*options%bulk_ratio - 2)/(2*(3*options%bulk_ratio + 1)))
+      storage_modulus = ball%youngs_modulus/(2*(1 + poisson_ratio))
+      material%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*poisson_ratio))
       allocate (share(0), material%branch_time(0))
       select case (options%viscosity)
       case ('kelvin_voigt')

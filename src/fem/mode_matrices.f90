@@ -171,17 +171,20 @@ contains
    end subroutine apply_mass
 
    !> Displacements under forces on the shifted system, without change of volume at Poisson's ratio 1/2.
-   subroutine apply_inverse(matrices, force, x)
+   subroutine apply_inverse(matrices, force, x, failed)
       !> The matrices.
       type(mode_matrices_type), intent(in) :: matrices
       !> Forces, N: [n].
       real(wp), intent(in) :: force(:)
       !> Displacements, m: [n].
       real(wp), intent(out) :: x(:)
+      !> The volume could not be kept.
+      logical, intent(out) :: failed
       real(wp) :: pressure(n_dilatation, size(matrices%place, 2)), change(n_dilatation, size(matrices%place, 2))
       real(wp) :: padded(matrices%n + 1)
       integer :: turn, element, info
 
+      failed = .false.
       x = force
       call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, x, matrices%n, info)
       if (.not. matrices%incompressible) return
@@ -194,7 +197,7 @@ contains
                *matmul(matrices%dilatation(:, :, element), padded(matrices%place(:, element)))
          end do
          pressure = pressure + change
-         if (sum(change**2) <= constraint_tolerance**2*sum(pressure**2)) exit
+         if (sum(change**2) <= constraint_tolerance**2*sum(pressure**2)) return
          ! The change of the pressures drives what is still to be added to the displacements.
          padded = 0.0_wp
          do element = 1, size(matrices%place, 2)
@@ -206,6 +209,7 @@ contains
             info)
          x = x + padded(:matrices%n)
       end do
+      failed = .true.
    end subroutine apply_inverse
 
 end module thud_mode_matrices

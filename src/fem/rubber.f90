@@ -4,8 +4,9 @@
 !> share c of Mooney and Rivlin and the mean dilatation theta of the element.
 !> Viscous: Cauchy stress 2 eta dev D (Kelvin and Voigt), and Maxwell branches with the energy
 !> mu_i/2 (tr(Cbar Cv^-1) - 3) and the flow Cv' = (Cbar - tr(Cbar Cv^-1)/3 Cv)/tau_i (Simo and Miehe
-!> 1992), stepped in closed form (Shutov, Landgraf and Ihlemann 2013, Comput. Methods Appl. Mech. Eng.
-!> 265, 213-225): Cv stays symmetric, positive definite and of determinant 1 with any step.
+!> 1992), stepped in closed form after Shutov, Landgraf and Ihlemann (2013, Comput. Methods Appl. Mech.
+!> Eng. 265, 213-225), with exp(step/tau) - 1 for their step/tau, which is exact at small strain: Cv stays
+!> symmetric, positive definite and of determinant 1 with any step.
 !>
 !> Components as in `thud_element_row`.
 module thud_rubber

@@ -1,9 +1,10 @@
 !> Whole files in, whole sets of files out: a set is either written completely or not at all.
 module thud_file
+   use, intrinsic :: iso_c_binding, only: c_intptr_t
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
-   use thud_posix, only: directory_exists, is_empty_directory, lock_directory, lock_type, make_directory, remove_file, &
-      rename_file, unlock_directory
+   use thud_posix, only: directory_exists, ignore_interrupts, is_empty_directory, lock_directory, lock_type, &
+      make_directory, remove_file, rename_file, unlock_directory
    use thud_text, only: newline, to_text
    implicit none (type, external)
    private
@@ -125,6 +126,7 @@ contains
       !> A file could not be written; then none of them was, and older ones are as they were.
       type(error_type), allocatable, intent(out) :: error
       type(lock_type) :: lock
+      integer(c_intptr_t) :: interrupt
       logical :: done, was_there
       integer :: i
 
@@ -146,11 +148,13 @@ contains
       end do
       ! Only renaming is left to do.
       if (.not. allocated(error)) then
+         call ignore_interrupts(.true., interrupt)
          do i = 1, size(files)
             call rename_file(directory//'/.'//trim(files(i)%name)//'.part', directory//'/'//trim(files(i)%name), done)
             if (.not. done) error = input_error('--output '//directory//': '//trim(files(i)%name)//' cannot be replaced; ' &
                //'allowed: a directory that you may write to')
          end do
+         call ignore_interrupts(.false., interrupt)
       end if
       if (allocated(error)) call remove_parts(directory, files%name)
       call unlock_directory(lock)

@@ -6,8 +6,8 @@ module thud_posix
    implicit none (type, external)
    private
 
-   public :: directory_exists, get_free_bytes, ignore_signals, is_empty_directory, lock_directory, lock_type
-   public :: is_terminal, make_directory, print_text
+   public :: directory_exists, get_free_bytes, ignore_interrupts, ignore_signals, is_empty_directory, is_terminal
+   public :: lock_directory, lock_type, make_directory, print_text
    public :: remove_file, rename_file, standard_error, standard_output, unlock_directory
 
    !> Descriptors of the process.
@@ -145,6 +145,24 @@ contains
       old_handler = c_signal(sigpipe, ignore)
       if (old_handler < 0) return
    end subroutine ignore_signals
+
+   !> Lets interrupts pass or not, while files are renamed.
+   subroutine ignore_interrupts(ignored, before)
+      !> They are ignored from now on; otherwise `before` holds again.
+      logical, intent(in) :: ignored
+      !> What happens on an interrupt at other times.
+      integer(c_intptr_t), intent(inout) :: before
+      integer(c_int), parameter :: sigint = 2
+      integer(c_intptr_t), parameter :: ignore = 1
+      integer(c_intptr_t) :: old_handler
+
+      if (ignored) then
+         before = c_signal(sigint, ignore)
+      else
+         old_handler = c_signal(sigint, before)
+         if (old_handler < 0) return
+      end if
+   end subroutine ignore_interrupts
 
    !> Waits for and takes the lock on a directory. File systems without locks go without.
    subroutine lock_directory(path, lock)

@@ -173,19 +173,17 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(criterion_type) :: criteria(criterion_count)
       type(band_type), allocatable :: bands(:)
-      type(text_file_type) :: modes_files(size(modes_names))
-      type(text_file_type) :: impact_files(size(file_names) + 1)
-      type(text_file_type), allocatable :: motion_files(:)
       real(wp), allocatable :: elastic_level(:), floor_level(:)
-      integer :: first
+      integer :: first, at
 
-      allocate (files(1))
+      allocate (files(1 + count_files(case, results)))
+      at = 1
       outcome%table = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
       outcome%table = outcome%table//newline
       if (case%has_modes) then
-         call get_modes_files(results%modes, modes_files)
-         files = [files, modes_files]
+         call get_modes_files(results%modes, files(at + 1:at + size(modes_names)))
+         at = at + size(modes_names)
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
       if (.not. case%has_impact) return
@@ -196,19 +194,37 @@ contains
          outcome%table = outcome%table//newline//get_table(case, history, elastic_level, floor_level, criteria)
          ! The octaves come first and serve the verdict also where only thirds are asked for.
          first = merge(octave_count, 0, case%bands == 'third') + 1
-         impact_files%name = [character(len=13) :: file_names, channel_file]
-         impact_files(1)%content = get_force_csv(history)
-         impact_files(2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
+         files(at + 1:at + size(file_names))%name = file_names
+         files(at + 1)%content = get_force_csv(history)
+         files(at + 2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
             trim(case%level_force))
-         impact_files(3)%content = get_summary(case, history, criteria)
-         if (allocated(history%channel)) impact_files(4)%content = get_channels_csv(history)
-         files = [files, impact_files(:merge(4, 3, allocated(history%channel)))]
+         files(at + 3)%content = get_summary(case, history, criteria)
+         at = at + size(file_names)
+         if (allocated(history%channel)) then
+            at = at + 1
+            files(at)%name = channel_file
+            files(at)%content = get_channels_csv(history)
+         end if
       end associate
-      if (results%motion%n_frame == 0) return
-      allocate (motion_files(results%motion%n_frame + size(motion_names)))
-      call get_motion_files(results%motion, motion_files)
-      files = [files, motion_files]
+      if (results%motion%n_frame > 0) call get_motion_files(results%motion, files(at + 1:))
    end subroutine describe
+
+   !> Number of files of results.
+   pure function count_files(case, results) result(n_file)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its results.
+      type(results_type), intent(in) :: results
+      !> The number.
+      integer :: n_file
+
+      n_file = 0
+      if (case%has_modes) n_file = size(modes_names)
+      if (.not. case%has_impact) return
+      n_file = n_file + size(file_names)
+      if (allocated(results%history%channel)) n_file = n_file + 1
+      if (results%motion%n_frame > 0) n_file = n_file + results%motion%n_frame + size(motion_names)
+   end function count_files
 
    !> Removes files that an earlier run of the case has left and this one has not replaced.
    subroutine remove_stale(directory, files, differs)

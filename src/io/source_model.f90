@@ -10,13 +10,16 @@ module thud_source_model
    use thud_force_history, only: force_history_type
    use thud_hollow_sphere, only: get_hollow_sphere_fields, hollow_sphere_type, solve_hollow_sphere
    use thud_hunt_crossley, only: check_hunt_crossley, get_hunt_crossley_fields, hunt_crossley_type, solve_hunt_crossley
+   use thud_kinds, only: wp
    use thud_measured_modes, only: check_measured_modes, get_measured_modes_fields, measured_modes_type, &
       solve_measured_modes
    use thud_modal_ball, only: solve_modal_ball
    use thud_modal_ball_options, only: check_modal_ball, get_modal_ball_fields, modal_ball_type
    use thud_motion, only: motion_type
    use thud_sampling, only: sampling_type
+   use thud_source_limits, only: recorded_band
    use thud_text, only: join_quoted, quoted
+   use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
 
@@ -122,6 +125,7 @@ contains
          call solve_modal_ball(ball, drop, options%modal_ball, sampling, history, error)
       case ('finite_element')
          call solve_finite_element(ball, drop, options%finite_element, sampling, history, motion, error)
+         if (.not. allocated(error)) call take_recorded_peak(history)
       case ('measured_modes')
          call solve_measured_modes(drop, options%measured_modes, sampling, history, error)
       case ('hunt_crossley')
@@ -130,5 +134,17 @@ contains
          error = input_error('&model: name = '//quoted(model)//' is not allowed; allowed: '//join_quoted(model_names))
       end select
    end subroutine solve_model
+
+   !> Peaks as a force plate records them. Nodes that meet the floor one by one make spikes as high as
+   !> the steps are short.
+   subroutine take_recorded_peak(history)
+      !> Gets its peaks.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: recorded(size(history%floor_force))
+
+      call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
+      history%peak_force = maxval(recorded)
+      history%peak_floor_force = history%peak_force
+   end subroutine take_recorded_peak
 
 end module thud_source_model

@@ -138,16 +138,64 @@ def test_a_shorter_run_leaves_nothing_of_a_longer_one(case_file: CaseFile, tmp_p
 
 
 def test_channels_keep_the_balance_of_energy(impact: thud.Impact) -> None:
-    kept = np.flatnonzero(impact.channels["kinetic_energy_J"])
-    total = sum(values[kept] for name, values in impact.channels.items() if "energy_J" in name)
+    total = sum(values for name, values in impact.channels.items() if "energy_J" in name)
     assert abs(total - total[0]).max() < 0.005 * 2.5 * 9.81
     assert impact.energy_residual < 0.005
     assert impact.impulse_residual < 1e-8
     assert impact.channels["contact_radius_m"].max() < 0.089
-    assert impact.facts["bulk_modulus"] == pytest.approx(200 * 1.6e6 / 3)
+    # K = 200 mu and E = 9 K mu/(3 K + mu).
+    assert impact.facts["bulk_modulus"] == pytest.approx(601 / 9 * 1.6e6)
     np.testing.assert_allclose(
         impact.floor_force.sum() / impact.sample_rate, impact.impulse, rtol=1e-12
     )
+
+
+def test_record_goes_on_as_free_flight(impact: thud.Impact) -> None:
+    end = np.flatnonzero(impact.floor_force)[-1] + 10
+    np.testing.assert_allclose(np.diff(impact.velocity[end:]) * impact.sample_rate, 9.81, rtol=0.02)
+    fall = np.diff(impact.deflection[end:]) * impact.sample_rate
+    np.testing.assert_allclose(fall, impact.velocity[end:-1], atol=9.81 / impact.sample_rate)
+    assert (impact.channels["least_volume_ratio"] > 0).all()
+    long = thud.solve(
+        model="finite_element", duration=1.0, sample_rate=16000, snapshot_interval=0, **COARSE
+    )
+    # The flight ends where the next contact would begin.
+    assert long.deflection[-1] == pytest.approx(0, abs=1e-12)
+    speed = np.sqrt(2 * 9.81 * -long.deflection.min())
+    assert long.velocity[-1] == pytest.approx(speed, rel=1e-3)
+
+
+def test_flight_ends_before_a_contact_that_is_not_asked_for() -> None:
+    short = thud.solve(model="finite_element", **COARSE)
+    long = thud.solve(
+        model="finite_element", duration=1.5, flight_after=1.4, snapshot_interval=0, **COARSE
+    )
+    np.testing.assert_allclose(long.levels(), short.levels(), atol=1e-6)
+    assert long.channels["contact_radius_m"][1500:].max() == 0
+
+
+def test_peak_is_that_of_the_recorded_band() -> None:
+    peaks = [
+        thud.solve(
+            model="finite_element", sample_rate=rate, snapshot_interval=0, **COARSE
+        ).peak_force
+        for rate in (16e3, 44.1e3, 200e3)
+    ]
+    np.testing.assert_allclose(peaks, peaks[0], rtol=2e-3)
+
+
+def test_pressure_is_even_at_the_pole() -> None:
+    missing = []
+    for elements in (64, 128):
+        impact = thud.solve(model="finite_element", radial_elements=4, polar_elements=elements)
+        assert impact.motion
+        middle = np.argmin(abs(impact.motion.time - 9e-3))
+        pole, first, second = impact.motion.contact_pressure[middle, :3]
+        # Against a parabola through the next two nodes.
+        missing.append(1 - pole / (first - (second - first) / 3))
+    # The elements at the axis are of first order there; areas of half the frustums would add 1/3.
+    assert 0 < missing[0] < 0.1
+    assert missing[1] < 0.7 * missing[0]
 
 
 def test_figures_show_what_they_should(impact: thud.Impact, tmp_path: Path) -> None:
@@ -194,6 +242,8 @@ BAD = {
     "&finite_element flight_before = 0.9 /": "longer than the fall",
     "&finite_element bounces = 3 /": "after contact 3",
     "&finite_element step_safety = 1.5 /": "&finite_element: step_safety",
+    "&mesh radial_elements = 1 /": "allowed: from 2",
+    "&sampling sample_rate = 8000 /": "allowed: from 16000.0 Hz",
     "&sampling duration = 0.01 /": "&sampling: duration = 0.01 s ends less than",
     "&output snapshot_interval = 1e-9 / &sampling sample_rate = 1e7, duration = 0.4 /": "snapshots",
     "&modes count = 100 /": "&modes: count = 100",

@@ -10,9 +10,6 @@ import thud
 # The modulus of the paper's published modes, and the loss factor of the standard's restitution.
 FLAGSHIP = thud.Ball(youngs_modulus=2.08e6)
 NOMINAL = [39, 31, 23, 17, 12.5]
-# What meshes from 6 x 48 elements, steps, bulk modulus and contact treatment change of the levels,
-# dB (docs/finite_elements.md).
-SPREAD = np.array([0.05, 0.1, 0.1, 0.1, 0.5])
 
 
 def solve(ball: thud.Ball = FLAGSHIP, **options: object) -> thud.Impact:
@@ -31,19 +28,21 @@ def test_flagship_has_the_spectrum_of_the_standard(
     assert impact.conformity().conforms
 
 
+# What is left of each choice, dB in the octaves up to 250 Hz and at 500 Hz: twice what the table of
+# docs/finite_elements.md shows.
 @pytest.mark.parametrize(
-    "options",
+    ("options", "low", "high"),
     [
-        {"radial_elements": 12, "polar_elements": 96},
-        {"step_safety": 0.2},
-        {"bulk_ratio": 1000},
-        {"bulk_ratio": 100},
-        {"treatment": "penalty"},
+        ({"radial_elements": 12, "polar_elements": 96}, 0.06, 0.2),
+        ({"step_safety": 0.2}, 0.02, 0.04),
+        ({"bulk_ratio": 1000}, 0.04, 0.04),
+        ({"treatment": "penalty"}, 0.02, 0.04),
     ],
 )
-def test_flagship_is_converged(options: dict[str, object]) -> None:
-    change = solve(**options).levels() - solve().levels()
-    assert (abs(change) < SPREAD).all()
+def test_flagship_is_converged(options: dict[str, object], low: float, high: float) -> None:
+    change = abs(solve(**options).levels() - solve().levels())
+    assert change[:4].max() < low
+    assert change[4] < high
 
 
 def test_published_modes_belong_to_a_modulus_of_2080_kpa() -> None:
@@ -84,8 +83,8 @@ def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
 def test_undamped_ball_is_that_of_calculix() -> None:
     # CalculiX 2.20, 5 x 64 quadratic elements, increment 0.02 ms, penalty 1e9 Pa/m, without gas and
     # gravity (tests/bench/competitor_impact.py): 22.26 ms, e 0.9807 and these levels. Its impulse
-    # fixes the low octaves; above, its increment and penalty alone are worth 0.5 dB.
-    reference = np.array([37.80, 26.42, 21.29, 21.04, 13.57])
+    # fixes the low octaves; above, its increment and penalty alone are worth 0.5 dB and more.
+    reference = np.array([37.80, 26.42, 21.29])
     gravity = 1e-3
     drop = thud.Drop(9.81 / gravity, gravity)
     ball = thud.Ball(poisson_ratio=0.49, ambient_pressure=0)
@@ -95,5 +94,4 @@ def test_undamped_ball_is_that_of_calculix() -> None:
     )  # fmt: skip
     assert impact.contact_time == pytest.approx(22.26e-3, abs=0.1e-3)
     assert impact.restitution == pytest.approx(0.9807, abs=0.002)
-    np.testing.assert_allclose(impact.levels()[:3], reference[:3], atol=0.1)
-    np.testing.assert_allclose(impact.levels()[3:], reference[3:], atol=1.1)
+    np.testing.assert_allclose(impact.levels()[:3], reference, atol=0.1)

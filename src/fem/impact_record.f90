@@ -1,0 +1,141 @@
+!> The record of an impact by finite elements: its samples, its flight after the computation, its
+!> balances.
+module thud_impact_record
+   use thud_ball, only: ball_type
+   use thud_error, only: error_type, numerical_error
+   use thud_force_history, only: force_history_type, new_force_history
+   use thud_impact_run, only: get_mean_height, get_mean_velocity, impact_run_type
+   use thud_kinds, only: wp
+   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: continue_flight, finish_record, new_impact_record, record_sample
+
+   !> Part of the energy at first touch by which the balance may miss.
+   real(wp), parameter :: most_energy_residual = 0.005_wp
+
+   !> Part of the change of momentum by which the impulse of the record may miss.
+   real(wp), parameter :: most_impulse_residual = 1.0e-8_wp
+
+   !> Part of the wall that the surface may sink into the floor.
+   real(wp), parameter :: most_sink = 0.01_wp
+
+   !> Columns of the channels that are told apart here.
+   integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
+
+contains
+
+   !> A record without force.
+   pure function new_impact_record(sampling, impact_velocity) result(history)
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Velocity towards the floor at first touch, m/s.
+      real(wp), intent(in) :: impact_velocity
+      !> The record.
+      type(force_history_type) :: history
+
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
+      history%impact_velocity = impact_velocity
+      history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
+         'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'dissipated_energy_J', &
+         'least_volume_ratio']
+      allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
+   end function new_impact_record
+
+   !> Writes one sample of everything but the force.
+   subroutine record_sample(run, i, start, history)
+      !> The ball, between kick and drift.
+      type(impact_run_type), intent(in) :: run
+      !> Number of the sample.
+      integer, intent(in) :: i
+      !> Height of the centre of mass at first touch, m.
+      real(wp), intent(in) :: start
+      !> The history.
+      type(force_history_type), intent(inout) :: history
+
+      history%deflection(i) = start - get_mean_height(run)
+      history%velocity(i) = -get_mean_velocity(run)
+      associate (r => run%position(:, ubound(run%position, 2), 1))
+         history%channel(i, at_radius) = maxval(r, mask=run%floor_force > 0.0_wp)
+         if (.not. any(run%floor_force > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
+      end associate
+      history%channel(i, at_pressure:) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
+         run%state%gas_energy, run%potential, run%spring + run%stopped, run%dissipated, run%state%least_jacobian]
+   end subroutine record_sample
+
+   !> Goes on after the computation as free flight without further vibration, up to the next touch.
+   pure subroutine continue_flight(run, last, start, history)
+      !> The ball at the end of the computation.
+      type(impact_run_type), intent(in) :: run
+      !> Number of the latest sample.
+      integer, intent(in) :: last
+      !> Height of the centre of mass at first touch, m.
+      real(wp), intent(in) :: start
+      !> The history.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: mass, speed, rise, time
+      integer :: i
+
+      mass = sum(run%mass(:, :, 2))
+      do i = last + 1, size(history%deflection)
+         associate (first => -history%deflection(last), upwards => -history%velocity(last))
+            ! Where the flight meets the height of first touch, it ends.
+            time = (upwards + sqrt(upwards**2 + 2*run%gravity*max(first, 0.0_wp)))/run%gravity
+            time = min(time, (i - last)/history%sample_rate)
+            speed = upwards - run%gravity*time
+            rise = first + (upwards - run%gravity*time/2)*time
+            history%channel(i, :) = history%channel(last, :)
+            history%channel(i, at_kinetic) = history%channel(last, at_kinetic) + mass/2*(speed**2 - upwards**2)
+         end associate
+         history%velocity(i) = -speed
+         history%deflection(i) = -rise
+         history%channel(i, at_gravity) = mass*run%gravity*(start + rise)
+      end do
+   end subroutine continue_flight
+
+   !> Peaks of the impact, and the checks of the balances.
+   subroutine finish_record(ball, run, sampling, speed, history, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The run.
+      type(impact_run_type), intent(in) :: run
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Velocity downwards at the start, m/s.
+      real(wp), intent(in) :: speed
+      !> The history; its samples are complete.
+      type(force_history_type), intent(inout) :: history
+      !> A balance does not close.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: gain
+
+      history%part(:, 1) = history%floor_force
+      history%elastic_force = history%floor_force
+      history%peak_force = maxval(history%floor_force)
+      history%peak_floor_force = history%peak_force
+      history%max_deflection = maxval(history%deflection)
+      associate (material => run%body%material)
+         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'shortest_step', 'deepest_sink']
+         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 'm']
+         history%fact = [material%shear_modulus, material%bulk_modulus, run%shortest_interval, run%sink]
+      end associate
+      gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
+      history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
+      call check_contact_samples(sampling, history%contact_time, error)
+      if (allocated(error)) return
+      if (.not. history%impulse_residual <= most_impulse_residual) then
+         error = numerical_error('&finite_element: the balance of momentum misses by ' &
+            //to_text(history%impulse_residual)//'; allowed: up to '//to_text(most_impulse_residual))
+      else if (.not. history%energy_residual <= most_energy_residual) then
+         error = numerical_error('&finite_element: the balance of energy misses by ' &
+            //to_text(history%energy_residual)//' of the energy at first touch; allowed: up to ' &
+            //to_text(most_energy_residual)//', a smaller step_safety helps')
+      else if (run%sink > most_sink*ball%wall_thickness) then
+         error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink) &
+            //' mm into the floor; allowed: up to '//to_text(most_sink)//' of the wall, a higher penalty_ratio helps')
+      end if
+   end subroutine finish_record
+
+end module thud_impact_record
