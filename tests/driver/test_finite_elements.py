@@ -193,9 +193,8 @@ def test_pressure_is_even_at_the_pole() -> None:
         pole, first, second = impact.motion.contact_pressure[middle, :3]
         # Against a parabola through the next two nodes.
         missing.append(1 - pole / (first - (second - first) / 3))
-    # The elements at the axis are of first order there; areas of half the frustums would add 1/3.
-    assert 0 < missing[0] < 0.1
-    assert missing[1] < 0.7 * missing[0]
+    # The elements at the axis take some of it; areas of half the frustums would add 1/3.
+    assert 0 < missing[1] < missing[0] < 0.1
 
 
 def test_figures_show_what_they_should(impact: thud.Impact, tmp_path: Path) -> None:
