@@ -8,10 +8,21 @@
 """
 
 from thud.fitting.force_target import ForceTarget
-from thud.fitting.level_target import LevelTarget
-from thud.fitting.parameters import Parameter, known_parameters
+from thud.fitting.level_target import LevelTarget, release
+from thud.fitting.parameters import Parameter, known_parameters, with_values
 from thud.fitting.result import Fit
 from thud.fitting.search import fit
-from thud.fitting.study import run
+from thud.fitting.study import read_study, run
 
-__all__ = ["Fit", "ForceTarget", "LevelTarget", "Parameter", "fit", "known_parameters", "run"]
+__all__ = [
+    "Fit",
+    "ForceTarget",
+    "LevelTarget",
+    "Parameter",
+    "fit",
+    "known_parameters",
+    "read_study",
+    "release",
+    "run",
+    "with_values",
+]

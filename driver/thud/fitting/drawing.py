@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 # More parameters than that are drawn as a table of correlations.
 MOST_PANELS = 5
 BAND = "0.85"
+# Names that are too long for the axis or the key.
+BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
+PERSONS = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio"}
 # Time that is drawn before and after the contact, as part of it.
 BEFORE, AFTER = 0.15, 0.4
 
@@ -59,7 +62,7 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     column = misfit.history_columns(fit.impact, fit.time_shift)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
-    limit = f"below {misfit.frequency[-1] / 1e3:.3g} kHz"
+    limit = f"Record below {misfit.below / 1e3:.3g} kHz"
     if np.abs(record - target).max() > UNSEEN / 2 * target.max():
         above.plot(time, record / 1e3, color="0.8", linewidth=0.4, label="Record")
     above.plot(time, target / 1e3, color=COLOURS[0], linewidth=2.2, alpha=0.6, label=limit)
@@ -95,8 +98,9 @@ def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     scale = 1.0 if fit.known_noise else fit.noise
     for i in range(count):
         edge = values["target"][i] + scale * np.array([-1, 1]) * values["uncertainty"][i]
-        name = "Target and standard deviation" if i == 0 else None
-        above.fill_between([i - 0.35, i + 0.35], *edge, color=BAND, linewidth=0)
+        name = "Target" if i == 0 else None
+        band = "Its standard deviation" if i == 0 else None
+        above.fill_between([i - 0.35, i + 0.35], *edge, color="0.75", linewidth=0, label=band)
         above.plot(
             [i - 0.35, i + 0.35],
             2 * [values["target"][i]],
@@ -118,7 +122,7 @@ def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     below.plot(place, fit.residuals, color=COLOURS[1], marker="o", markersize=4, linestyle="none")
     most = 1.2 * max(1.2, np.abs(fit.residuals).max())
     below.set_ylim(-most, most)
-    below.set_xticks(place, [name.replace(" ", "\n") for name in names])
+    below.set_xticks(place, [BROKEN.get(name, name) for name in names])
     below.xaxis.set_minor_locator(NullLocator())
     below.set_xlim(-0.6, len(names) - 0.4)
     if count > MOST_PANELS:
@@ -190,8 +194,8 @@ def _draw_pair(
     half = 1.25 * np.sqrt(square * np.diag(block))
     axes.set_xlim(centre[0] - half[0], centre[0] + half[0])
     axes.set_ylim(centre[1] - half[1], centre[1] + half[1])
-    axes.xaxis.set_major_locator(MaxNLocator(3))
-    axes.yaxis.set_major_locator(MaxNLocator(4))
+    axes.xaxis.set_major_locator(MaxNLocator(2))
+    axes.yaxis.set_major_locator(MaxNLocator(3))
     axes.ticklabel_format(useOffset=False)
     axes.set_title(f"correlation {fit.correlation[pair]:.2f}", fontsize=SIZE - 1)
 
@@ -240,5 +244,5 @@ def _draw_correlation(fit: Fit) -> Figure:
 def _label(name: str, units: Mapping[str, tuple[str, float]]) -> str:
     """Return a parameter with its unit, on two lines."""
     unit = units[name][0]
-    text = name.replace("_", " ")
+    text = PERSONS.get(name, name.replace("_", " "))
     return f"{text},\n{unit}" if unit else text

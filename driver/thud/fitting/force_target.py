@@ -12,7 +12,7 @@ from scipy.signal import ZoomFFT
 from thud.errors import InputError
 from thud.fitting.misfit import require_positive
 from thud.impact import FORCES, Impact
-from thud.recording import Recording
+from thud.recording import LEAST_ROWS, Recording
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -23,10 +23,10 @@ BELOW = 1250.0
 OPEN_END = 0.1
 END = 1e-3
 # A doubt needs this many independent values during contact and otherwise, this probability of
-# Fisher's F, and a residual above this part of the largest force.
+# Fisher's F, and a residual above this part of the largest force: less comes from sampling.
 LEAST_FREEDOM = 5
 SURE = 0.999
-ROUNDING = 1e-6
+NUMERICAL = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +69,7 @@ class ForceTarget:
             raise InputError(message)
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
+        require_positive("below", self.below, "Hz")
         time, force, rate = self._samples()
         if self.window is not None:
             time, force = _cut(time, force, self.window)
@@ -116,7 +117,7 @@ def _cut(
     except (TypeError, ValueError):
         begin = end = np.nan
     inside = (time >= begin) & (time <= end)
-    if np.count_nonzero(inside) < len(window) or not force[inside].max() > 0:
+    if np.count_nonzero(inside) < LEAST_ROWS or not force[inside].max() > 0:
         message = (
             f"target: window = {window!r} is not allowed; allowed: begin and end, s, of an impact "
             f"between {time[0]:g} and {time[-1]:g}"
@@ -142,6 +143,7 @@ class ForceMisfit:
         self.time, self.force, self.sample_rate = time, force, sample_rate
         self.kind, self.known_noise, self.free_shift = kind, noise is not None, free_shift
         self.unit_deviation = noise or 1.0
+        self.below = below
         self.period = len(time) / sample_rate
         self.frequency = np.arange(int(below * self.period * (1 + 1e-12)) + 1) / self.period
         # Orthonormal: white noise of a deviation in time is white noise of that deviation here.
@@ -213,8 +215,8 @@ class ForceMisfit:
             return ""
         square = (residual[inside] ** 2).sum() / during
         other = (residual[~inside] ** 2).sum() / else_
-        rounding = (ROUNDING * self.force.max()) ** 2
-        if square < max(stats.f.ppf(SURE, during, else_) * other, rounding):
+        numerical = (NUMERICAL * self.force.max()) ** 2
+        if square < max(stats.f.ppf(SURE, during, else_) * other, numerical):
             return ""
         return (
             f"the residual is {np.sqrt(square):.3g} N during the contact and {np.sqrt(other):.3g} "

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import stats
 from scipy.linalg import qr
+
+from thud.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-# A column of the Jacobian this much smaller than the target is none.
+# A column of the Jacobian this much smaller than the target is none, nor is one with this error.
 NO_EFFECT = 1e-9
+UNRESOLVED = 0.5
 # Singular values of the Jacobian below this part of the largest, or below this many of its own
 # errors, are taken for zero.
 LEAST_RATIO = 1e-6
@@ -44,15 +48,15 @@ class Inference:
     null: NDArray[np.float64]
 
 
-def infer(jacobian: NDArray[np.float64], error: float, size: float) -> Inference:
+def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float) -> Inference:
     """Return covariance and directions in which nothing is known.
 
     Parameters
     ----------
     jacobian : ndarray, shape (m, n)
         Derivatives of the weighted residuals with the scaled parameters.
-    error
-        Error of its columns over their length.
+    finer : ndarray, shape (m, n)
+        The same with other steps: the difference is the error.
     size
         Length of the weighted target.
 
@@ -63,8 +67,10 @@ def infer(jacobian: NDArray[np.float64], error: float, size: float) -> Inference
     """
     count = jacobian.shape[1]
     length = np.linalg.norm(jacobian, axis=0)
-    dead = length <= NO_EFFECT * size
+    change = np.linalg.norm(jacobian - finer, axis=0)
+    dead = (length <= NO_EFFECT * size) | (change > UNRESOLVED * length)
     length[dead] = 1.0
+    error = np.max(change / length, where=~dead, initial=0.0)
     _, values, turned = np.linalg.svd(np.where(dead, 0.0, jacobian / length), full_matrices=True)
     values = np.concatenate([values, np.zeros(count - len(values))])
     lost = values <= max(LEAST_RATIO, ERRORS * error) * values[0]
@@ -110,7 +116,7 @@ def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
     apart = (
         f"the data do not tell {_join([name for name, _ in part])} apart: {_change(part)} together"
     )
-    return f"{apart} leave what is compared as it is{_product(names, part)}"
+    return f"{apart} leave what is compared as it is{_product(part)}"
 
 
 def weak_sentence(
@@ -136,19 +142,20 @@ def weak_sentence(
         )
     return (
         f"the data hardly tell {_join([name for name, _ in part])} apart: along {_change(part)} "
-        f"the {level:.0%} interval is +-{share}{_product(names, part)}"
+        f"the {level:.0%} interval is +-{share}{_product(part)}"
     )
 
 
 def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[str, float]]:
-    """Return names and entries of a direction, the largest first, without what is negligible."""
+    """Return names and entries of a direction without what is negligible; the largest is 1."""
     largest = np.abs(direction).max()
     found = [
         (name, float(value / largest))
         for name, value in zip(names, direction, strict=True)
         if abs(value) > SMALL * largest
     ]
-    return sorted(found, key=lambda entry: -abs(entry[1]))
+    sign = np.sign(found[0][1])
+    return [(name, sign * value) for name, value in found]
 
 
 def _join(words: Sequence[str]) -> str:
@@ -158,14 +165,40 @@ def _join(words: Sequence[str]) -> str:
 
 def _change(part: Sequence[tuple[str, float]]) -> str:
     """Return a small change along a direction."""
-    sign = np.sign(part[0][1])
-    return _join([f"{name} {sign * value:+.2g} %" for name, value in part])
+    return _join([f"{name} {value:+.2g} %" for name, value in part])
 
 
-def _product(names: Sequence[str], part: Sequence[tuple[str, float]]) -> str:
+def _product(part: Sequence[tuple[str, float]]) -> str:
     """Return what two parameters that change together determine."""
     if len(part) > 2:  # noqa: PLR2004 - a pair determines one product of powers
         return ""
-    first, second = (name for name in names if name in dict(part))
-    power = -dict(part)[first] / dict(part)[second]
+    (first, one), (second, other) = part
+    power = -one / other
     return f"; only {first} * {second}^{power:.3g} is determined, close to these values"
+
+
+def coverage_factor(level: float, freedom: int | None) -> float:
+    """Return how many standard errors a two-sided interval reaches.
+
+    Parameters
+    ----------
+    level
+        Confidence of the interval.
+    freedom
+        Degrees of freedom of Student's t; None where the noise is known.
+
+    Raises
+    ------
+    InputError
+        Where the level is not between 0 and 1.
+    """
+    require_level(level)
+    place = (1 + level) / 2
+    return float(stats.norm.ppf(place) if freedom is None else stats.t.ppf(place, freedom))
+
+
+def require_level(level: object) -> None:
+    """Complain about a confidence that is none."""
+    if not (isinstance(level, float | np.floating) and 0 < level < 1):
+        message = f"level = {level!r} is not allowed; allowed: 0 < level < 1"
+        raise InputError(message)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -58,11 +59,15 @@ class LevelTarget:
             )
             raise InputError(message)
         nominal = get_bands(self.bands).nominal.tolist()
-        asked = nominal if self.frequencies is None else list(self.frequencies)
+        asked = nominal
+        if self.frequencies is not None:
+            count = len(self.frequencies) if isinstance(self.frequencies, Sized) else 1
+            asked = numbers("frequencies", self.frequencies, count).tolist()
         if not set(asked) <= set(nominal) or len(set(asked)) < len(asked):
+            known = ", ".join(f"{frequency:g}" for frequency in nominal)
             message = (
-                f"target: frequencies = {asked!r} are not allowed; allowed: nominal mid "
-                f"frequencies of {self.bands} bands, {', '.join(f'{f:g}' for f in nominal)}"
+                f"target: frequencies = {self.frequencies!r} are not allowed; "
+                f"allowed: nominal mid frequencies of {self.bands} bands, {known}"
             )
             raise InputError(message)
         levels = numbers("levels", self.levels, len(asked))

@@ -28,6 +28,8 @@ UNITS = {
     "Hz": {"Hz": 1.0, "kHz": 1e3},
     "": {"1": 1.0, "%": 1e-2},
 }
+# The ones that tables and figures choose from, ascending.
+HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
 # A start that lies on a limit is moved away from it by this part of itself.
 INSIDE = 0.01
 # A limit of the library that is this much larger than the start does not guide the search.
@@ -250,3 +252,10 @@ def unit_factor(name: str, key_unit: str, unit: object) -> float:
         message = f"{name}: unit = {unit!r} is not allowed; allowed: {allowed}"
         raise InputError(message)
     return known[unit]
+
+
+def handy_unit(unit: str, value: float) -> tuple[str, float]:
+    """Return a unit in which a value has a digit before its point, and how many SI units it is."""
+    known = {name: UNITS.get(unit, {}).get(name) for name in HANDY.get(unit, ())}
+    small = [(name, factor) for name, factor in known.items() if factor and factor <= abs(value)]
+    return small[-1] if small and value else (unit, 1.0)

@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
 
 from thud._library import version
 from thud.case import write_case
 from thud.checks import replace_file
-from thud.errors import InputError
+from thud.fitting.inference import coverage_factor
+from thud.fitting.parameters import handy_unit
 
 if TYPE_CHECKING:
     import os
@@ -111,7 +111,7 @@ class Fit:
 
     @property
     def reduced_chi_square(self) -> float:
-        """Sum of squared residuals over degrees of freedom; 1 where they tell the noise."""
+        """Squared residuals over degrees of freedom; 1 where they tell the noise."""
         freedom = self.degrees_of_freedom
         return float(self.residuals @ self.residuals / freedom) if freedom else float("nan")
 
@@ -128,13 +128,18 @@ class Fit:
         level
             Confidence; by default that of the fit.
         """
-        factor = coverage_factor(self, self.level if level is None else level)
+        factor = self._coverage_factor(level)
         return {
             name: (value - factor * error, value + factor * error)
             for (name, value), error in zip(
                 self.values.items(), self.standard_errors.values(), strict=True
             )
         }
+
+    def _coverage_factor(self, level: float | None = None) -> float:
+        """Return how many standard errors an interval reaches."""
+        freedom = None if self.known_noise else self.degrees_of_freedom
+        return coverage_factor(self.level if level is None else level, freedom)
 
     def table(self, units: Mapping[str, tuple[str, float]] | None = None) -> str:
         """Return the fit as text.
@@ -165,10 +170,11 @@ class Fit:
         self, units: Mapping[str, tuple[str, float]] | None = None
     ) -> dict[str, tuple[str, float]]:
         """Return the units of tables and figures: name, and how many SI units it is."""
-        plain = {name: (unit, 1.0) for name, unit in zip(self.names, self.units, strict=True)}
-        if SHIFT in plain:
-            plain[SHIFT] = ("ms", 1e-3)
-        return {**plain, **(units or {})}
+        handy = {
+            name: handy_unit(unit, value)
+            for (name, value), unit in zip(self.values.items(), self.units, strict=True)
+        }
+        return {**handy, **(units or {})}
 
     def _remarks(self) -> list[str]:
         """Return the quality of the fit, one sentence per line."""
@@ -189,13 +195,7 @@ class Fit:
         return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
 
     def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
-        """Return the figures by name: ``"fit"`` and, of two or more parameters, ``"confidence"``.
-
-        Parameters
-        ----------
-        units
-            Other units by parameter, as in `table`.
-        """
+        """Return the figures by name; `units` as in `table`."""
         from thud.fitting import drawing  # noqa: PLC0415 - matplotlib takes its time
 
         figures = {"fit": drawing.target_and_fit(self)}
@@ -281,28 +281,6 @@ class Fit:
                     paths.append(folder / f"{name}.{ending}")
                     plot.save(figure, paths[-1])
         return paths
-
-
-def coverage_factor(fit: Fit, level: float) -> float:
-    """Return how many standard errors a two-sided interval reaches.
-
-    Raises
-    ------
-    InputError
-        Where the level is not between 0 and 1.
-    """
-    require_level(level)
-    place = (1 + level) / 2
-    if fit.known_noise:
-        return float(stats.norm.ppf(place))
-    return float(stats.t.ppf(place, fit.degrees_of_freedom))
-
-
-def require_level(level: object) -> None:
-    """Complain about a confidence that is none."""
-    if not (isinstance(level, float | np.floating) and 0 < level < 1):
-        message = f"level = {level!r} is not allowed; allowed: 0 < level < 1"
-        raise InputError(message)
 
 
 def _digits(value: float, error: float) -> int:

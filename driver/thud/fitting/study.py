@@ -13,7 +13,7 @@ import numpy as np
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.errors import FitWarning, InputError, NumericalError
+from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget
 from thud.fitting.parameters import Parameter, require_known, unit_factor
@@ -88,10 +88,8 @@ def read_study(path: str | os.PathLike[str]) -> Study:
     try:
         return _study(place, content)
     except InputError as error:
-        message = str(error)
-        raise InputError(
-            message if message.startswith(f"{place.parent}/") else f"{path}: {message}"
-        ) from error
+        message = f"{path}: {error}"
+        raise InputError(message) from error
 
 
 def _study(place: Path, content: dict[str, Any]) -> Study:
@@ -166,7 +164,11 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
 def run(options: argparse.Namespace) -> int:
     """Run the command ``thud-driver fit``: print the fit, save it, return the exit code."""
     study = read_study(options.study)
-    found = study.run(progress=not options.quiet)
+    try:
+        found = study.run(progress=not options.quiet)
+    except ThudError as error:
+        message = f"{options.study}: {error}"
+        raise type(error)(message) from error
     folder = Path(options.output or Path("outputs", study.name))
     found.save(folder, study.units, figures=not options.no_figures, study=study.content)
     if not options.quiet:
