@@ -194,10 +194,13 @@ def _draw_pair(
     half = 1.25 * np.sqrt(square * np.diag(block))
     axes.set_xlim(centre[0] - half[0], centre[0] + half[0])
     axes.set_ylim(centre[1] - half[1], centre[1] + half[1])
-    axes.xaxis.set_major_locator(MaxNLocator(2))
-    axes.yaxis.set_major_locator(MaxNLocator(3))
+    ticks = 4 if len(fit.names) == len(pair) else 2
+    axes.xaxis.set_major_locator(MaxNLocator(ticks))
+    axes.yaxis.set_major_locator(MaxNLocator(ticks + 1))
     axes.ticklabel_format(useOffset=False)
-    axes.set_title(f"correlation {fit.correlation[pair]:.2f}", fontsize=SIZE - 1)
+    share = fit.correlation[pair]
+    digits = 2 if abs(share) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
+    axes.set_title(f"correlation {share:.{digits}f}", fontsize=SIZE - 1)
 
 
 def _add_ellipse(axes: Axes, centre: NDArray[np.float64], block: NDArray[np.float64]) -> None:

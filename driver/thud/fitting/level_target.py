@@ -64,10 +64,10 @@ class LevelTarget:
             count = len(self.frequencies) if isinstance(self.frequencies, Sized) else 1
             asked = numbers("frequencies", self.frequencies, count).tolist()
         if not set(asked) <= set(nominal) or len(set(asked)) < len(asked):
-            known = ", ".join(f"{frequency:g}" for frequency in nominal)
+            listed = ", ".join(f"{frequency:g}" for frequency in nominal)
             message = (
                 f"target: frequencies = {self.frequencies!r} are not allowed; "
-                f"allowed: nominal mid frequencies of {self.bands} bands, {known}"
+                f"allowed: nominal mid frequencies of {self.bands} bands, {listed}"
             )
             raise InputError(message)
         levels = numbers("levels", self.levels, len(asked))
