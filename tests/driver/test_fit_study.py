@@ -107,6 +107,8 @@ def test_search_without_an_end_is_a_failure(
         ("1.4", "-1", r"youngs_modulus: start = -1e\+06 is not allowed; allowed: 0 <= start <="),
         ("1.4", "'soft'", r"youngs_modulus\] start = 'soft' is not allowed; allowed: real numbers"),
         ("1.4", "nan", r"start = nan is not allowed"),
+        ("1.4", f"1{'0' * 400}", r"start = a very large number is not allowed"),
+        ("[parameters.youngs_modulus]", "[parameters]", r"parameters\] start is not a parameter"),
         ("start", "begin", r"begin is not a known key; allowed: start, lower, upper, unit"),
         ("file", "files", r"\[target\] takes one of file and levels"),
         ("record.csv", "nowhere.csv", r"nowhere.csv: cannot be read"),

@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from tqdm import tqdm
 
 from thud.case import Case, read_case
@@ -31,6 +30,7 @@ OPTIONS = ("level", "starts", "seed", "max_steps")
 WHOLE = ("starts", "seed", "max_steps")
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
 LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
+LARGE = 1e300
 PARAMETER_KEYS = ("start", "lower", "upper", "unit")
 
 
@@ -190,9 +190,9 @@ def _require_keys(where: str, table: Mapping[str, object], known: Iterable[str])
 def _table(name: str, content: Mapping[str, Any], where: str = "") -> dict[str, Any]:
     """Return a table of a file."""
     table = content.get(name)
-    if not isinstance(table, dict) or not table:
+    if not isinstance(table, dict):
         place = where or f"[{name}]"
-        message = f"{place} is missing or not a table with entries; allowed: keys and values"
+        message = f"{place} is missing or not a table; allowed: keys and values"
         raise InputError(message)
     return table
 
@@ -208,8 +208,9 @@ def _text(name: str, value: object) -> str:
 def _number(name: str, value: object, *, whole: bool = False) -> float:
     """Return a finite number of a file."""
     kind = int if whole else float | int
-    if isinstance(value, bool) or not isinstance(value, kind) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, kind) or not abs(value) < LARGE:
         allowed = "whole numbers" if whole else "real numbers"
-        message = f"{name} = {value!r} is not allowed; allowed: {allowed}"
+        shown = "a very large number" if isinstance(value, int) and value > LARGE else repr(value)
+        message = f"{name} = {shown} is not allowed; allowed: {allowed}"
         raise InputError(message)
     return value
