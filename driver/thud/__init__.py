@@ -23,7 +23,7 @@ from thud.case import (
     read_case,
     write_case,
 )
-from thud.errors import InputError, NumericalError, ThudError
+from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
 from thud.impact import Impact, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
@@ -42,6 +42,7 @@ __all__ = [
     "Criterion",
     "Drop",
     "FiniteElement",
+    "FitWarning",
     "FreeModes",
     "HollowSphere",
     "HuntCrossley",
@@ -70,12 +71,18 @@ __all__ = [
 ]
 
 
-# What needs matplotlib or plotly is imported when it is first asked for: they take their time.
+# What needs matplotlib, plotly or SciPy is imported when it is first asked for: they take time.
 _LATE = {
     "plot": None,
     "mesh_plot": None,
     "comparison": None,
     "compare": "comparison",
+    "fitting": None,
+    "Fit": "fitting",
+    "ForceTarget": "fitting",
+    "LevelTarget": "fitting",
+    "Parameter": "fitting",
+    "fit": "fitting",
     "read_all": "comparison",
 }
 

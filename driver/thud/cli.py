@@ -110,6 +110,15 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--source", choices=("rubber_ball", "tyre"), default="rubber_ball")
     compare.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors")
 
+    fit = commands.add_parser("fit", help="parameters of a model from a force or from levels")
+    fit.set_defaults(command=_fit)
+    fit.add_argument("study", metavar="STUDY.toml", help="target, parameters and base case")
+    fit.add_argument(
+        "-o", "--output", metavar="DIR", help="directory for the results (default: outputs/<study>)"
+    )
+    fit.add_argument("-q", "--quiet", action="store_true", help="show nothing but warnings")
+    fit.add_argument("--no-figures", action="store_true", help="results only")
+
     figures = commands.add_parser(
         "figures", help="draw the figures of the paper and of the documentation"
     )
@@ -238,6 +247,12 @@ def _compare(options: argparse.Namespace) -> int:
             print("   ".join(cell.ljust(width) for cell, width in cells).rstrip())
         print(f"Page: {paths[-1]}")
     return 0
+
+
+def _fit(options: argparse.Namespace) -> int:
+    """Fit parameters as a study says."""
+    _require_output(options.output)
+    return int(thud.fitting.run(options))
 
 
 def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:

@@ -13,6 +13,10 @@ class ThudError(Exception):
     exit_code = 2
 
 
+class FitWarning(UserWarning):
+    """A fit has an answer that is not to be trusted in every respect."""
+
+
 class InputError(ThudError, ValueError):
     """The input cannot be used; names group, key, value and allowed range."""
 

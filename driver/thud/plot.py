@@ -44,10 +44,10 @@ FORMATS = ("pdf", "png", "svg")
 def empty_axes(height: float) -> tuple[Figure, Axes]:
     """Return an empty figure of column width and its axes."""
     figure = Figure(figsize=(WIDTH, height), dpi=300, layout="constrained")
-    return figure, _dress(figure.add_subplot())
+    return figure, dress(figure.add_subplot())
 
 
-def _dress(axes: Axes) -> Axes:
+def dress(axes: Axes) -> Axes:
     """Give axes the look of all figures."""
     axes.tick_params(labelsize=SIZE)
     axes.grid(visible=True, linewidth=0.4, alpha=0.5)
@@ -239,10 +239,10 @@ def comparison_page(
     """
     figure = Figure(figsize=(2 * WIDTH, 7.5), dpi=200, layout="constrained")
     rows = figure.add_gridspec(3, 2, height_ratios=[3, 3, 0.35 + 0.25 * len(table)])
-    history = _dress(figure.add_subplot(rows[0, :]))
+    history = dress(figure.add_subplot(rows[0, :]))
     panels = {
-        "octave": _dress(figure.add_subplot(rows[1, 0])),
-        "third": _dress(figure.add_subplot(rows[1, 1])),
+        "octave": dress(figure.add_subplot(rows[1, 0])),
+        "third": dress(figure.add_subplot(rows[1, 1])),
     }
     _draw_tolerance(panels["octave"], source)
     _draw_forces(history, impacts, force)

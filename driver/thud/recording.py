@@ -52,21 +52,7 @@ class Recording:
         InputError
             Where the file is missing or does not hold at least eight evenly spaced samples.
         """
-        try:
-            if not Path(path).is_file():  # to open a pipe could take for ever
-                raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
-            text = Path(path).read_text(encoding="utf-8-sig")
-            lines = [line for line in text.splitlines() if line.strip() and line[0] != "#"]
-            if not any(map(_is_number, lines[0].split(","))):
-                del lines[0]
-            if not lines:
-                message = "no numbers"
-                raise ValueError(message)  # noqa: TRY301 - one sentence for all that is unreadable
-            table = np.loadtxt(lines, delimiter=",", ndmin=2)
-        except (IndexError, OSError, ValueError) as error:
-            message = f"{path}: cannot be read ({error}); allowed: columns of time, s, and force, N"
-            raise InputError(message) from error
-        return cls.from_arrays(table, str(path))
+        return cls.from_arrays(read_table(path), str(path))
 
     @classmethod
     def from_arrays(cls, table: NDArray[np.float64], name: str = "recording") -> Recording:
@@ -119,6 +105,31 @@ class Recording:
         return force_exposure_levels(
             self.force(force or "floor"), self.sample_rate, bands, method or "exact"
         )
+
+
+def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """Return the numbers of a file of columns with commas between, with or without a header.
+
+    Raises
+    ------
+    InputError
+        Where the file is missing or holds something else.
+    """
+    try:
+        if not Path(path).is_file():  # to open a pipe could take for ever
+            raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
+        text = Path(path).read_text(encoding="utf-8-sig")
+        lines = [line for line in text.splitlines() if line.strip() and line[0] != "#"]
+        if not any(map(_is_number, lines[0].split(","))):
+            del lines[0]
+        if not lines:
+            message = "no numbers"
+            raise ValueError(message)  # noqa: TRY301 - one sentence for all that is unreadable
+        table = np.loadtxt(lines, delimiter=",", ndmin=2)
+    except (IndexError, OSError, ValueError) as error:
+        message = f"{path}: cannot be read ({error}); allowed: columns of time, s, and force, N"
+        raise InputError(message) from error
+    return table
 
 
 def _is_number(word: str) -> bool:

@@ -1,0 +1,204 @@
+"""What residuals and Jacobian of a fit tell of its parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+from scipy.linalg import qr
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# A column of the Jacobian this much smaller than the target is none, nor is one with this error.
+NO_EFFECT = 1e-9
+UNRESOLVED = 0.5
+# Singular values of the Jacobian below this part of the largest, or below this many of its own
+# errors, are taken for zero.
+LEAST_RATIO = 1e-6
+ERRORS = 3.0
+# Part of a unit vector below which a parameter does not belong to it.
+NEGLIGIBLE = 1e-3
+# Part of the largest entry below which a sentence leaves a parameter out.
+SMALL = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Inference:
+    """Covariance of scaled parameters, and directions in which nothing is known.
+
+    Attributes
+    ----------
+    covariance : ndarray, shape (n, n)
+        Covariance for residuals of unit variance; infinite where nothing is known.
+    singular_values : ndarray, shape (n,)
+        Singular values of the Jacobian with columns of unit length, the largest first.
+    null : ndarray, shape (n_null, n)
+        Changes of the parameters that change nothing else, as few at a time as can be.
+    """
+
+    covariance: NDArray[np.float64]
+    singular_values: NDArray[np.float64]
+    null: NDArray[np.float64]
+
+
+def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float) -> Inference:
+    """Return covariance and directions in which nothing is known.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (m, n)
+        Derivatives of the weighted residuals with the scaled parameters.
+    finer : ndarray, shape (m, n)
+        The same with other steps: the difference is the error.
+    size
+        Length of the weighted target.
+
+    Returns
+    -------
+    Inference
+        Covariance, singular values, null directions.
+    """
+    count = jacobian.shape[1]
+    length = np.linalg.norm(jacobian, axis=0)
+    change = np.linalg.norm(jacobian - finer, axis=0)
+    dead = (length <= NO_EFFECT * size) | (change > UNRESOLVED * length)
+    length[dead] = 1.0
+    error = np.max(change / length, where=~dead, initial=0.0)
+    _, values, turned = np.linalg.svd(np.where(dead, 0.0, jacobian / length), full_matrices=True)
+    values = np.concatenate([values, np.zeros(count - len(values))])
+    lost = values <= max(LEAST_RATIO, ERRORS * error) * values[0]
+    known = turned[~lost] / values[~lost, np.newaxis]
+    covariance = known.T @ known / np.outer(length, length)
+    unknown = (np.abs(turned[lost]) > NEGLIGIBLE).any(axis=0)
+    covariance[unknown] = covariance[:, unknown] = np.nan
+    covariance[unknown, unknown] = np.inf
+    return Inference(covariance, values, _sparse(turned[lost] / length))
+
+
+def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return another basis of the same space, in which each of as many columns has one entry."""
+    if not len(rows):
+        return rows
+    # The parameters that vary most stand for the directions.
+    _, _, order = qr(rows, pivoting=True)
+    basis = np.linalg.solve(rows[:, order[: len(rows)]], rows)
+    result: NDArray[np.float64] = basis / np.abs(basis).max(axis=1, keepdims=True)
+    return result
+
+
+def worst_directions(
+    covariance: NDArray[np.float64], most: float
+) -> list[tuple[float, NDArray[np.float64]]]:
+    """Return directions of scaled parameters with a larger standard deviation than allowed."""
+    finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
+    variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
+    found = []
+    for variance, vector in zip(variances[::-1], vectors.T[::-1], strict=True):
+        if variance > most**2:
+            direction = np.zeros(len(covariance))
+            direction[finite] = vector
+            found.append((float(np.sqrt(variance)), direction))
+    return found
+
+
+def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
+    """Return what a direction in which nothing is known means."""
+    part = _parts(names, direction)
+    if len(part) == 1:
+        return f"{part[0][0]} has no effect on what is compared: it cannot be fitted to this target"
+    apart = (
+        f"the data do not tell {_join([name for name, _ in part])} apart: {_change(part)} together"
+    )
+    return f"{apart} leave what is compared as it is{_product(part)}"
+
+
+def weak_sentence(
+    names: Sequence[str], direction: NDArray[np.float64], width: float, level: float
+) -> str:
+    """Return what a direction in which little is known means.
+
+    Parameters
+    ----------
+    names, direction
+        The parameters, and how they change together.
+    width
+        Half the confidence interval of that change, relative.
+    level
+        Confidence of the interval.
+    """
+    part = _parts(names, direction)
+    share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
+    if len(part) == 1:
+        return (
+            f"the data tell little of {part[0][0]}: its {level:.0%} interval is +-{share} of its "
+            "value"
+        )
+    return (
+        f"the data hardly tell {_join([name for name, _ in part])} apart: along {_change(part)} "
+        f"the {level:.0%} interval is +-{share}{_product(part)}"
+    )
+
+
+def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[str, float]]:
+    """Return names and entries of a direction without what is negligible; the largest is 1."""
+    largest = np.abs(direction).max()
+    found = [
+        (name, float(value / largest))
+        for name, value in zip(names, direction, strict=True)
+        if abs(value) > SMALL * largest
+    ]
+    sign = np.sign(found[0][1])
+    return [(name, sign * value) for name, value in found]
+
+
+def _join(words: Sequence[str]) -> str:
+    """Return words as a list in a sentence."""
+    return f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _change(part: Sequence[tuple[str, float]]) -> str:
+    """Return a small change along a direction."""
+    return _join([f"{name} {value:+.2g} %" for name, value in part])
+
+
+def _product(part: Sequence[tuple[str, float]]) -> str:
+    """Return what two parameters that change together determine."""
+    if len(part) > 2:  # noqa: PLR2004 - a pair determines one product of powers
+        return ""
+    (first, one), (second, other) = part
+    power = -one / other
+    return f"; only {first} * {second}^{power:.3g} is determined, close to these values"
+
+
+def coverage_factor(level: float, freedom: int | None) -> float:
+    """Return how many standard errors a two-sided interval reaches.
+
+    Parameters
+    ----------
+    level
+        Confidence of the interval.
+    freedom
+        Degrees of freedom of Student's t; None where the noise is known.
+
+    Raises
+    ------
+    InputError
+        Where the level is not between 0 and 1.
+    """
+    require_level(level)
+    place = (1 + level) / 2
+    return float(stats.norm.ppf(place) if freedom is None else stats.t.ppf(place, freedom))
+
+
+def require_level(level: object) -> None:
+    """Complain about a confidence that is none."""
+    if not (isinstance(level, float | np.floating) and 0 < level < 1):
+        message = f"level = {level!r} is not allowed; allowed: 0 < level < 1"
+        raise InputError(message)

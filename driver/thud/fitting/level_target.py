@@ -1,0 +1,163 @@
+"""Levels as the target of a fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sized
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.errors import InputError
+from thud.fitting.misfit import numbers, require_positive
+from thud.impact import FORCES
+from thud.levels import BANDWIDTHS, get_bands
+from thud.models import FiniteElement, ModalBall
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.impact import Impact
+
+
+@dataclass(frozen=True, eq=False)
+class LevelTarget:
+    """Levels to be fitted, and what else is known of the impact.
+
+    Attributes
+    ----------
+    levels : sequence of float, shape (n_band,)
+        Force exposure levels, dB.
+    uncertainty : float or sequence of float or None
+        Standard deviations of the levels, dB; None: one for all, told from the residual.
+    bands : str
+        ``"octave"`` or ``"third"``.
+    frequencies : sequence of float or None
+        Nominal mid frequencies of the levels, Hz; None: all bands.
+    contact_time, restitution : tuple of float or None
+        Value and standard deviation, s and 1.
+    force : str
+        ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared.
+    """
+
+    levels: Sequence[float]
+    uncertainty: float | Sequence[float] | None = None
+    bands: str = "octave"
+    frequencies: Sequence[float] | None = None
+    contact_time: tuple[float, float] | None = None
+    restitution: tuple[float, float] | None = None
+    force: str = "floor"
+
+    def misfit(self) -> LevelMisfit:
+        """Return what the fit needs of the target."""
+        if self.bands not in BANDWIDTHS or self.force not in FORCES:
+            message = (
+                f"target: bands = {self.bands!r} or force = {self.force!r} is not known; "
+                "allowed: 'octave', 'third'; 'elastic', 'floor'"
+            )
+            raise InputError(message)
+        nominal = get_bands(self.bands).nominal.tolist()
+        asked = nominal
+        if self.frequencies is not None:
+            count = len(self.frequencies) if isinstance(self.frequencies, Sized) else 1
+            asked = numbers("frequencies", self.frequencies, count).tolist()
+        if not set(asked) <= set(nominal) or len(set(asked)) < len(asked):
+            listed = ", ".join(f"{frequency:g}" for frequency in nominal)
+            message = (
+                f"target: frequencies = {self.frequencies!r} are not allowed; "
+                f"allowed: nominal mid frequencies of {self.bands} bands, {listed}"
+            )
+            raise InputError(message)
+        levels = numbers("levels", self.levels, len(asked))
+        deviation = np.ones_like(levels)
+        if self.uncertainty is not None:
+            entries: object = self.uncertainty
+            if isinstance(entries, float | int):
+                entries = [entries] * len(levels)
+            deviation = numbers("uncertainty", entries, len(levels))
+        extra = {"contact_time": self.contact_time, "restitution": self.restitution}
+        known = {name: numbers(name, pair, 2) for name, pair in extra.items() if pair is not None}
+        if known and self.uncertainty is None:
+            message = "target: uncertainty of the levels is missing; allowed: dB, above 0"
+            raise InputError(message)
+        target = np.concatenate([levels, [pair[0] for pair in known.values()]])
+        deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
+        for value in deviation:
+            require_positive("uncertainty", value, "dB, s or 1")
+        return LevelMisfit(self, [nominal.index(f) for f in asked], target, deviation, list(known))
+
+
+class LevelMisfit:
+    """How far levels of an impact are from a target; see `Misfit`."""
+
+    free_shift = False
+    unit_deviation = 1.0
+
+    def __init__(
+        self,
+        target: LevelTarget,
+        places: list[int],
+        values: NDArray[np.float64],
+        deviation: NDArray[np.float64],
+        extra: list[str],
+    ) -> None:
+        self.bands, self.kind = target.bands, target.force
+        self.places, self.target, self.deviation, self.extra = places, values, deviation, extra
+        self.known_noise = target.uncertainty is not None
+        self.size = len(values)
+
+    def values(self, impact: Impact) -> NDArray[np.float64]:
+        """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
+        levels = impact.levels(self.bands, force=self.kind)[self.places]
+        known = {"contact_time": release(impact), "restitution": impact.restitution}
+        return np.concatenate([levels, [known[name] for name in self.extra]])
+
+    def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return model minus target over standard deviation, shape (size,)."""
+        return (self.values(impact) - self.target) / self.deviation
+
+    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return zeros: levels do not know of time."""
+        return np.zeros(self.size)
+
+    def first_shift(self, impact: Impact) -> float:  # noqa: ARG002
+        """Return zero: levels do not know of time."""
+        return 0.0
+
+    def target_vector(self) -> NDArray[np.float64]:
+        """Return the target over standard deviation, shape (size,)."""
+        return self.target / self.deviation
+
+    def columns(self, impact: Impact, shift: float) -> dict[str, list[object]]:  # noqa: ARG002
+        """Return target and model side by side, dB, s and 1: columns by their names."""
+        nominal = get_bands(self.bands).nominal
+        names = [f"{nominal[place]:g} Hz" for place in self.places]
+        model = self.values(impact)
+        return {
+            "quantity": [*names, *(name.replace("_", " ") for name in self.extra)],
+            "target": self.target.tolist(),
+            "uncertainty": self.deviation.tolist(),
+            "model": model.tolist(),
+            "residual": (model - self.target).tolist(),
+        }
+
+    def doubt(self, impact: Impact, shift: float, count: int) -> str:  # noqa: ARG002
+        """Return nothing: levels do not tell where noise ends and the model's error begins."""
+        return ""
+
+
+def release(impact: Impact) -> float:
+    """Return the contact time between samples, s: some models tell it in whole ones only.
+
+    Their force is continued to zero in a straight line from the last two samples of the contact.
+    """
+    model = impact.case.model
+    if not isinstance(model, ModalBall | FiniteElement):
+        return impact.contact_time
+    last = int(np.flatnonzero(impact.floor_force)[-1])
+    before, end = impact.floor_force[last - 1 : last + 1]
+    part = min(1.0, end / (before - end)) if before > end else 1.0
+    touch = model.flight_before if isinstance(model, FiniteElement) else 0.0
+    return float((last + part) / impact.sample_rate - touch)

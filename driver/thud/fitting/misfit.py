@@ -1,0 +1,71 @@
+"""What the fit needs of a target, and checks of what targets are given."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.impact import Impact
+
+
+class Misfit(Protocol):
+    """How far an impact is from the target, in standard deviations."""
+
+    @property
+    def size(self) -> int:
+        """Number of residuals."""
+
+    @property
+    def known_noise(self) -> bool:
+        """The standard deviations were given; else the residuals tell their common factor."""
+
+    @property
+    def free_shift(self) -> bool:
+        """The time of first touch is not known."""
+
+    @property
+    def unit_deviation(self) -> float:
+        """What residuals are measured in: the noise of forces, N; 1 for levels."""
+
+    def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:
+        """Return model minus target over standard deviation, shape (size,)."""
+
+    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:
+        """Return the derivative of the residual with the time of first touch, 1/s."""
+
+    def first_shift(self, impact: Impact) -> float:
+        """Return a time of first touch to start from, s."""
+
+    def target_vector(self) -> NDArray[np.float64]:
+        """Return the target over standard deviation, shape (size,)."""
+
+    def columns(self, impact: Impact, shift: float) -> dict[str, list[object]]:
+        """Return target and model side by side, SI units, dB: columns by their names."""
+
+    def doubt(self, impact: Impact, shift: float, count: int) -> str:
+        """Return what speaks against the model with so many parameters, or nothing."""
+
+
+def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
+    """Return a list of finite numbers of a given length."""
+    try:
+        array = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != (count,) or not np.isfinite(array).all():
+        message = f"target: {name} = {values!r} is not allowed; allowed: {count} real numbers"
+        raise InputError(message)
+    return array
+
+
+def require_positive(name: str, value: object, unit: str) -> None:
+    """Complain about what is not a number above 0."""
+    if not (isinstance(value, float | int | np.floating) and 0 < value < np.inf):
+        message = f"target: {name} = {value!r} is not allowed; allowed: numbers above 0, {unit}"
+        raise InputError(message)

@@ -1,0 +1,295 @@
+"""The answer of a fit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud._library import version
+from thud.case import write_case
+from thud.checks import replace_file
+from thud.fitting.inference import coverage_factor
+from thud.fitting.parameters import handy_unit
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.case import Case
+    from thud.fitting.misfit import Misfit
+    from thud.impact import Impact
+
+SHIFT = "time_shift"
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Parameters of a model that fit a target best, and how well they are known; SI units.
+
+    Attributes
+    ----------
+    names : tuple of str
+        The parameters; last ``"time_shift"``, the time of first touch in the record, where free.
+    units : tuple of str
+        Their units.
+    estimate : ndarray, shape (n,)
+        Their values.
+    covariance : ndarray, shape (n, n)
+        Their covariance; infinite variances where the data do not tell them apart.
+    singular_values : ndarray, shape (n,)
+        Singular values of the Jacobian with columns of unit length, the largest first.
+    level : float
+        Confidence of the intervals in tables and files.
+    noise : float
+        Standard deviation of one residual: given, or told from the residuals; N for forces, for
+        levels in units of their uncertainties, or dB where none were given.
+    known_noise : bool
+        The standard deviation was given.
+    residuals : ndarray, shape (n_residual,)
+        Model minus target over its standard deviation.
+    evaluations, failures : int
+        Impacts that were computed, and that could not be.
+    converged : bool
+        The search came to an end by itself.
+    warnings : tuple of str
+        What the data do not tell, parameters at their limits, and other doubts, as sentences.
+    case : Case
+        The base case with the fitted values.
+    impact : Impact
+        Its impact.
+    misfit : Misfit
+        The target as the fit saw it.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    estimate: NDArray[np.float64]
+    covariance: NDArray[np.float64]
+    singular_values: NDArray[np.float64]
+    level: float
+    noise: float
+    known_noise: bool
+    residuals: NDArray[np.float64]
+    evaluations: int
+    failures: int
+    converged: bool
+    warnings: tuple[str, ...]
+    case: Case
+    impact: Impact
+    misfit: Misfit
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values of the parameters by name."""
+        return dict(zip(self.names, map(float, self.estimate), strict=True))
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard errors of the parameters by name."""
+        errors = np.sqrt(np.diag(self.covariance))
+        return dict(zip(self.names, map(float, errors), strict=True))
+
+    @property
+    def correlation(self) -> NDArray[np.float64]:
+        """Correlation of the parameters, shape (n, n); NaN where a variance is infinite."""
+        errors = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore"):
+            result: NDArray[np.float64] = self.covariance / np.outer(errors, errors)
+        return result
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Residuals less parameters."""
+        return len(self.residuals) - len(self.names)
+
+    @property
+    def reduced_chi_square(self) -> float:
+        """Squared residuals over degrees of freedom; 1 where they tell the noise."""
+        freedom = self.degrees_of_freedom
+        return float(self.residuals @ self.residuals / freedom) if freedom else float("nan")
+
+    @property
+    def time_shift(self) -> float:
+        """Time of first touch in the record, s."""
+        return self.values.get(SHIFT, 0.0)
+
+    def intervals(self, level: float | None = None) -> dict[str, tuple[float, float]]:
+        """Return confidence intervals by name, Student's t where the residuals tell the noise.
+
+        Parameters
+        ----------
+        level
+            Confidence; by default that of the fit.
+        """
+        factor = self._coverage_factor(level)
+        return {
+            name: (value - factor * error, value + factor * error)
+            for (name, value), error in zip(
+                self.values.items(), self.standard_errors.values(), strict=True
+            )
+        }
+
+    def _coverage_factor(self, level: float | None = None) -> float:
+        """Return how many standard errors an interval reaches."""
+        freedom = None if self.known_noise else self.degrees_of_freedom
+        return coverage_factor(self.level if level is None else level, freedom)
+
+    def table(self, units: Mapping[str, tuple[str, float]] | None = None) -> str:
+        """Return the fit as text.
+
+        Parameters
+        ----------
+        units
+            Other units by parameter: name, and how many SI units it is.
+        """
+        rows = [("parameter", "value", "standard error", f"{self.level:.0%} interval", "unit")]
+        intervals = self.intervals()
+        for name, (shown, factor) in self.shown_units(units).items():
+            value, error = self.values[name] / factor, self.standard_errors[name] / factor
+            lower, upper = (end / factor for end in intervals[name])
+            digits = _digits(value, error)
+            interval = f"{lower:.{digits}g} to {upper:.{digits}g}"
+            if not np.isfinite(error):
+                interval = "not known"
+            rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        lines = [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+            for row in rows
+        ]
+        return "\n".join([*lines, "", *self._remarks()])
+
+    def shown_units(
+        self, units: Mapping[str, tuple[str, float]] | None = None
+    ) -> dict[str, tuple[str, float]]:
+        """Return the units of tables and figures: name, and how many SI units it is."""
+        handy = {
+            name: handy_unit(unit, value)
+            for (name, value), unit in zip(self.values.items(), self.units, strict=True)
+        }
+        return {**handy, **(units or {})}
+
+    def _remarks(self) -> list[str]:
+        """Return the quality of the fit, one sentence per line."""
+        kind = "given" if self.known_noise else "told from the residuals"
+        freedom = self.degrees_of_freedom
+        quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
+        failures = f", {self.failures} of them impossible" if self.failures else ""
+        return [
+            (
+                f"{len(self.residuals)} data, {freedom} degrees of freedom{quality}; "
+                f"standard deviation {self.noise:.3g}, {kind}"
+            ),
+            f"{self.evaluations} impacts computed{failures}",
+        ]
+
+    def __str__(self) -> str:
+        """Return the fit as text, with its warnings."""
+        return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
+
+    def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
+        """Return the figures by name; `units` as in `table`."""
+        from thud.fitting import drawing  # noqa: PLC0415 - matplotlib takes its time
+
+        figures = {"fit": drawing.target_and_fit(self)}
+        if len(self.names) > 1:
+            figures["confidence"] = drawing.confidence(self, self.shown_units(units))
+        return figures
+
+    def summary(self) -> dict[str, Any]:
+        """Return the numbers of the fit as JSON can hold them: what is not finite is None."""
+        intervals = self.intervals()
+        return {
+            "version": version(),
+            "model": self.case.model.name if self.case.model else None,
+            "parameters": {
+                name: {
+                    "value": self.values[name],
+                    "standard_error": _finite(self.standard_errors[name]),
+                    "interval": [_finite(end) for end in intervals[name]],
+                    "unit": unit,
+                }
+                for name, unit in zip(self.names, self.units, strict=True)
+            },
+            "level": self.level,
+            "covariance": [[_finite(entry) for entry in row] for row in self.covariance],
+            "correlation": [[_finite(entry) for entry in row] for row in self.correlation],
+            "singular_values": self.singular_values.tolist(),
+            "residuals": len(self.residuals),
+            "degrees_of_freedom": self.degrees_of_freedom,
+            "reduced_chi_square": _finite(self.reduced_chi_square),
+            "noise": self.noise,
+            "noise_given": self.known_noise,
+            "evaluations": self.evaluations,
+            "failures": self.failures,
+            "converged": self.converged,
+            "warnings": list(self.warnings),
+        }
+
+    def save(
+        self,
+        directory: str | os.PathLike[str],
+        units: Mapping[str, tuple[str, float]] | None = None,
+        *,
+        figures: bool = True,
+        **extra: object,
+    ) -> list[Path]:
+        """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
+
+        Parameters
+        ----------
+        directory
+            Where they are written.
+        units
+            Other units of the figures by parameter, as in `table`; files have SI units.
+        figures
+            Draw the figures too.
+        **extra
+            What ``fit.json`` is to hold besides.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        OSError
+            Where a file cannot be written.
+        """
+        folder = Path(directory)
+        folder.mkdir(parents=True, exist_ok=True)
+        paths = [folder / "fit.json", folder / "fit.csv", folder / "fitted.nml"]
+        content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
+        replace_file(paths[0], f"{content}\n".encode())
+        columns = self.misfit.columns(self.impact, self.time_shift)
+        rows = [columns, *zip(*columns.values(), strict=True)]
+        replace_file(paths[1], "".join(f"{','.join(map(str, row))}\n" for row in rows).encode())
+        write_case(self.case, paths[2])
+        if figures:
+            from thud import plot  # noqa: PLC0415 - matplotlib takes its time
+
+            for name, figure in self.figures(units).items():
+                for ending in ("png", "svg"):
+                    paths.append(folder / f"{name}.{ending}")
+                    plot.save(figure, paths[-1])
+        return paths
+
+
+def _digits(value: float, error: float) -> int:
+    """Return how many digits show a value to two digits of its error."""
+    if not (np.isfinite(error) and error > 0 and value):
+        return 6
+    return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))
+
+
+def _finite(value: float) -> float | None:
+    """Return a number, or None for what is not finite."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,216 @@
+"""Fits that a file describes, and the command that runs them."""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+import warnings
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tqdm import tqdm
+
+from thud.case import Case, read_case
+from thud.errors import FitWarning, InputError, NumericalError, ThudError
+from thud.fitting.force_target import ForceTarget
+from thud.fitting.level_target import LevelTarget
+from thud.fitting.parameters import Parameter, require_known, unit_factor
+from thud.fitting.search import fit
+from thud.recording import Recording, read_table
+
+if TYPE_CHECKING:
+    import argparse
+    import os
+    from collections.abc import Iterable, Mapping
+
+    from thud.fitting.result import Fit
+
+OPTIONS = ("level", "starts", "seed", "max_steps")
+WHOLE = ("starts", "seed", "max_steps")
+FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
+LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
+LARGE = 1e300
+PARAMETER_KEYS = ("start", "lower", "upper", "unit")
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """A fit as a file describes it.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file without its ending.
+    base : Case
+        Everything that is not fitted.
+    target : ForceTarget or LevelTarget
+        What is fitted.
+    parameters : dict of str to Parameter
+        The parameters, SI units.
+    units : dict of str to tuple
+        Units of the file by parameter: name, and how many SI units it is.
+    options : dict
+        Other arguments of `fit`.
+    content : dict
+        The file as it is.
+    """
+
+    name: str
+    base: Case
+    target: ForceTarget | LevelTarget
+    parameters: dict[str, Parameter]
+    units: dict[str, tuple[str, float]]
+    options: dict[str, Any]
+    content: dict[str, Any]
+
+    def run(self, *, progress: bool = False) -> Fit:
+        """Return the fit; its warnings are not issued."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FitWarning)
+            return fit(self.target, self.parameters, self.base, progress=progress, **self.options)
+
+
+def read_study(path: str | os.PathLike[str]) -> Study:
+    """Read a fit from a TOML file; other files are named from where it stands.
+
+    Raises
+    ------
+    InputError
+        Names file, table, key, value and what is allowed.
+    """
+    place = Path(path)
+    try:
+        content = tomllib.loads(place.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        message = f"{path}: cannot be read ({error}); allowed: a TOML file with a study"
+        raise InputError(message) from error
+    try:
+        return _study(place, content)
+    except InputError as error:
+        message = f"{path}: {error}"
+        raise InputError(message) from error
+
+
+def _study(place: Path, content: dict[str, Any]) -> Study:
+    """Return the study of a file's content."""
+    _require_keys("", content, ("base", "target", "parameters", *OPTIONS))
+    base = Case()
+    if "base" in content:
+        base = read_case(place.parent / _text("base", content["base"]))
+    for name in OPTIONS:
+        if name in content:
+            _number(name, content[name], whole=name in WHOLE)
+    if "seed" in content and content["seed"] < 0:
+        message = f"seed = {content['seed']} is not allowed; allowed: whole numbers from 0"
+        raise InputError(message)
+    parameters: dict[str, Parameter] = {}
+    units = {}
+    for name, entries in _table("parameters", content).items():
+        where = f"[parameters.{name}]"
+        key = require_known(base, name, "[parameters] ")
+        given = _table(name, content["parameters"], where)
+        _require_keys(where, given, PARAMETER_KEYS)
+        factor = 1.0
+        if "unit" in entries:
+            factor = unit_factor(where, key.unit, entries["unit"])
+            units[name] = (entries["unit"], factor)
+        values = {n: _number(f"{where} {n}", v) * factor for n, v in given.items() if n != "unit"}
+        parameters[name] = Parameter(**values)
+    target = _target(place, _table("target", content))
+    options = {name: content[name] for name in OPTIONS if name in content}
+    return Study(place.stem, base, target, parameters, units, options, content)
+
+
+def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
+    """Return the target of a study."""
+    if ("file" in table) == ("levels" in table):
+        message = (
+            "[target] takes one of file and levels; allowed: file = 'record.csv' or levels = [...]"
+        )
+        raise InputError(message)
+    if "file" in table:
+        _require_keys("[target]", table, FORCE_KEYS)
+        options = {name: value for name, value in table.items() if name != "file"}
+        path = place.parent / _text("[target] file", table["file"])
+        samples = read_table(path)
+        Recording.from_arrays(samples, str(path))  # complains about what is no recording
+        for name in ("noise", "below"):
+            if name in options:
+                options[name] = _number(f"[target] {name}", options[name])
+        if not isinstance(options.get("time_shift", True), bool):
+            shown = options["time_shift"]
+            message = f"[target] time_shift = {shown!r} is not allowed; allowed: true, false"
+            raise InputError(message)
+        return ForceTarget((samples[:, 0], samples[:, 1]), **options)
+    _require_keys("[target]", table, LEVEL_KEYS)
+    options = dict(table)
+    for name, unit in (("contact_time", "s"), ("restitution", "")):
+        if name in options:
+            where = f"[target] {name}"
+            pair = _table(name, table, where)
+            _require_keys(where, pair, ("value", "uncertainty", "unit"))
+            factor = unit_factor(where, unit, pair["unit"]) if "unit" in pair else 1.0
+            if not {"value", "uncertainty"} <= set(pair):
+                message = f"{where} = {pair} is not allowed; allowed: value and uncertainty"
+                raise InputError(message)
+            options[name] = tuple(
+                _number(f"{where}: {part}", pair[part]) * factor
+                for part in ("value", "uncertainty")
+            )
+    return LevelTarget(**options)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command ``thud-driver fit``: print the fit, save it, return the exit code."""
+    study = read_study(options.study)
+    try:
+        found = study.run(progress=not options.quiet)
+    except ThudError as error:
+        message = f"{options.study}: {error}"
+        raise type(error)(message) from error
+    folder = Path(options.output or Path("outputs", study.name))
+    found.save(folder, study.units, figures=not options.no_figures, study=study.content)
+    if not options.quiet:
+        tqdm.write(f"{study.name}\n\n{found.table(study.units)}\nResults: {folder}")
+    for sentence in found.warnings:
+        tqdm.write(f"thud-driver: {options.study}: {sentence}", file=sys.stderr)
+    return 0 if found.converged else NumericalError.exit_code
+
+
+def _require_keys(where: str, table: Mapping[str, object], known: Iterable[str]) -> None:
+    """Complain about a key that is not known."""
+    allowed = list(known)
+    for key in table:
+        if key not in allowed:
+            message = f"{where} {key} is not a known key; allowed: {', '.join(allowed)}".lstrip()
+            raise InputError(message)
+
+
+def _table(name: str, content: Mapping[str, Any], where: str = "") -> dict[str, Any]:
+    """Return a table of a file."""
+    table = content.get(name)
+    if not isinstance(table, dict):
+        place = where or f"[{name}]"
+        message = f"{place} is missing or not a table; allowed: keys and values"
+        raise InputError(message)
+    return table
+
+
+def _text(name: str, value: object) -> str:
+    """Return a text of a file."""
+    if not isinstance(value, str) or not value.strip():
+        message = f"{name} = {value!r} is not allowed; allowed: text in quotes"
+        raise InputError(message)
+    return value
+
+
+def _number(name: str, value: object, *, whole: bool = False) -> float:
+    """Return a finite number of a file."""
+    kind = int if whole else float | int
+    if isinstance(value, bool) or not isinstance(value, kind) or not abs(value) < LARGE:
+        allowed = "whole numbers" if whole else "real numbers"
+        shown = "a very large number" if isinstance(value, int) and value > LARGE else repr(value)
+        message = f"{name} = {shown} is not allowed; allowed: {allowed}"
+        raise InputError(message)
+    return value

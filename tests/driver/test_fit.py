@@ -1,0 +1,296 @@
+"""Fits: known parameters come back, intervals cover, what cannot be told apart is told."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import thud
+from thud.fitting.inference import infer
+
+RATE = 44100.0
+TRUTH = thud.Ball(youngs_modulus=1.8e6)
+MODAL = thud.Case(model=thud.ModalBall(damping_law="rising"))
+COARSE = thud.FiniteElement(radial_elements=2, polar_elements=16, snapshot_interval=0.0)
+# Least squares end where a step or a gain is 1e-8; near a perfect fit the last step squares that
+# of the one before, but for the derivative's own error of up to 3e-3.
+SOLVED = 1e-8
+
+
+def quiet_fit(*arguments: object, **options: object) -> thud.Fit:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", thud.FitWarning)
+        return thud.fit(*arguments, **options)  # type: ignore[arg-type]
+
+
+def noisy_record(impact: thud.Impact, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    # 5 ms before first touch, at which no sample lies, and the impact.
+    force = np.random.default_rng(seed).normal(scale=noise, size=1323)
+    force[220:] += impact.floor_force[:1103]
+    return np.arange(1323) / RATE - 0.1, force
+
+
+def test_known_parameters_come_back() -> None:
+    fit = thud.fit(thud.solve(TRUTH, thud.Drop(1.1)), ["youngs_modulus", "height"])
+    assert fit.values == pytest.approx({"youngs_modulus": 1.8e6, "height": 1.1}, rel=SOLVED)
+    assert fit.converged
+    assert fit.case.ball == replace(TRUTH, youngs_modulus=fit.values["youngs_modulus"])
+
+
+@pytest.mark.parametrize(
+    ("base", "truth", "starts"),
+    [
+        (MODAL, {"youngs_modulus": 1.75e6, "loss_factor": 0.18}, {}),
+        (
+            thud.Case(model=COARSE),
+            {"youngs_modulus": 2.08e6, "loss_factor": 0.25},
+            {"youngs_modulus": 1.6e6, "loss_factor": 0.1},
+        ),
+        (
+            thud.Case(model=thud.HuntCrossley(contact_time=0.019, restitution=0.7)),
+            {"contact_time": 0.02, "restitution": 0.8},
+            {},
+        ),
+        (
+            thud.Case(model=thud.MeasuredModes((23.0, 80.0), (0.05, 0.1), (2.4, 0.1))),
+            {"frequency(1)": 24.0, "frequency(2)": 89.0, "damping_ratio(2)": 0.05},
+            {},
+        ),
+    ],
+    ids=["modal_ball", "finite_element", "hunt_crossley", "measured_modes"],
+)
+def test_every_model_can_be_fitted(
+    base: thud.Case, truth: dict[str, float], starts: dict[str, float]
+) -> None:
+    target = thud.solve_case(thud.fitting.with_values(base, truth))
+    fit = thud.fit(target, starts or list(truth), base)
+    assert fit.values == pytest.approx(truth, rel=SOLVED)
+    assert not fit.warnings
+
+
+def test_finite_element_loss_factor_from_noisy_force() -> None:
+    base = thud.Case(model=COARSE)
+    truth = {"youngs_modulus": 2.08e6, "loss_factor": 0.25}
+    record = noisy_record(thud.solve_case(thud.fitting.with_values(base, truth)), 5.0, seed=1)
+    fit = thud.fit(record, list(truth), base)
+    for name, value in truth.items():
+        # A miss by four standard errors has a probability of 6e-5.
+        assert abs(fit.values[name] - value) < 4 * fit.standard_errors[name]
+        assert fit.standard_errors[name] < 0.01 * value
+
+
+def test_time_of_first_touch_is_found_between_samples() -> None:
+    impact = thud.solve(TRUTH)
+    late = 0.0123456
+    time = np.arange(3000) / RATE
+    frequency = np.fft.rfftfreq(3000, 1 / RATE)
+    whole = np.concatenate([impact.floor_force, np.zeros(3000 - len(impact.time))])
+    moved = np.fft.irfft(np.fft.rfft(whole) * np.exp(-2j * np.pi * frequency * late), 3000)
+    fit = thud.fit((time, moved), ["youngs_modulus"])
+    assert fit.time_shift == pytest.approx(late, abs=1e-10)
+    assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
+
+
+def test_other_sampling_rates_are_no_hindrance() -> None:
+    target = thud.solve(TRUTH, sample_rate=96000.0, substeps=2)
+    fit = thud.fit(target, ["youngs_modulus"])
+    # The sums over samples differ by the bend at release, at most slope/8 times the interval
+    # squared in an impulse of 21 N s; a change of E by 1 changes the spectrum by about itself.
+    slope = np.abs(np.diff(target.floor_force)).max() * 96000
+    assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=10 * slope / 8 / RATE**2 / 21)
+
+
+@pytest.mark.parametrize(
+    ("noise", "count"), [(5.0, 100), (None, 200)], ids=["given noise", "noise from the residuals"]
+)
+def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, count: int) -> None:
+    # 90 % of the intervals are to hold the truth: the number of those that do is binomial, and
+    # leaves these quantiles once in 10 000 times.
+    level = 0.9
+    truth = {"youngs_modulus": 1.8e6, "height": 1.1, "time_shift": 220 / RATE - 0.1}
+    case = thud.Case(sampling=thud.Sampling(duration=0.026))
+    impact = thud.solve_case(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
+    impact = replace(impact, floor_force=np.append(impact.floor_force, np.zeros(2000)))
+    starts = {"youngs_modulus": 1.8e6, "height": 1.1}
+    covered = dict.fromkeys(truth, 0)
+    pulls = []
+    for seed in range(count):
+        record = noisy_record(impact, 5.0, seed)
+        fit = quiet_fit(thud.ForceTarget(record, noise=noise), starts, case, level=level)
+        for name, (lower, upper) in fit.intervals().items():
+            covered[name] += lower < truth[name] < upper
+        pulls.append([(fit.values[n] - truth[n]) / fit.standard_errors[n] for n in truth])
+    least, most = stats.binom.ppf([0.5e-4, 1 - 0.5e-4], count, level)
+    assert all(least <= number <= most for number in covered.values()), covered
+    # The covariance is that of the estimates: errors over standard errors have unit variance, the
+    # sum of their squares is chi-square (to 1/100 where some 100 residuals tell the noise).
+    spread = np.sum(np.square(pulls), axis=0)
+    ends = stats.chi2.ppf([0.5e-4, 1 - 0.5e-4], count)
+    assert (ends[0] < spread).all(), spread
+    assert (spread < ends[1]).all(), spread
+
+
+def test_covariance_of_a_linear_problem() -> None:
+    jacobian = np.random.default_rng(1).normal(size=(20, 3)) * [1.0, 10.0, 0.1]
+    known = infer(jacobian, jacobian, 1.0)
+    np.testing.assert_allclose(known.covariance, np.linalg.inv(jacobian.T @ jacobian), rtol=1e-10)
+    assert not len(known.null)
+
+
+def test_directions_without_data_of_a_linear_problem() -> None:
+    random = np.random.default_rng(1)
+    one, other = random.normal(size=(2, 20))
+    # The third column is that of the first, the fourth is nothing.
+    known = infer(np.column_stack([one, other, 3 * one, 0 * one]), np.zeros((20, 4)) + np.nan, 1.0)
+    assert len(known.null) == 2
+
+
+def test_noise_is_told_from_the_residuals() -> None:
+    fit = quiet_fit(noisy_record(thud.solve(TRUTH), 5.0, 3), ["youngs_modulus"])
+    # A standard deviation from n residuals has the relative error 1 / sqrt(2 n).
+    assert fit.noise == pytest.approx(5.0, rel=4 / np.sqrt(2 * fit.degrees_of_freedom))
+    assert fit.reduced_chi_square == pytest.approx(1.0)
+    given = quiet_fit(
+        thud.ForceTarget(noisy_record(thud.solve(TRUTH), 5.0, 3), noise=5.0), ["youngs_modulus"]
+    )
+    assert given.reduced_chi_square == pytest.approx((fit.noise / 5.0) ** 2)
+    assert given.values == pytest.approx(fit.values)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [
+        (
+            {"youngs_modulus": None, "poisson_ratio": 0.4},
+            # F ~ E / sqrt(1 - nu2): d ln F = d ln E + nu2 / (1 - nu2) d ln nu.
+            r"youngs_modulus and poisson_ratio apart: .* youngs_modulus \* poisson_ratio\^0\.19",
+        ),
+        (
+            ["youngs_modulus", "wall_thickness"],
+            r"apart: youngs_modulus \+1 % and wall_thickness -0.5 % .* \* wall_thickness\^2 is",
+        ),
+    ],
+)
+def test_parameters_that_are_not_told_apart_are_named(
+    parameters: dict[str, float], words: str
+) -> None:
+    with pytest.warns(thud.FitWarning, match=words):
+        fit = thud.fit(noisy_record(thud.solve(TRUTH), 5.0, 1), parameters)
+    others = set(fit.names) - {"time_shift"}
+    assert all(fit.standard_errors[name] == np.inf for name in others)
+    assert np.isfinite(fit.standard_errors["time_shift"])
+    assert fit.singular_values[-1] < 1e-6 * fit.singular_values[0]
+
+
+def test_parameter_without_effect_is_named() -> None:
+    base = thud.Case(model=thud.ModalBall())
+    with pytest.warns(thud.FitWarning, match="loss_frequency has no effect on what is compared"):
+        fit = thud.fit(thud.solve_case(base), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, base)
+    assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
+    assert np.isfinite(fit.standard_errors["youngs_modulus"])
+
+
+def test_low_octaves_hardly_tell_modulus_and_wall_apart() -> None:
+    impact = thud.solve_case(MODAL)
+    names = ["youngs_modulus", "wall_thickness"]
+    low = thud.LevelTarget(impact.levels(force="floor")[:2], 0.5, frequencies=[31.5, 63])
+    with pytest.warns(thud.FitWarning, match=f"hardly tell {names[0]} and {names[1]} apart"):
+        thud.fit(low, names, MODAL)
+    # The force itself tells them apart well.
+    fit = thud.fit(thud.ForceTarget(impact, noise=5.0), names, MODAL)
+    assert not fit.warnings
+    assert all(fit.standard_errors[name] < 0.01 * fit.values[name] for name in names)
+
+
+@pytest.mark.parametrize("bands", ["octave", "third"])
+def test_levels_and_what_else_is_known(bands: str) -> None:
+    truth = {"youngs_modulus": 1.75e6, "loss_factor": 0.18}
+    impact = thud.solve_case(thud.fitting.with_values(MODAL, truth))
+    target = thud.LevelTarget(
+        impact.levels(bands, force="floor"),
+        uncertainty=0.2,
+        bands=bands,
+        restitution=(impact.restitution, 0.01),
+    )
+    fit = thud.fit(target, list(truth), MODAL)
+    assert fit.values == pytest.approx(truth, rel=1e-6)
+    assert not fit.warnings
+
+
+def test_contact_time_is_told_between_samples() -> None:
+    # The modal ball tells it in whole samples; its force, continued to zero, moves smoothly.
+    moduli = 1.7e6 * (1 + 1e-3 * np.arange(12))
+    impacts = [thud.solve(thud.Ball(youngs_modulus=e), model="modal_ball") for e in moduli]
+    between = np.array([thud.fitting.release(impact) for impact in impacts])
+    whole = np.array([impact.contact_time for impact in impacts])
+    assert (np.abs(between - whole) <= 1 / RATE).all()
+    assert (np.diff(between) < 0).all()
+    assert not np.diff(whole).all()
+
+
+def test_model_that_cannot_follow_is_told() -> None:
+    record = noisy_record(thud.solve_case(MODAL), 5.0, 1)
+    with pytest.warns(thud.FitWarning, match="the model does not follow the force"):
+        thud.fit(record, ["youngs_modulus"])
+    with pytest.warns(thud.FitWarning, match="times what the given uncertainty lets expect"):
+        thud.fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"])
+
+
+def test_limits_hold_and_are_told() -> None:
+    limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.7e6)}
+    fit = quiet_fit(thud.solve(TRUTH), limited)
+    assert fit.warnings[0].startswith("youngs_modulus ended at its limit, 1.7e+06 Pa")
+    assert fit.values["youngs_modulus"] <= 1.7e6
+
+
+def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve = thud.fitting.objective.solve_case
+
+    def with_a_gap(case: thud.Case) -> thud.Impact:
+        if 0.95e6 < case.ball.youngs_modulus < 1.1e6:
+            message = "out of the model"
+            raise thud.NumericalError(message)
+        return solve(case)
+
+    monkeypatch.setattr(thud.fitting.objective, "solve_case", with_a_gap)
+    # The first step, of the length of the start, leads into the gap.
+    fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 0.5e6})
+    assert fit.failures
+    assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
+
+
+def test_one_parameter_far_from_its_start() -> None:
+    # SciPy's search in a plane breaks down for a single parameter.
+    fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 0.3e6})
+    assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
+
+
+def test_model_that_fails_around_the_best_place_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    solve = thud.fitting.objective.solve_case
+
+    def only_here(case: thud.Case) -> thud.Impact:
+        if case.ball.youngs_modulus != 2e6:
+            message = "out of the model"
+            raise thud.NumericalError(message)
+        return solve(case)
+
+    monkeypatch.setattr(thud.fitting.objective, "solve_case", only_here)
+    with pytest.raises(thud.NumericalError, match=r"youngs_modulus: .* around 2e\+06 \(out of"):
+        thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
+
+
+def test_best_of_several_starts_counts() -> None:
+    base = thud.Case(model=COARSE)
+    names = {"youngs_modulus": thud.Parameter(5e6, 1e6, 6e6), "loss_factor": None}
+    once, often = (
+        quiet_fit(thud.solve_case(base), names, base, max_steps=2, starts=starts, seed=4)
+        for starts in (1, 4)
+    )
+    assert often.noise <= once.noise
+    assert often.evaluations > once.evaluations
+    assert not once.converged
+    assert "the search has not come to an end" in str(once)

@@ -1,0 +1,177 @@
+"""Fits that files describe, and the command that runs them."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+STUDIES = REPOSITORY / "inputs/studies"
+# What make_targets.py has put into the targets.
+TRUTH = {"youngs_modulus": 1.75e6, "loss_factor": 0.18}
+STUDY = """
+[target]
+file = "record.csv"
+
+[parameters.youngs_modulus]
+start = 1.4
+unit = "MPa"
+"""
+
+
+@pytest.fixture(autouse=True)
+def in_directory_with_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    impact = thud.solve(duration=0.03)
+    table = np.column_stack([impact.time + 0.2, impact.floor_force])
+    np.savetxt("record.csv", table, delimiter=",")
+
+
+@pytest.mark.parametrize("name", ["fit_force", "fit_levels"])
+def test_studies_of_the_repository(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["fit", str(STUDIES / f"{name}.toml")]) == 0
+    folder = tmp_path / "outputs" / name
+    assert sorted(path.name for path in folder.iterdir()) == [
+        "confidence.png",
+        "confidence.svg",
+        "fit.csv",
+        "fit.json",
+        "fit.png",
+        "fit.svg",
+        "fitted.nml",
+    ]
+    saved = json.loads((folder / "fit.json").read_text())
+    case = thud.read_case(folder / "fitted.nml")
+    for parameter, truth in TRUTH.items():
+        entry = saved["parameters"][parameter]
+        # A miss by four standard errors has a probability of 6e-5.
+        assert abs(entry["value"] - truth) < 4 * entry["standard_error"]
+        fitted = vars(case.ball) | vars(case.model)
+        assert fitted[parameter] == pytest.approx(entry["value"], rel=1e-12)
+    assert not saved["warnings"]
+    assert saved["study"]["parameters"]["youngs_modulus"]["unit"] == "MPa"
+    output = capsys.readouterr().out
+    assert "youngs_modulus  1.7" in output
+    assert "MPa" in output
+
+
+def test_units_are_those_of_the_file(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    study = thud.fitting.read_study("study.toml")
+    assert study.parameters == {"youngs_modulus": thud.Parameter(start=1.4e6)}
+    fit = study.run()
+    # The table of the record has times of its own.
+    assert fit.time_shift == pytest.approx(0.2, abs=1e-6)
+    assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
+    assert "1.6" in fit.table(study.units)
+
+
+def test_doubts_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = STUDY.replace("[parameters", "[parameters.wall_thickness]\n[parameters", 1)
+    text = text.replace("[parameters.wall_thickness]", "[parameters.wall_thickness]\nstart = 0.03")
+    (tmp_path / "study.toml").write_text(text)
+    assert cli.main(["fit", "-q", "-o", "found", "study.toml"]) == 0
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "thud-driver: study.toml: the data do not tell wall_thickness and" in captured.err
+    saved = json.loads((tmp_path / "found/fit.json").read_text())
+    assert saved["parameters"]["wall_thickness"]["standard_error"] is None
+
+
+def test_search_without_an_end_is_a_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.toml").write_text(f"max_steps = 1\n{STUDY}")
+    assert cli.main(["fit", "--no-figures", "study.toml"]) == 2
+    assert "the search has not come to an end" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("youngs_modulus", "hardness", r"\[parameters\] hardness is not a parameter .* allowed: o"),
+        ("MPa", "mm", r"\[parameters.youngs_modulus\]: unit = 'mm' is not .* allowed: 'Pa', 'kPa"),
+        ("1.4", "-1", r"youngs_modulus: start = -1e\+06 is not allowed; allowed: 0 <= start <="),
+        ("1.4", "'soft'", r"youngs_modulus\] start = 'soft' is not allowed; allowed: real numbers"),
+        ("1.4", "nan", r"start = nan is not allowed"),
+        ("1.4", f"1{'0' * 400}", r"start = a very large number is not allowed"),
+        ("[parameters.youngs_modulus]", "[parameters]", r"parameters\] start is not a parameter"),
+        ("start", "begin", r"begin is not a known key; allowed: start, lower, upper, unit"),
+        ("file", "files", r"\[target\] takes one of file and levels"),
+        ("record.csv", "nowhere.csv", r"nowhere.csv: cannot be read"),
+        ("[target]", "[targets]", r"targets is not a known key; allowed: base, target, parameters"),
+        ("[target]", "base = 'no.nml'\n[target]", r"no.nml: there is no such file"),
+        ("[target]", "starts = 1.5\n[target]", r"starts = 1.5 is not allowed; allowed: whole"),
+        ("[target]", "seed = -1\n[target]", r"seed = -1 is not allowed"),
+        ("[target]", "level = 2\n[target]", r"level = 2 is not allowed; allowed: 0 < level < 1"),
+        ("[target]", "[target", r"study.toml: cannot be read"),
+        ("[target]", "[target]\nnoise = 0", r"noise = 0 is not allowed"),
+        ("[target]", "[target]\ntime_shift = 1", r"time_shift = 1 is not allowed; allowed: true"),
+        ("[target]", "[target]\nwindow = 3", r"window = 3 is not allowed"),
+        (
+            'file = "record.csv"',
+            "levels = [39]",
+            r"levels = \[39\] is not allowed; allowed: 5 real",
+        ),
+        ('file = "record.csv"', "levels = []\nbands = []", r"bands = \[\]"),
+        (
+            'file = "record.csv"',
+            "levels = [1]\nfrequencies = 3",
+            r"frequencies = 3 is not allowed; allowed: 1 real",
+        ),
+        (
+            'file = "record.csv"',
+            "levels = [39, 31, 23, 17, 12]\ncontact_time = 20",
+            r"contact_time is missing or not a table",
+        ),
+        (
+            'file = "record.csv"',
+            "levels = [39, 31, 23, 17, 12]\ncontact_time = { value = 20, unit = 'm' }",
+            r"contact_time: unit = 'm' is not allowed; allowed: 's', 'ms', 'us'",
+        ),
+    ],
+)
+def test_bad_studies_are_told(
+    old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert old in STUDY
+    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
+    assert cli.main(["fit", "study.toml"]) == 1
+    error = capsys.readouterr().err
+    assert len(error.strip().splitlines()) == 1
+    assert "; allowed: " in error or "no such file" in error
+    assert re.search(words, error), error
+
+
+def test_study_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["fit", "nowhere.toml"]) == 1
+    assert "nowhere.toml: cannot be read" in capsys.readouterr().err
+
+
+def test_targets_are_those_of_their_script(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copy(STUDIES / "make_targets.py", tmp_path)
+    names: dict[str, object] = {"__file__": str(tmp_path / "make_targets.py"), "__name__": "made"}
+    exec(compile((tmp_path / "make_targets.py").read_text(), "make_targets.py", "exec"), names)  # noqa: S102
+    names["main"]()  # type: ignore[operator]
+    made, kept = (
+        np.loadtxt(folder / "fit_force.csv", delimiter=",", skiprows=3)
+        for folder in (tmp_path, STUDIES)
+    )
+    np.testing.assert_allclose(made, kept, atol=2e-3)
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first in (STUDIES / "fit_levels.toml").read_text()
