@@ -28,8 +28,15 @@ contains
       character(len=*), intent(in) :: message
       !> The error.
       type(error_type) :: error
+      character(len=len(message)) :: text
+      integer :: i
 
-      error = error_type(code=bad_input, message=message)
+      text = message
+      ! No screen shows these characters, and a zero byte would end the sentence; input may hold them.
+      do i = 1, len(text)
+         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) text(i:i) = '?'
+      end do
+      error = error_type(code=bad_input, message=text)
    end function input_error
 
    !> Error of a computation that could not be carried through.

@@ -335,3 +335,12 @@ def test_full_screen_is_an_error_without_a_crash(
             check=False,
         )
     assert result.returncode == 1
+
+
+def test_characters_that_no_screen_shows_are_replaced(run: Run, case_file: CaseFile) -> None:
+    path = case_file(MINIMAL.replace("&model", "&model name = 'a\x00b\x07'"))
+    result = run(path)
+    assert result.returncode == 1
+    assert "&model: name = 'a?b?' is not allowed; allowed: 'hollow_sphere'" in result.stderr
+    with pytest.raises(thud.InputError, match=r"'a\?b\?' is not allowed; allowed: "):
+        thud.read_case(path)
