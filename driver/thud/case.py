@@ -186,12 +186,13 @@ class Case:
             for option in fields(self.model):
                 values = groups.setdefault(group_of(self.model.name, option), {})
                 value = getattr(self.model, option.name)
-                if values.setdefault(option.name, value) != value:
+                if self.modes and option.name in _MESH and values[option.name] != value:
                     message = (
                         f"&mesh: {option.name} = {value} of the model is not that of the modes, "
                         f"{values[option.name]}; allowed: one mesh for both"
                     )
                     raise InputError(message)
+                values[option.name] = value
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}

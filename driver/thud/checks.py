@@ -13,13 +13,20 @@ if TYPE_CHECKING:
     from types import UnionType
 
 
+# Longer values are told by their kind.
+LONGEST_SHOWN = 80
+
+
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
     """Complain about an argument of another kind."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
         )
-        message = f"{name} = {value!r} is not allowed; allowed: an object of {expected}"
+        shown = repr(value)
+        if len(shown) > LONGEST_SHOWN:
+            shown = f"an object of {type(value).__name__}"
+        message = f"{name} = {shown} is not allowed; allowed: an object of {expected}"
         raise InputError(message)
 
 

@@ -170,7 +170,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     folder = Path(output or os.fsdecode(directory.rstrip()))
     if not options.no_figures:
         _draw(folder, _case_figures(case, folder))
-    if options.animation:
+    if options.animation and (folder / "motion.pvd").exists():
         thud.mesh_plot.animate(thud.read_results(folder), folder / "motion.gif")
     if not options.quiet:
         tqdm.write(f"{text(table)}\n  Results: {folder}\n")

@@ -105,9 +105,10 @@ class Comparison:
             group = {"name": html.escape(name), "legendgroup": str(i)}
             force = impact.force(self.force)
             # Nothing is drawn long after the contact.
-            shown = impact.time < 1.5 * impact.contact_time
+            since = impact.time - impact.touch_time
+            shown = (since >= 0) & (since < 1.5 * impact.contact_time)
             figure.add_trace(
-                go.Scatter(x=1e3 * impact.time[shown], y=force[shown], line=look, **group),
+                go.Scatter(x=1e3 * since[shown], y=force[shown], line=look, **group),
                 row=1,
                 col=1,
             )

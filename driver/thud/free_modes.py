@@ -9,12 +9,12 @@ import numpy as np
 
 from thud._library import call, door
 from thud.case import Ball, Case, Modes, case_text
+from thud.checks import require_kind
 from thud.errors import InputError
+from thud.models import FiniteElement
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
-
-    from thud.models import FiniteElement
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +119,11 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     ndarray, shape (n,)
         Loss modulus over storage modulus.
     """
-    wanted = np.ascontiguousarray(frequency, dtype=np.float64)
+    require_kind("model", model, FiniteElement)
+    try:
+        wanted = np.ascontiguousarray(frequency, dtype=np.float64)
+    except (TypeError, ValueError):
+        wanted = np.array([])
     if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
         message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
         raise InputError(message)

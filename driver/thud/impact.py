@@ -86,6 +86,19 @@ class Impact:
     impulse_residual: float
     energy_residual: float
 
+    def __repr__(self) -> str:
+        """Return the numbers that describe the impact; its arrays would fill pages."""
+        model = self.case.model.name if self.case.model else ""
+        return (
+            f"<Impact, {model}: contact {1e3 * self.contact_time:.2f} ms, "
+            f"e {self.restitution:.3f}, peak {self.peak_floor_force:.0f} N>"
+        )
+
+    @property
+    def touch_time(self) -> float:
+        """Time of first touch in the record, s: the flight before it, where a model computes it."""
+        return float(getattr(self.case.model, "flight_before", 0.0))
+
     @property
     def shell_force(self) -> NDArray[np.float64]:
         """Force of the shell F_B, N, shape (n_sample,)."""

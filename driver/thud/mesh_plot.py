@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,6 @@ from thud.plot import SIZE, WIDTH, add_curves, empty_axes
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
 
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
@@ -38,6 +38,8 @@ INSTANTS = 9
 # Nodes between two arrows, from pole to pole and through the wall.
 ARROWS = (4, 4)
 FRAMES_PER_SECOND = 12
+# More would not be readable at column width.
+MOST_PANELS = 30
 
 
 def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
@@ -56,9 +58,12 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
         One half section for each mode; the colour is the displacement over its largest.
     """
     require_kind("modes", modes, FreeModes)
+    _require_count("columns", columns)
     count = len(modes.frequency)
     rows = -(-count // columns)
-    figure = Figure(figsize=(WIDTH, 0.45 + 1.75 * rows), dpi=300, layout="constrained")
+    # More than three side by side need more than a column.
+    width = WIDTH * max(1, columns / 3)
+    figure = Figure(figsize=(width, 0.45 + 1.75 * rows), dpi=300, layout="constrained")
     panels = figure.subplots(rows, columns, squeeze=False).ravel()
     radius = modes.ball.outer_radius
     scale = Normalize(0, 1)
@@ -93,10 +98,11 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
         Half sections on the floor; displacement since first touch in mm, time in ms.
     """
     shown = _snapshots(impact)
-    begin = impact.time[np.argmax(impact.floor_force > 0)]
-    wanted = begin + np.linspace(0, impact.contact_time, instants)
-    chosen = [int(np.argmin(np.abs(shown.time - time))) for time in wanted]
-    rows = -(-instants // 3)
+    _require_count("instants", instants)
+    wanted = impact.touch_time + np.linspace(0, impact.contact_time, instants)
+    # Fewer panels where there are fewer snapshots.
+    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in wanted})
+    rows = -(-len(chosen) // 3)
     figure = Figure(figsize=(WIDTH, 0.6 + 1.6 * rows), dpi=300, layout="constrained")
     panels = figure.subplots(rows, 3, squeeze=False).ravel()
     scale = Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
@@ -104,7 +110,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
         _draw_instant(axes, impact, shown, i, scale)
     for axes in panels:
         axes.set_axis_off()
-    _add_colour_bar(figure, panels, scale, "Displacement, mm")
+    _add_colour_bar(figure, panels, scale, _motion_label(impact))
     return figure
 
 
@@ -132,7 +138,7 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     figure = Figure(figsize=(WIDTH, WIDTH), dpi=120, layout="constrained")
     axes = figure.subplots()
     scale = Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in range(len(shown.time))))
-    _add_colour_bar(figure, [axes], scale, "Displacement, mm")
+    _add_colour_bar(figure, [axes], scale, _motion_label(impact))
 
     def draw(i: int) -> list[Any]:
         axes.clear()
@@ -162,6 +168,9 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     Figure
         Frequency in Hz and loss factor, both logarithmic.
     """
+    if not isinstance(models, Mapping) or not models:
+        message = "models are not given; allowed: a mapping of names to models, at least one"
+        raise InputError(message)
     figure, axes = empty_axes(2.5)
     frequency = np.geomspace(10, 1000, 200)
     add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
@@ -175,6 +184,18 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     return figure
 
 
+def _require_count(name: str, value: object) -> None:
+    """Complain about a number of panels that no figure has."""
+    if not isinstance(value, int) or not 1 <= value <= MOST_PANELS:
+        message = f"{name} = {value!r} is not allowed; allowed: 1 to {MOST_PANELS}"
+        raise InputError(message)
+
+
+def _motion_label(impact: Impact) -> str:
+    """Return what colours and arrows mean."""
+    return f"Displacement, mm (arrows: a third of the radius is {impact.impact_velocity:.1f} m/s)"
+
+
 def _snapshots(impact: Impact) -> Motion:
     """Return the snapshots of an impact that has some."""
     require_kind("impact", impact, Impact)
@@ -185,8 +206,9 @@ def _snapshots(impact: Impact) -> Motion:
 
 
 def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
-    """Return the length of the displacements of a snapshot, m, shape (n_line, n_ring)."""
-    length: NDArray[np.float64] = np.hypot(*(shown.position[i] - shown.start).T).T
+    """Return the displacements since first touch, m, shape (n_line, n_ring)."""
+    touching = shown.start - [0, shown.start[..., 1].min()]
+    length: NDArray[np.float64] = np.hypot(*(shown.position[i] - touching).T).T
     return length
 
 
@@ -207,9 +229,10 @@ def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Norm
         color="0.1",
     )
     axes.fill_between([-0.05 * radius, 1.4 * radius], -0.12 * radius, 0, color="0.6", linewidth=0)
-    axes.set_title(f"{1e3 * shown.time[i]:.0f} ms", fontsize=SIZE, pad=2)
+    since = 1e3 * (shown.time[i] - impact.touch_time)
+    axes.set_title(f"{since:.3g} ms", fontsize=SIZE, pad=2)
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
-    axes.set_ylim(-0.4 * radius, 2.3 * radius)
+    axes.set_ylim(-0.4 * radius, 2.6 * radius)
     axes.set_aspect("equal")
 
 

@@ -39,3 +39,7 @@ class Motion:
     velocity: NDArray[np.float64]
     contact_pressure: NDArray[np.float64]
     cavity_pressure: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        """Return the size of the snapshots; their arrays would fill pages."""
+        return f"<Motion: {len(self.time)} snapshots of {self.start[..., 0].size} nodes>"

@@ -137,19 +137,21 @@ def _literal(label: str) -> str:
 
 def _draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
     """Draw forces against time as force plates record them; thin and grey, what is above that."""
-    most = 0.0
+    most = end = 0.0
     band = ""
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
         whole = impact.force(kind)
+        time = 1e3 * (impact.time - impact.touch_time)
         recorded = record_force(whole, impact.sample_rate)
         if np.abs(whole - recorded).max() > UNSEEN * whole.max():
-            axes.plot(1e3 * impact.time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1)
+            axes.plot(time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1)
             shown, band = recorded, " below 1.25 kHz"
         else:
             shown = whole
-        axes.plot(1e3 * impact.time, 1e-3 * shown, label=name, **_style(i))
+        axes.plot(time, 1e-3 * shown, label=name, **_style(i))
+        end = max(end, time[np.flatnonzero(whole > 0)[-1]])
         most = max(most, whole.max())
-    axes.set_xlim(0, 1.15e3 * max(impact.contact_time for impact in impacts.values()))
+    axes.set_xlim(0, 1.15 * end)
     axes.set_ylim(0, 1.05e-3 * most)
     axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
     name = force.capitalize() if force else "Blocked"

@@ -79,6 +79,11 @@ class Recording:
         return cls((np.arange(rows) - first[0]) * step, force.copy(), 1 / step)
 
     @property
+    def touch_time(self) -> float:
+        """Time of first touch, s: 0."""
+        return 0.0
+
+    @property
     def contact_time(self) -> float:
         """Time during which the force passes 1 % of its largest value, s."""
         above = np.flatnonzero(self.record > NOISE * self.record.max())

@@ -44,16 +44,16 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     InputError
         Where the directory does not hold the results of an impact.
     """
-    folder = Path(directory)
     try:
+        folder = Path(directory)
         case = Case.from_namelist(f90nml.read(folder / "effective.nml"))
         numbers = f90nml.read(folder / "summary.nml")
         force = _table(folder / "force.csv")
         channels = folder / "channels.csv"
         found = _table(channels) if channels.exists() else {}
         motion = _read_motion(folder, case) if (folder / "motion.pvd").exists() else None
-    except (OSError, ValueError, KeyError) as error:
-        message = f"{folder}: cannot be read ({error}); allowed: the results of an impact"
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        message = f"{directory}: cannot be read ({error}); allowed: the results of an impact"
         raise InputError(message) from error
     time = force.pop("time_s")
     named = {name.rsplit("_", 1)[0]: values for name, values in force.items()}

@@ -2,7 +2,7 @@
 !> over the long-term modulus and its relaxation time.
 module thud_prony
    use thud_constants, only: pi
-   use thud_error, only: error_type, numerical_error
+   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_lapack, only: dgels
    use thud_text, only: to_text
@@ -81,9 +81,9 @@ contains
       end do
       call dgels('N', n_frequency, n_branch, 1, matrix, n_frequency, right, n_frequency, work, size(work), info)
       share = right(:n_branch)
-      if (info /= 0 .or. minval(share) < 0.0_wp) error = numerical_error('&material: no Prony series with ' &
+      if (info /= 0 .or. minval(share) < 0.0_wp) error = input_error('&material: no Prony series with ' &
          //to_text(n_branch)//' terms has loss_factor = '//to_text(loss_factor)//' from '//to_text(lowest)//' to ' &
-         //to_text(highest)//' Hz; allowed: a lower loss factor')
+         //to_text(highest)//' Hz; allowed: up to about 0.9')
    end subroutine fit_constant_loss
 
 end module thud_prony

@@ -59,16 +59,23 @@ contains
       !> Text of `channels.csv`.
       character(len=:), allocatable :: text
       character(len=25*(size(history%channel, 2) + 1)) :: row
-      integer :: i
+      character(len=:), allocatable :: header
+      integer :: i, at
 
-      text = 'time_s'
+      header = 'time_s'
       do i = 1, size(history%channel_name)
-         text = text//','//trim(history%channel_name(i))
+         header = header//','//trim(history%channel_name(i))
       end do
-      text = text//newline
+      header = header//newline
+      ! One piece: text that grows line by line would be copied for each of them.
+      allocate (character(len=len(header) + size(history%channel, 1)*len(row)) :: text)
+      text(:len(header)) = header
+      at = len(header)
       do i = 1, size(history%channel, 1)
          write (row, csv_form) real(i - 1, wp)/history%sample_rate, history%channel(i, :)
-         text = text//trim(row)//newline
+         row(len(row):) = newline
+         text(at + 1:at + len(row)) = row
+         at = at + len(row)
       end do
    end function get_channels_csv
 
