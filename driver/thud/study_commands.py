@@ -100,7 +100,8 @@ def _summary(dataset: xr.Dataset) -> list[tuple[str, ...]]:
         if variable.dtype.kind == "f":
             for band in dataset["octave"].values if "octave" in variable.dims else [None]:
                 values = variable if band is None else variable.sel(octave=band)
-                label = f"{name}, {variable.attrs['units']}" if band is None else f"  {band:g} Hz"
+                place = "" if band is None else f" {band:g} Hz"
+                label = f"{name}{place}, {variable.attrs['units']}"
                 numbers = (values.min(), values.median(), values.max())
                 rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
     rows.append(("conforming sets", "", "", f"{int(dataset['conforms'].sum())}"))

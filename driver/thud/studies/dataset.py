@@ -13,7 +13,7 @@ import thud
 from thud._library import compiler
 from thud.levels import get_bands
 from thud.studies import sets
-from thud.studies.evaluation import SCALARS
+from thud.studies.evaluation import SCALARS, block_size
 from thud.studies.units import power_of
 
 if TYPE_CHECKING:
@@ -31,14 +31,16 @@ MEANINGS = {
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
 }
-# Bytes of a set on disk besides its parameters, and of the file itself.
-SET_BYTES = 160
-FILE_BYTES = 60_000
+# Bytes of a set on disk besides its parameters, and of a file itself.
+_SET_BYTES = 175
+_FILE_BYTES = 27_000
 
 
 def disk_space(study: Study) -> int:
     """Return about how many bytes the results of a study need, those of its blocks included."""
-    return 2 * (FILE_BYTES + sets.count(study) * (SET_BYTES + 8 * len(study.parameters)))
+    total = sets.count(study)
+    files = 1 - (-total // block_size(study.base))
+    return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * len(study.parameters))
 
 
 def coordinate(parameter: Parameter) -> str:

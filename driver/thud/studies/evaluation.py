@@ -33,6 +33,11 @@ SCALARS = {
     "impulse": ("N s", "time integral of the force on the floor"),
 }
 OCTAVES = 5
+# About the time of one set, s; a block of sets should take about _BLOCK_TIME.
+_SET_TIME = {"modal_ball": 8e-3, "finite_element": 0.25}
+_USUAL_TIME = 1.5e-3
+_ENSEMBLE_TIME = 1.5e-5
+_BLOCK_TIME = 0.5
 _ENSEMBLE_KEYS = {
     *(option.name for kind in (Ball, Drop) for option in dataclasses.fields(kind)),
     "momentum_flux",
@@ -126,7 +131,13 @@ def _empty(size: int) -> Columns:
     return found
 
 
-def has_ensemble(base: Case) -> bool:
+def block_size(base: Case) -> int:
+    """Return how many sets are computed together: the same wherever they are computed."""
+    usual = _ENSEMBLE_TIME if _has_ensemble(base) else _USUAL_TIME
+    return max(1, round(_BLOCK_TIME / _SET_TIME.get(base.model.name, usual)))  # type: ignore[union-attr]
+
+
+def _has_ensemble(base: Case) -> bool:
     """Return whether the library computes many sets of a case at once."""
     # The ensemble judges as these defaults do.
     same = base.limits == Limits() and base.levels.force == Levels.force
@@ -136,7 +147,7 @@ def has_ensemble(base: Case) -> bool:
 
 def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
     """Return whether the library computes these sets at once."""
-    return has_ensemble(base) and set(columns) <= _ENSEMBLE_KEYS
+    return _has_ensemble(base) and set(columns) <= _ENSEMBLE_KEYS
 
 
 def _by_ensemble(base: Case, columns: Columns) -> Columns:

@@ -152,10 +152,10 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
         axes.plot(
             row["first_order"], at, "D", markersize=2.5, markerfacecolor="white",
             markeredgecolor="black", markeredgewidth=0.6, linestyle="none",
-            label="first order alone" if i == len(parameters) - 1 else None,
+            label="first order" if i == len(parameters) - 1 else None,
         )  # fmt: skip
     axes.set_yticks(place, outputs)
-    axes.invert_yaxis()
+    axes.set_ylim(len(outputs) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.set_xlabel("Total Sobol index, interval of 95 %", fontsize=SIZE)
     _legend_above(axes, 2)
@@ -205,7 +205,7 @@ def draw_design_map(result: DesignMap) -> Figure:
     axes.set_xlabel(first, fontsize=SIZE)
     axes.set_ylabel(second, fontsize=SIZE)
     if axes.get_legend_handles_labels()[0]:
-        _legend_above(axes, 3)
+        _legend_above(axes, 2)
     return figure
 
 

@@ -109,6 +109,7 @@ def sensitivity(
     if usable.sum() < LEAST_SAMPLES:
         reason = next(text for text in dataset["reason"].values if text)
         message = f"only {usable.sum()} of {plan.size} base samples have results ({reason})"
+        message += "; allowed: ranges in which sets have some"
         raise InputError(message)
     rows = np.repeat(usable, dimension + 2)
     found = [sobol_indices(values[rows], dimension, plan.seed) for values in outputs.values()]

@@ -13,7 +13,7 @@ from thud.errors import InputError
 from thud.studies import sets
 from thud.studies.backends import run_blocks
 from thud.studies.dataset import disk_space, grid_of, new_dataset
-from thud.studies.evaluation import Block, has_ensemble
+from thud.studies.evaluation import Block, block_size
 from thud.studies.store import Store, read_sweep
 from thud.studies.study import read_study
 
@@ -28,11 +28,6 @@ if TYPE_CHECKING:
 
 # More sets than this have to be confirmed.
 MOST_SETS = 100_000
-# About the time of one set, s; a block of sets should take about BLOCK_TIME.
-_SET_TIME = {"modal_ball": 8e-3, "finite_element": 0.25}
-_USUAL_TIME = 1.5e-3
-_ENSEMBLE_TIME = 1.5e-5
-BLOCK_TIME = 0.5
 
 
 class How(TypedDict, total=False):
@@ -100,7 +95,7 @@ def sweep(  # noqa: PLR0913 - a study has a place, a backend and a face
     if total > MOST_SETS and not yes:
         message = f"{describe(plan)}; allowed: up to {MOST_SETS} sets, more with yes=True (--yes)"
         raise InputError(message)
-    size = block_size(plan)
+    size = block_size(plan.base)
     store = Store(output, plan, size) if output is not None else None
     memory: dict[int, Columns] = {}
     if not (store and store.complete):
@@ -133,12 +128,6 @@ def describe(study: Study) -> str:
     space = disk_space(study) / 1e6
     amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
     return f"{study.name}: {sets.count(study)} sets of {study.model}, about {amount} on disk"
-
-
-def block_size(study: Study) -> int:
-    """Return how many sets are computed together: the same wherever they are computed."""
-    usual = _ENSEMBLE_TIME if has_ensemble(study.base) else _USUAL_TIME
-    return max(1, round(BLOCK_TIME / _SET_TIME.get(study.model, usual)))
 
 
 def _blocks(study: Study, starts: list[int], size: int) -> Iterator[Block]:

@@ -169,7 +169,8 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
         return _join(paths)
     if place.suffix == ".zarr":
         with _readable(place):
-            return xr.open_zarr(place, consolidated=False)
+            lazy: xr.Dataset = xr.open_zarr(place, consolidated=False)
+            return lazy
     with _open(place) as dataset:
         return _loaded(dataset)
 
@@ -193,8 +194,7 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
         for name, variable in dataset.variables.items()
         if variable.dtype.kind == "U"
     }
-    loaded: xr.Dataset = dataset.load()
-    return loaded.assign(texts)
+    return dataset.load().assign(texts)
 
 
 @contextmanager

@@ -152,7 +152,12 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
             message = f"{table} = {given[table]!r} is not allowed; allowed: a table [{table}]"
             raise InputError(message)
     name = given.get("name", name)
-    if not isinstance(name, str) or not name.strip() or Path(name).name != name:
+    if (
+        not isinstance(name, str)
+        or not name.strip()
+        or not name.isprintable()
+        or Path(name).name != name
+    ):
         message = f"name = {name!r} is not allowed; allowed: the name of a file, without folders"
         raise InputError(message)
     written = given.get("format", FORMATS[0])

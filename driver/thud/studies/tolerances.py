@@ -134,7 +134,8 @@ def uncertainty(
     if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
         reasons = [text for text in dataset["reason"].values if text]
         message = f"only {good.sum()} of {plan.size} sets have results"
-        message += f" ({reasons[0]})" if reasons else "; allowed: [design] size of 2 or more"
+        message += f" ({reasons[0]})" if reasons else ""
+        message += "; allowed: two or more"
         raise InputError(message)
     return Uncertainty(
         dataset,
