@@ -69,7 +69,7 @@ def test_ball_of_the_paper_is_marked() -> None:
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.6))
     assert axes.get_xlabel() == "Wall thickness, mm"
-    assert axes.get_ylabel() == "Youngs modulus, MPa"
+    assert axes.get_ylabel() == "Young's modulus, MPa"
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["octave limits", "all criteria met", "paper's ball"]
 

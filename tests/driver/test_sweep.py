@@ -333,17 +333,22 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
         thud.sweep({**other, "name": "c"}, tmp_path)
     (tmp_path / "d.partial").mkdir()
     (tmp_path / "d.partial/study").write_text("something else")
+    (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
     with pytest.raises(thud.InputError, match=r"d\.partial belongs to another study"):
         thud.sweep({**other, "name": "d"}, tmp_path)
+    assert len(list((tmp_path / "d.partial").iterdir())) == 2
+    (tmp_path / "e.partial").mkdir()
+    (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
     with pytest.raises(thud.InputError, match="holds no finished sets"):
-        thud.read_sweep(tmp_path / "d.partial")
+        thud.read_sweep(tmp_path / "e.partial")
+    assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
 
 
 def test_many_sets_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
     with pytest.raises(
-        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about 93 MB .*yes"
+        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about 89 MB .*yes"
     ):
         thud.sweep(many, tmp_path)
     spread = {"low": 1, "high": 2, "count": 10**6}

@@ -102,8 +102,8 @@ def test_figure_shows_distribution_over_tolerance() -> None:
     nominal = [(c.upper + c.lower) / 2 for c in limits]
     np.testing.assert_allclose(medians, np.median(result.levels, axis=0) - nominal)
     low, high = result.interval
-    title = f"conforms: {100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
-    assert axes.get_title("right") == title
+    title = f"Conforms: {100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
+    assert axes.get_legend().get_title().get_text() == title
 
 
 def test_command_writes_figure_and_table(

@@ -81,9 +81,10 @@ class Store:
     def _require_own(self, path: Path) -> None:
         """Complain about results of another study."""
         if path == self._partial:
-            mark = self._mark.read_text(encoding="utf-8") if self._mark.exists() else None
-            # A directory without a mark was killed at its birth, unless something is in it.
-            mine = mark == self._identity or (mark is None and not any(path.iterdir()))
+            # A directory without anything but a mark holds nothing that could be lost.
+            mine = set(path.iterdir()) <= {self._mark} or (
+                self._mark.exists() and self._mark.read_bytes() == self._identity.encode()
+            )
         else:
             with _open(path) as dataset:
                 mine = dataset.attrs.get("fingerprint") == self._study.fingerprint
