@@ -26,7 +26,6 @@ from thud.studies.keys import known_keys
 from thud.studies.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
@@ -203,11 +202,16 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
     assert np.isnan(found["elastic_level"].values[1:]).all()
 
 
-def test_zarr_holds_the_same(tmp_path: Path) -> None:
-    study = {"name": "a", **HEIGHTS, "format": "zarr"}
-    found = thud.sweep(study, tmp_path)
+def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = values(thud.sweep(HEIGHTS))
+    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path)
     assert (tmp_path / "a.zarr").is_dir()
-    assert values(found).identical(values(thud.sweep(HEIGHTS)))
+    assert values(found).identical(expected)
+    # Whatever is larger than a byte is Zarr now, and written one variable at a time.
+    monkeypatch.setattr("thud.studies.store.LARGE", 1)
+    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
+    assert values(found).identical(expected)
 
 
 def test_ensemble_is_used_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -489,8 +493,23 @@ def test_study_without_results_is_a_failure(
     assert "2 of 2 sets have no results, such as: " in capsys.readouterr().err
 
 
-def test_import_stays_light(run: Callable[..., object]) -> None:
-    del run  # the environment of the tests is there
+def test_study_of_another_kind_is_told() -> None:
+    study = thud.read_study(HEIGHTS)
+    for function in (thud.sensitivity, thud.design_map, thud.uncertainty):
+        with pytest.raises(thud.InputError, match="python is a sweep study; allowed: a "):
+            function(study)
+
+
+def test_missing_packages_are_told(tmp_path: Path) -> None:
+    code = "import sys; sys.modules['xarray'] = None; from thud import cli; sys.exit(cli.main())"
+    command = [sys.executable, "-c", code, "sweep", "study.toml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    sentence = "xarray is not installed; allowed: studies with pip install 'thud[studies]'"
+    assert done.stderr == f"thud-driver: {sentence}\n"
+
+
+def test_import_stays_light() -> None:
     code = "import sys, thud; print({'xarray', 'scipy', 'SALib', 'matplotlib'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"

@@ -15,7 +15,7 @@ from thud.studies.backends import run_blocks
 from thud.studies.dataset import disk_space, grid_of, new_dataset
 from thud.studies.evaluation import Block, block_size
 from thud.studies.store import Store, read_sweep
-from thud.studies.study import read_study
+from thud.studies.study import Study, read_study
 
 if TYPE_CHECKING:
     import os
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from thud.studies.sets import Columns
-    from thud.studies.study import Source, Study
+    from thud.studies.study import Source
 
 # More sets than this have to be confirmed.
 MOST_SETS = 100_000
@@ -90,7 +90,8 @@ def sweep(  # noqa: PLR0913 - a study has a place, a backend and a face
     >>> found["contact_time"].round(4).values.tolist()
     [0.0213, 0.0204]
     """
-    plan = read_study(study)
+    # A study of another kind is a sweep too.
+    plan = study if isinstance(study, Study) else read_study(study)
     total = sets.count(plan)
     if total > MOST_SETS and not yes:
         message = f"{describe(plan)}; allowed: up to {MOST_SETS} sets, more with yes=True (--yes)"

@@ -131,14 +131,16 @@ class Store:
         shutil.rmtree(self._partial, ignore_errors=True)
 
     def _write_zarr(self, paths: list[Path]) -> None:
-        """Write a Zarr group, one variable at a time: only one has to fit into memory."""
+        """Write a Zarr group, some variables at a time: only these have to fit into memory."""
         part = self.path.with_name(f".{self.path.name}.part")
         shutil.rmtree(part, ignore_errors=True)
         with _named(self.path), _open(paths[0]) as first:
             names = list(map(str, first.data_vars))
-            for name in names:
-                grid = grid_of(self._study, _join(paths, name))
-                grid.to_zarr(part, mode="w" if name == names[0] else "a", consolidated=False)
+            largest = max(variable.nbytes for variable in first.data_vars.values()) * len(paths)
+            together = max(1, 2 * LARGE // largest)
+            for i in range(0, len(names), together):
+                grid = grid_of(self._study, _join(paths, names[i : i + together]))
+                grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
             part.rename(self.path)
 
 
@@ -176,12 +178,12 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
         return _loaded(dataset)
 
 
-def _join(paths: list[Path], name: str | None = None) -> xr.Dataset:
-    """Return blocks as one dataset, or one variable of them with all coordinates."""
+def _join(paths: list[Path], names: list[str] | None = None) -> xr.Dataset:
+    """Return blocks as one dataset, or some variables of them with all coordinates."""
     parts = []
     for path in paths:
         with _open(path) as dataset:
-            parts.append(_loaded(dataset if name is None else dataset[[name]]))
+            parts.append(_loaded(dataset if names is None else dataset[names]))
     return xr.concat(
         parts, "set", data_vars="minimal", coords="minimal", compat="override",
         join="override", combine_attrs="override",

@@ -127,6 +127,9 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
         Names file, table, key and what is allowed.
     """
     if isinstance(source, Study):
+        if source.kind != kind:
+            message = f"{source.name} is a {source.kind} study; allowed: a {kind} study"
+            raise InputError(message)
         return source
     if isinstance(source, Mapping):
         text = json.dumps(source, default=repr)
