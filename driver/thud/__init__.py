@@ -71,7 +71,8 @@ __all__ = [
 ]
 
 
-# What needs matplotlib, plotly or SciPy is imported when it is first asked for: they take time.
+# What needs matplotlib, plotly, SciPy or xarray is imported when it is first asked for: that takes
+# time.
 _LATE = {
     "plot": None,
     "mesh_plot": None,
@@ -84,11 +85,19 @@ _LATE = {
     "Parameter": "fitting",
     "fit": "fitting",
     "read_all": "comparison",
+    "studies": None,
+    "Study": "studies",
+    "design_map": "studies",
+    "read_study": "studies",
+    "read_sweep": "studies",
+    "sensitivity": "studies",
+    "sweep": "studies",
+    "uncertainty": "studies",
 }
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it
-    """Import the modules that draw when they are first asked for."""
+    """Import modules that take their time when they are first asked for."""
     if name in _LATE:
         module = importlib.import_module(f"thud.{_LATE[name] or name}")
         return getattr(module, name) if _LATE[name] else module

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from thud import _core
@@ -55,3 +56,9 @@ def words(value: bytes) -> list[str]:
 def version() -> str:
     """Version of the library."""
     return text(door.get_version())
+
+
+def compiler() -> str:
+    """Compiler of the library, with its options but for the places of files."""
+    # Options that name places say nothing.
+    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(door.get_compiler()))

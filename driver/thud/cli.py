@@ -1,4 +1,4 @@
-"""The command ``thud-driver``: cases with figures, and the figures of the paper."""
+"""The command ``thud-driver``: cases with figures, studies, and the figures of the paper."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 import thud
 from thud._library import call, door, text
+from thud.study_commands import FORMATS, add_study_commands
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 NOT_CONFORMING = 3
 INTERRUPTED = 130
-FORMATS = (".png", ".svg")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -65,7 +65,7 @@ def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     parser = argparse.ArgumentParser(
         prog="thud-driver",
-        description="Cases with figures, and the figures of the paper.",
+        description="Cases with figures, studies, and the figures of the paper.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
         "3 not conforming (run --check), 130 interrupted.",
     )
@@ -109,6 +109,8 @@ def _parser() -> argparse.ArgumentParser:
     compare.add_argument("--force", choices=("elastic", "floor"), default="floor")
     compare.add_argument("--source", choices=("rubber_ball", "tyre"), default="rubber_ball")
     compare.add_argument("-q", "--quiet", action="store_true", help="show nothing but errors")
+
+    add_study_commands(commands)
 
     fit = commands.add_parser("fit", help="parameters of a model from a force or from levels")
     fit.set_defaults(command=_fit)

@@ -230,7 +230,7 @@ def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Norm
     )
     axes.fill_between([-0.05 * radius, 1.4 * radius], -0.12 * radius, 0, color="0.6", linewidth=0)
     since = 1e3 * (shown.time[i] - impact.touch_time)
-    axes.set_title(f"{since:.3g} ms", fontsize=SIZE, pad=2)
+    axes.set_title(f"{since:.1f} ms", fontsize=SIZE, pad=2)
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
     axes.set_ylim(-0.4 * radius, 2.6 * radius)
     axes.set_aspect("equal")

@@ -108,7 +108,7 @@ def levels(
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
         values = impact.levels(method=method, force=kind)
         axes.plot(place, values, label=name, **_style(i), **_marker(i))
-    _octave_axis(axes)
+    octave_axis(axes)
     axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
     _add_legend(axes, impacts)
     return figure
@@ -209,7 +209,7 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
     for i, (name, impact, kind) in enumerate(_curves(impacts, force)):
         change = impact.levels(force=kind) - base
         axes.plot(np.arange(5), change, label=name, **_style(i), **_marker(i))
-    _octave_axis(axes)
+    octave_axis(axes)
     axes.set_ylabel("Change of the level, dB", fontsize=SIZE)
     axes.legend(fontsize=SIZE - 1, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
     return figure
@@ -253,8 +253,8 @@ def comparison_page(
             values = impact.levels(bands, "exact", kind)
             axes.plot(np.arange(len(values)), values, **_style(i), **_marker(i, 3))
     history.legend(fontsize=SIZE, frameon=False)
-    _octave_axis(panels["octave"])
-    _octave_axis(panels["third"], "third")
+    octave_axis(panels["octave"])
+    octave_axis(panels["third"], "third")
     for axes in panels.values():
         axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
     panels["octave"].legend(fontsize=SIZE, frameon=False)
@@ -269,7 +269,7 @@ def comparison_page(
     return figure
 
 
-def _octave_axis(axes: Axes, bands: str = "octave") -> None:
+def octave_axis(axes: Axes, bands: str = "octave") -> None:
     """Name the bands."""
     names = [f"{frequency:g}" for frequency in get_bands(bands).nominal]
     axes.set_xticks(np.arange(len(names)), names)

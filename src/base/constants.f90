@@ -1,10 +1,11 @@
-!> Mathematical constants, reference values of levels and the program's version.
+!> Mathematical constants, reference values of levels, the program's version and compiler.
 module thud_constants
+   use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: pi, reference_force, reference_time, version
+   public :: compiler, pi, reference_force, reference_time, version
 
    !> Ratio of a circle's circumference to its diameter.
    real(wp), parameter :: pi = acos(-1.0_wp)
@@ -17,5 +18,8 @@ module thud_constants
 
    !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.
    character(len=*), parameter :: version = '0.1.0'
+
+   !> Compiler of the library and its options.
+   character(len=*), parameter :: compiler = compiler_version()//', options '//compiler_options()
 
 end module thud_constants

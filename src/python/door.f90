@@ -6,7 +6,7 @@
 !> `thud_text`.
 module thud_door
    use thud_case, only: case_type, describe_keys, get_case_text, read_case
-   use thud_constants, only: program_version => version
+   use thud_constants, only: program_compiler => compiler, program_version => version
    use thud_error, only: error_type, tell
    use thud_finite_element_options, only: get_frame_count
    use thud_kinds, only: wp
@@ -17,7 +17,7 @@ module thud_door
    implicit none (type, external)
    private
 
-   public :: effective_case, free_modes, get_sizes, get_version, keys, loss_factors, run, solve
+   public :: effective_case, free_modes, get_compiler, get_sizes, get_version, keys, loss_factors, run, solve
 
 contains
 
@@ -29,6 +29,15 @@ contains
 
       version = program_version
    end subroutine get_version
+
+   !> What the library was compiled with.
+   subroutine get_compiler(compiler)
+      !f2py threadsafe
+      !> Compiler and its options.
+      character(len=2048), intent(out) :: compiler
+
+      compiler = program_compiler
+   end subroutine get_compiler
 
    !> The commented list of all keys.
    subroutine keys(text)

@@ -1,0 +1,175 @@
+"""Where blocks are computed: threads, processes, or the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from contextlib import contextmanager, suppress
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, Any
+
+from thud.errors import InputError, NumericalError, ThudError
+from thud.studies.evaluation import Block, evaluate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+    Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
+
+BACKENDS = ("threads", "processes", "dask")
+# A scheduler that does not answer within these seconds is not there.
+PATIENCE = 5
+
+
+def run_blocks(
+    blocks: Iterable[Block],
+    keep: Keep,
+    backend: str | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> None:
+    """Compute blocks in any order and keep the results of each as soon as it is done.
+
+    Parameters
+    ----------
+    blocks
+        The blocks.
+    keep
+        Takes a block and its results.
+    backend
+        ``"threads"`` (the default), ``"processes"`` or ``"dask"`` (the default with a scheduler).
+    workers
+        Number of threads or processes; by default one per processor.
+    scheduler
+        Address of a Dask scheduler.
+
+    Raises
+    ------
+    InputError
+        Where there is no such backend or scheduler.
+    NumericalError
+        Where the backend loses a block.
+    """
+    with _open(*_checked(backend, workers, scheduler)) as (executor, width):
+        running: dict[Future[dict[str, NDArray[Any]]], Block] = {}
+        try:
+            for block in blocks:
+                if len(running) >= 2 * width:
+                    _collect(running, keep)
+                running[executor.submit(evaluate, block)] = block
+            while running:
+                _collect(running, keep)
+        except BaseException:
+            # What runs already is waited for and kept; nothing finished is lost.
+            for future in list(running):
+                if future.cancel():
+                    del running[future]
+            done, _ = wait(running)
+            for future in done:
+                if not future.cancelled() and not future.exception():
+                    with suppress(OSError):
+                        keep(running[future], future.result())
+            raise
+
+
+def _checked(
+    backend: str | None, workers: int | None, scheduler: str | None
+) -> tuple[str, int | None, str | None]:
+    """Return a backend, number of workers and scheduler that belong together."""
+    backend = backend or ("dask" if scheduler else BACKENDS[0])
+    if backend not in BACKENDS:
+        message = f"backend = {backend!r} is not known; allowed: {', '.join(BACKENDS)}"
+        raise InputError(message)
+    if (backend == "dask") != (scheduler is not None):
+        message = (
+            f"backend = {backend!r} with scheduler = {scheduler!r} is not allowed; "
+            f"allowed: the address of a scheduler for dask, and only there"
+        )
+        raise InputError(message)
+    if workers is not None and (scheduler or not isinstance(workers, int) or workers < 1):
+        message = f"workers = {workers!r} is not allowed; allowed: 1 <= workers, not for dask"
+        raise InputError(message)
+    return backend, workers, scheduler
+
+
+def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) -> None:
+    """Wait for blocks and keep them."""
+    done, _ = wait(running, return_when=FIRST_COMPLETED)
+    for future in done:
+        try:
+            found = future.result()
+        except ThudError:
+            raise
+        except (Exception, CancelledError) as error:
+            del running[future]
+            said = str(error).partition("\n")[0]
+            message = (
+                f"the backend lost a block of sets ({type(error).__name__}: {said}); what was "
+                f"finished is kept; allowed: run the study again"
+            )
+            raise NumericalError(message) from error
+        keep(running[future], found)
+        del running[future]
+
+
+@contextmanager
+def _open(
+    backend: str, workers: int | None, scheduler: str | None
+) -> Iterator[tuple[Executor, int]]:
+    """Open a backend; return its executor and how many blocks it computes at once."""
+    if scheduler is not None:
+        with _dask(scheduler) as opened:
+            yield opened
+        return
+    width = workers or len(os.sched_getaffinity(0))
+    if backend == "threads":
+        with ThreadPoolExecutor(width) as threads:
+            yield threads, width
+        return
+    # Processes that were forked would share locks of threads that they do not have.
+    context = get_context("spawn")
+    with ProcessPoolExecutor(width, context, initializer=_ignore_interrupts) as processes:
+        yield processes, width
+
+
+def _ignore_interrupts() -> None:
+    """Leave interrupts to the process that started this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[tuple[Executor, int]]:
+    """Open a Dask scheduler."""
+    try:
+        from distributed import Client  # noqa: PLC0415 - an optional package
+    except ModuleNotFoundError as error:
+        message = f"{error.name} is not installed; allowed: pip install 'thud[studies,dask]'"
+        raise InputError(message) from error
+    try:
+        client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError, TypeError) as error:
+        message = (
+            f"scheduler = {address!r} does not answer within {PATIENCE} s; "
+            f"allowed: the address of a running one, such as tcp://host:8786"
+        )
+        raise InputError(message) from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=PATIENCE)
+        except TimeoutError as error:
+            message = f"scheduler = {address!r} has no workers; allowed: one with workers"
+            raise InputError(message) from error
+        width = sum(client.nthreads().values())
+        with client.get_executor() as executor:
+            yield executor, width

@@ -1,0 +1,141 @@
+"""Results of a study as an xarray.Dataset: names, units, provenance."""
+
+from __future__ import annotations
+
+import platform
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+import thud
+from thud._library import compiler
+from thud.levels import get_bands
+from thud.studies import sets
+from thud.studies.evaluation import SCALARS, block_size
+from thud.studies.units import power_of
+
+if TYPE_CHECKING:
+    from thud.studies.parameters import Parameter
+    from thud.studies.sets import Columns
+    from thud.studies.study import Study
+
+_LEVEL = "force exposure level of the {} force, re 1 N and 1 s"
+MEANINGS = {
+    **SCALARS,
+    "elastic_level": ("dB", _LEVEL.format("elastic")),
+    "floor_level": ("dB", _LEVEL.format("floor")),
+    "margin": ("dB", "least distance of the judged octave levels to a limit, positive inside"),
+    "conforms": ("1", "all criteria of the standard are met"),
+    "status": ("1", "0: computed; otherwise the exit code of the error"),
+    "reason": ("1", "why there are no results"),
+}
+# Bytes of a set on disk besides its parameters, and of a file itself.
+_SET_BYTES = 175
+_FILE_BYTES = 27_000
+
+
+def disk_space(study: Study) -> int:
+    """Return about how many bytes the results of a study need, those of its blocks included."""
+    total = sets.count(study)
+    files = 1 - (-total // block_size(study.base))
+    return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * len(study.parameters))
+
+
+def coordinate(parameter: Parameter) -> str:
+    """Return the name of a parameter's coordinate; some keys are named as results are."""
+    name = parameter.name.replace("(", "_").rstrip(")")
+    return f"{parameter.key.group}_{name}" if name in MEANINGS else name
+
+
+def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
+    """Return the results of some sets as a dataset, one after the other.
+
+    Parameters
+    ----------
+    study
+        The study.
+    columns
+        Its parameters, by their names.
+    found
+        Results of the same sets, as `evaluate` gives them.
+
+    Returns
+    -------
+    Dataset
+        Of the dimensions ``set`` and ``octave``.
+    """
+    nominal = get_bands().nominal
+    octave = ("octave", nominal, {"units": "Hz", "long_name": "nominal mid frequency"})
+    coordinates: dict[str, Any] = {"octave": octave}
+    for parameter in study.parameters:
+        values = columns[parameter.name]
+        if not parameter.numeric and values.dtype.kind == "U":
+            values = values.astype(object)
+        coordinates[coordinate(parameter)] = ("set", values, _attributes(parameter))
+    variables = {}
+    for name, values in found.items():
+        unit, meaning = MEANINGS[name]
+        dimensions = ("set", "octave") if values.ndim > 1 else ("set",)
+        variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
+    return xr.Dataset(variables, coordinates, provenance(study))
+
+
+def _attributes(parameter: Parameter) -> dict[str, Any]:
+    """Return the attributes of a parameter; figures show it in the unit of the study."""
+    power = power_of(parameter.unit, parameter.key.unit, parameter.name)
+    return {
+        "units": parameter.key.unit or "1",
+        "long_name": parameter.key.meaning,
+        "group": parameter.key.group,
+        "shown_unit": parameter.unit,
+        "shown_power": -power,
+    }
+
+
+def provenance(study: Study) -> dict[str, str]:
+    """Return where results come from."""
+    return {
+        "title": f"{study.kind} {study.name}",
+        "study": study.text,
+        "study_kind": study.kind,
+        "fingerprint": study.fingerprint,
+        "design": study.design,
+        "seed": str(study.seed) if study.size else "none",
+        "model": study.model,
+        "judged_force": study.base.levels.force,
+        "limits": study.base.limits.source,
+        "base_case": f"{study.base.to_namelist()}",
+        "thud_version": thud.__version__,
+        "compiler": compiler(),
+        "python_version": platform.python_version(),
+        "numpy_version": np.__version__,
+        "xarray_version": xr.__version__,
+        "machine": platform.machine(),
+        "date_created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def grid_of(study: Study, dataset: xr.Dataset) -> xr.Dataset:
+    """Return the dataset of a complete grid with one dimension per parameter instead of ``set``."""
+    if study.design != "grid":
+        return dataset
+    sizes = sets.shape(study)
+    names = tuple(map(coordinate, study.parameters))
+    axes = {}
+    for parameter, name in zip(study.parameters, names, strict=True):
+        values = parameter.spread.grid()
+        if values.dtype.kind == "U":
+            values = values.astype(object)
+        axes[name] = (name, values, dataset[name].attrs)
+    variables = {
+        name: (
+            (*names, *variable.dims[1:]),
+            variable.to_numpy().reshape(*sizes, *variable.shape[1:]),
+            variable.attrs,
+        )
+        for name, variable in dataset.data_vars.items()
+    }
+    octave = {"octave": dataset["octave"]} if "octave" in dataset.coords else {}
+    return xr.Dataset(variables, {**octave, **axes}, dataset.attrs)

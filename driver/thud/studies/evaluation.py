@@ -1,0 +1,171 @@
+"""What becomes of a block of sets: one function, whatever computes them."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import thud
+from thud.case import Ball, Case, Drop, Levels, Limits
+from thud.errors import InputError, ThudError
+from thud.impact import FORCES, solve_case
+from thud.levels import octave_limits
+from thud.models import HollowSphere
+from thud.studies.keys import put
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    Columns = dict[str, NDArray[Any]]
+
+# By name: unit and meaning of the numbers that each set has.
+SCALARS = {
+    "contact_time": ("s", "contact time"),
+    "peak_force": ("N", "largest elastic force"),
+    "peak_floor_force": ("N", "largest force on the floor"),
+    "max_deflection": ("m", "largest deflection"),
+    "restitution": ("1", "coefficient of restitution"),
+    "impulse": ("N s", "time integral of the force on the floor"),
+}
+OCTAVES = 5
+# About the time of one set, s; a block of sets should take about _BLOCK_TIME.
+_SET_TIME = {"modal_ball": 8e-3, "finite_element": 0.25}
+_USUAL_TIME = 1.5e-3
+_ENSEMBLE_TIME = 1.5e-5
+_BLOCK_TIME = 0.5
+_ENSEMBLE_KEYS = {
+    *(option.name for kind in (Ball, Drop) for option in dataclasses.fields(kind)),
+    "momentum_flux",
+}
+
+
+@dataclass(frozen=True)
+class Block:
+    """Sets that are computed together.
+
+    Attributes
+    ----------
+    start : int
+        The first of them.
+    base : Case
+        The case from which they differ.
+    columns : dict of str to ndarray, shape (n_set,)
+        Their values by the names of keys.
+    version : str
+        The version of thud that has to compute them.
+    """
+
+    start: int
+    base: Case
+    columns: Columns
+    version: str
+
+
+def evaluate(block: Block) -> Columns:
+    """Compute the sets of a block.
+
+    Parameters
+    ----------
+    block
+        The sets.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (n_set,) or (n_set, 5)
+        The `SCALARS`; ``elastic_level`` and ``floor_level`` of each octave, dB; ``margin``, the
+        least distance of the judged force's levels to a limit, dB; ``conforms``; ``status``, 0 or
+        the exit code of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
+
+    Raises
+    ------
+    InputError
+        Where this is another version of thud.
+    """
+    if block.version != thud.__version__:
+        message = (
+            f"thud {thud.__version__} is asked for sets of thud {block.version}; "
+            f"allowed: the same version everywhere"
+        )
+        raise InputError(message)
+    if _suits_ensemble(block.base, block.columns):
+        return _by_ensemble(block.base, block.columns)
+    return _one_by_one(block.base, block.columns)
+
+
+def _one_by_one(base: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
+    """Compute sets by the single solver."""
+    size = len(next(iter(columns.values())))
+    found = _empty(size)
+    for i in range(size):
+        try:
+            case = put(base, {name: values[i].item() for name, values in columns.items()})
+            impact = solve_case(case)
+            levels = {force: impact.levels(force=force) for force in FORCES}
+            verdict = impact.conformity()
+        except ThudError as error:
+            found["status"][i] = error.exit_code
+            found["reason"][i] = str(error)
+            continue
+        for name in SCALARS:
+            found[name][i] = getattr(impact, name)
+        for force in FORCES:
+            found[f"{force}_level"][i] = levels[force]
+        octaves = verdict.criteria[:OCTAVES]
+        found["margin"][i] = min(min(o.value - o.lower, o.upper - o.value) for o in octaves)
+        found["conforms"][i] = verdict.conforms
+    return found
+
+
+def _empty(size: int) -> Columns:
+    """Return columns for the results of sets: not a number, not conforming, no error."""
+    found: Columns = {name: np.full(size, np.nan) for name in (*SCALARS, "margin")}
+    found |= {f"{force}_level": np.full((size, OCTAVES), np.nan) for force in FORCES}
+    found["conforms"] = np.zeros(size, dtype=bool)
+    found["status"] = np.zeros(size, dtype=np.int8)
+    found["reason"] = np.full(size, "", dtype=object)
+    return found
+
+
+def block_size(base: Case) -> int:
+    """Return how many sets are computed together: the same wherever they are computed."""
+    usual = _ENSEMBLE_TIME if _has_ensemble(base) else _USUAL_TIME
+    return max(1, round(_BLOCK_TIME / _SET_TIME.get(base.model.name, usual)))  # type: ignore[union-attr]
+
+
+def _has_ensemble(base: Case) -> bool:
+    """Return whether the library computes many sets of a case at once."""
+    # The ensemble judges as these defaults do.
+    same = base.limits == Limits() and base.levels.force == Levels.force
+    same = same and base.levels.method == Levels.method
+    return hasattr(thud, "solve_many") and isinstance(base.model, HollowSphere) and same
+
+
+def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
+    """Return whether the library computes these sets at once."""
+    return _has_ensemble(base) and set(columns) <= _ENSEMBLE_KEYS
+
+
+def _by_ensemble(base: Case, columns: Columns) -> Columns:
+    """Compute sets by the ensemble of the shell model, on one thread: blocks run side by side."""
+    shared = vars(base.ball) | vars(base.drop) | vars(base.model)
+    ensemble = thud.solve_many(shared | columns, threads=1, bands="octave", **vars(base.sampling))
+    found = _empty(len(next(iter(columns.values()))))
+    for name in (*SCALARS, "conforms"):
+        found[name][:] = getattr(ensemble, name)
+    for force in FORCES:
+        found[f"{force}_level"][:] = getattr(ensemble, f"{force}_levels")
+    lower, upper = octave_limits(base.limits.source)
+    judged = found[f"{base.levels.force}_level"]
+    found["margin"][:] = np.minimum(judged - lower, upper - judged).min(axis=1)
+    # The single solver has the sentences.
+    failed = np.flatnonzero(np.asarray(ensemble.status))
+    if failed.size:
+        again = _one_by_one(base, {name: values[failed] for name, values in columns.items()})
+        for name, values in again.items():
+            found[name][failed] = values
+    return found

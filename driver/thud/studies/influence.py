@@ -1,0 +1,163 @@
+"""Which parameter matters for what: Sobol indices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Unpack
+
+import numpy as np
+import xarray as xr
+
+from thud.errors import InputError
+from thud.levels import get_bands
+from thud.studies.dataset import coordinate
+from thud.studies.run import sweep
+from thud.studies.study import read_study
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+    from thud.studies.run import How
+    from thud.studies.study import Source
+
+INDICES = {
+    "first_order": "share of the variance by this parameter alone",
+    "first_order_interval": "half width of its confidence interval",
+    "total": "share of the variance by this parameter, interactions included",
+    "total_interval": "half width of its confidence interval",
+}
+CONFIDENCE = 0.95
+RESAMPLES = 200
+# Fewer base samples than this say nothing.
+LEAST_SAMPLES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """Sobol indices of a study.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        Every set of the study.
+    indices : Dataset
+        ``first_order`` and ``total`` index of each ``output`` and ``parameter``, and half widths
+        of their confidence intervals of 95 %. Outputs that do not vary have none: NaN.
+    left_out : int
+        Base samples left out because one of their sets has no result.
+    """
+
+    dataset: xr.Dataset
+    indices: xr.Dataset
+    left_out: int
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: total indices of each output."""
+        parameters = [str(name) for name in self.indices["parameter"].values]
+        rows = [("total index of", *parameters)]
+        for output in self.indices["output"].values:
+            row = self.indices.sel(output=output)
+            pairs = zip(row["total"].values, row["total_interval"].values, strict=True)
+            rows.append((str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs)))
+        return rows
+
+    def csv(self) -> bytes:
+        """Return all indices as a table with a line for each output and parameter."""
+        lines = [",".join(("output", "parameter", *INDICES))]
+        for output in self.indices["output"].values:
+            for name in self.indices["parameter"].values:
+                cell = self.indices.sel(output=output, parameter=name)
+                lines.append(",".join((output, name, *(f"{float(cell[i]):.6g}" for i in INDICES))))
+        return "\n".join((*lines, "")).encode()
+
+
+def sensitivity(
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+) -> Sensitivity:
+    """Compute Sobol indices of the octave levels, the contact time and the peak of the force.
+
+    Parameters
+    ----------
+    study
+        Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
+        samples N, a power of 2; N (d + 2) sets are computed for d parameters.
+    output, **how
+        See `sweep`.
+
+    Returns
+    -------
+    Sensitivity
+        Indices of the force that the base case judges, with confidence intervals.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; also where too few sets have results.
+    """
+    plan = read_study(study, "sensitivity")
+    dataset = sweep(plan, output, **how).load()
+    force = plan.base.levels.force
+    levels = dataset[f"{force}_level"].values
+    peak = "peak_force" if force == "elastic" else "peak_floor_force"
+    outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)} | {
+        name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)
+    }
+    dimension = len(plan.parameters)
+    usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
+    if usable.sum() < LEAST_SAMPLES:
+        reason = next(text for text in dataset["reason"].values if text)
+        message = f"only {usable.sum()} of {plan.size} base samples have results ({reason})"
+        message += "; allowed: ranges in which sets have some"
+        raise InputError(message)
+    rows = np.repeat(usable, dimension + 2)
+    found = [sobol_indices(values[rows], dimension, plan.seed) for values in outputs.values()]
+    variables = {
+        name: (("output", "parameter"), np.stack([one[i] for one in found]), _about(meaning))
+        for i, (name, meaning) in enumerate(INDICES.items())
+    }
+    names = {"output": list(outputs), "parameter": list(map(coordinate, plan.parameters))}
+    left_out = int((~usable).sum())
+    return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)
+
+
+def _about(meaning: str) -> dict[str, str]:
+    """Return the attributes of an index."""
+    return {"units": "1", "long_name": meaning}
+
+
+def sobol_indices(
+    values: NDArray[np.float64], dimension: int, seed: int = 0
+) -> tuple[NDArray[np.float64], ...]:
+    """Return the Sobol indices of one quantity.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n (dimension + 2),)
+        The quantity at the points of a ``"saltelli"`` design, in their order.
+    dimension
+        Number of parameters.
+    seed
+        Seed of the resampling for the confidence intervals.
+
+    Returns
+    -------
+    first, first_interval, total, total_interval : ndarray, shape (dimension,)
+        Indices and half widths of their confidence intervals; NaN where nothing varies.
+    """
+    from SALib.analyze import sobol  # noqa: PLC0415 - takes its time
+
+    # Rounding is no variance.
+    if np.ptp(values) <= 1e-12 * np.abs(values).max():
+        return tuple(np.full((4, dimension), np.nan))
+    cube = {"num_vars": dimension, "names": list(map(str, range(dimension)))}
+    found = sobol.analyze(
+        cube,
+        values,
+        calc_second_order=False,
+        num_resamples=RESAMPLES,
+        conf_level=CONFIDENCE,
+        seed=seed,
+    )
+    return tuple(np.asarray(found[name]) for name in ("S1", "S1_conf", "ST", "ST_conf"))

@@ -1,0 +1,236 @@
+"""Files of a study: finished blocks while it runs, one file or Zarr group at its end."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from thud.checks import replace_file
+from thud.errors import InputError
+from thud.studies import sets
+from thud.studies.dataset import disk_space, grid_of, new_dataset
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterator
+
+    from thud.studies.evaluation import Block
+    from thud.studies.sets import Columns
+    from thud.studies.study import Study
+
+# Results that need more bytes than this are written as Zarr.
+LARGE = 256 * 2**20
+
+
+class Store:
+    """The directory of a study.
+
+    Parameters
+    ----------
+    folder
+        The directory; it is made where there is none.
+    study
+        The study that it belongs to.
+    size
+        Sets in a block.
+
+    Raises
+    ------
+    InputError
+        Where what lies there belongs to another study.
+    OSError
+        Where nothing can be written there.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str], study: Study, size: int) -> None:
+        self._study = study
+        self._size = size
+        large = disk_space(study) > LARGE
+        ending = "zarr" if study.format == "zarr" or (large and study.format == "auto") else "nc"
+        self.path = Path(folder) / f"{study.name}.{ending}"
+        self._partial = self.path.with_suffix(".partial")
+        for path in (self.path, self._partial):
+            if path.exists():
+                self._require_own(path)
+        with _named(self.path):
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            if not self.complete:
+                self._require_space()
+                self._partial.mkdir(exist_ok=True)
+                replace_file(self._mark, self._identity.encode())
+
+    @property
+    def _mark(self) -> Path:
+        """The file that says whose blocks these are."""
+        return self._partial / "study"
+
+    @property
+    def _identity(self) -> str:
+        """What stands in it."""
+        return f"{self._study.fingerprint} {self._size}\n"
+
+    @property
+    def complete(self) -> bool:
+        """The study is done."""
+        return self.path.exists()
+
+    def _require_own(self, path: Path) -> None:
+        """Complain about results of another study."""
+        if path == self._partial:
+            # A directory without anything but a mark holds nothing that could be lost.
+            mine = set(path.iterdir()) <= {self._mark} or (
+                self._mark.exists() and self._mark.read_bytes() == self._identity.encode()
+            )
+        else:
+            with _open(path) as dataset:
+                mine = dataset.attrs.get("fingerprint") == self._study.fingerprint
+        if not mine:
+            message = (
+                f"{path} belongs to another study, or to another version of this one; "
+                f"allowed: another directory, or remove it first"
+            )
+            raise InputError(message)
+
+    def _require_space(self) -> None:
+        """Complain about a disk that is too small."""
+        free = shutil.disk_usage(self.path.parent).free
+        needed = disk_space(self._study)
+        if needed > free:
+            message = (
+                f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are "
+                f"free; allowed: fewer sets, or another disk"
+            )
+            raise InputError(message)
+
+    def _block(self, start: int) -> Path:
+        """Return the file of a block."""
+        return self._partial / f"block_{start:012d}.nc"
+
+    def has(self, start: int) -> bool:
+        """Return whether the block that begins with a set is finished."""
+        return self._block(start).exists()
+
+    def keep(self, block: Block, found: Columns) -> None:
+        """Write the results of a block, completely or not at all."""
+        stop = block.start + len(found["status"])
+        columns = sets.parameter_columns(self._study, block.start, stop)
+        _write(new_dataset(self._study, columns, found), self._block(block.start))
+
+    def finish(self) -> None:
+        """Put all blocks together, then remove them."""
+        if not self.complete:
+            paths = sorted(self._partial.glob("block_*.nc"))
+            if self.path.suffix == ".nc":
+                _write(grid_of(self._study, _join(paths)), self.path)
+            else:
+                self._write_zarr(paths)
+        shutil.rmtree(self._partial, ignore_errors=True)
+
+    def _write_zarr(self, paths: list[Path]) -> None:
+        """Write a Zarr group, some variables at a time: only these have to fit into memory."""
+        part = self.path.with_name(f".{self.path.name}.part")
+        shutil.rmtree(part, ignore_errors=True)
+        with _named(self.path), _open(paths[0]) as first:
+            names = list(map(str, first.data_vars))
+            largest = max(variable.nbytes for variable in first.data_vars.values()) * len(paths)
+            together = max(1, 2 * LARGE // largest)
+            for i in range(0, len(names), together):
+                grid = grid_of(self._study, _join(paths, names[i : i + together]))
+                grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
+            part.rename(self.path)
+
+
+def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Read the results of a study, also of one that was interrupted.
+
+    Parameters
+    ----------
+    path
+        A file ``.nc``, a Zarr group ``.zarr``, or the directory ``.partial`` of a study that is not
+        done: its finished sets.
+
+    Returns
+    -------
+    Dataset
+        The results; those of a Zarr group are read when they are needed.
+
+    Raises
+    ------
+    InputError
+        Where there are no results of a study.
+    """
+    place = Path(path)
+    if place.suffix == ".partial":
+        paths = sorted(place.glob("block_*.nc"))
+        if not paths:
+            message = f"{place} holds no finished sets; allowed: results of a study"
+            raise InputError(message)
+        return _join(paths)
+    if place.suffix == ".zarr":
+        with _readable(place):
+            lazy: xr.Dataset = xr.open_zarr(place, consolidated=False)
+            return lazy
+    with _open(place) as dataset:
+        return _loaded(dataset)
+
+
+def _join(paths: list[Path], names: list[str] | None = None) -> xr.Dataset:
+    """Return blocks as one dataset, or some variables of them with all coordinates."""
+    parts = []
+    for path in paths:
+        with _open(path) as dataset:
+            parts.append(_loaded(dataset if names is None else dataset[names]))
+    return xr.concat(
+        parts, "set", data_vars="minimal", coords="minimal", compat="override",
+        join="override", combine_attrs="override",
+    )  # fmt: skip
+
+
+def _loaded(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in memory, its texts of any length as they were before they were written."""
+    texts: dict[Any, Any] = {
+        name: variable.astype(object)
+        for name, variable in dataset.variables.items()
+        if variable.dtype.kind == "U"
+    }
+    return dataset.load().assign(texts)
+
+
+@contextmanager
+def _open(path: Path) -> Iterator[xr.Dataset]:
+    """Open a file or Zarr group."""
+    with _readable(path):
+        if path.suffix == ".zarr":
+            dataset = xr.open_zarr(path, consolidated=False)
+        else:
+            dataset = xr.open_dataset(path, engine="h5netcdf")
+    with dataset:
+        yield dataset
+
+
+@contextmanager
+def _readable(path: Path) -> Iterator[None]:
+    """Complain about what is not a dataset."""
+    try:
+        yield
+    except (OSError, ValueError, KeyError) as error:
+        message = f"{path} cannot be read; allowed: results of a study, or remove it"
+        raise InputError(message) from error
+
+
+def _write(dataset: xr.Dataset, path: Path) -> None:
+    """Write a NetCDF file, completely or not at all."""
+    replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Give errors of the disk the path that was asked for."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(error.filename or path)) from error

@@ -1,0 +1,317 @@
+"""Studies: what varies around which case, read from TOML."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import thud
+from thud.case import Case, read_case
+from thud.checks import require_kind
+from thud.errors import InputError
+from thud.models import FiniteElement, new_model
+from thud.studies.keys import DENSITY, TEMPERATURE, Value, find_key, put
+from thud.studies.parameters import Normal, Parameter, Uniform, checked, new_parameter
+from thud.studies.units import power_of
+
+if TYPE_CHECKING:
+    import os
+
+# What `read_study` reads.
+Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
+
+# By study: the designs that it takes, the default first.
+DESIGNS = {
+    "sweep": ("grid", "list", "random", "latin_hypercube", "sobol"),
+    "sensitivity": ("saltelli",),
+    "design": ("grid",),
+    "uncertainty": ("random",),
+}
+DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
+FORMATS = ("auto", "netcdf", "zarr")
+_WORDS = ("name", "case", "format", "fixed", "design", "temperature", "parameters")
+_LARGEST_SEED = 2**32 - 1
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """How the modulus of elasticity falls with temperature: E (1 + c (T - T_ref)).
+
+    Attributes
+    ----------
+    reference : float
+        Temperature T_ref at which the modulus is that of the case, degrees Celsius.
+    coefficient : float
+        Relative change c of the modulus, 1/K.
+    """
+
+    reference: float
+    coefficient: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study, complete and checked; `read_study` makes one.
+
+    Attributes
+    ----------
+    name : str
+        Name of the study, also of its files.
+    kind : str
+        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
+    base : Case
+        The case from which sets differ.
+    parameters : tuple of Parameter
+        What varies.
+    design : str
+        ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
+    size, seed : int
+        Number of sets that are drawn (of base samples for ``"saltelli"``), and the seed.
+    density : float or None
+        Density of the wall where it is given instead of the mass, kg/m3.
+    temperature : Temperature or None
+        Law of the modulus where the temperature varies.
+    format : str
+        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
+    text : str
+        The text of the study.
+    """
+
+    name: str
+    kind: str
+    base: Case
+    parameters: tuple[Parameter, ...]
+    design: str
+    size: int = 0
+    seed: int = 0
+    density: float | None = None
+    temperature: Temperature | None = None
+    format: str = "auto"
+    text: str = field(default="", compare=False, repr=False)
+
+    @property
+    def model(self) -> str:
+        """Name of the source model."""
+        return self.base.model.name  # type: ignore[union-attr]
+
+    @property
+    def fingerprint(self) -> str:
+        """What tells studies with other results apart; comments and formats do not count."""
+        parts = repr(replace(self, format=""))
+        return hashlib.sha256(f"{thud.__version__} {parts}".encode()).hexdigest()
+
+
+def read_study(source: Source, kind: str = "sweep") -> Study:
+    """Read a study.
+
+    Parameters
+    ----------
+    source
+        Path of a TOML file, or what would stand in it.
+    kind
+        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
+
+    Returns
+    -------
+    Study
+        The study.
+
+    Raises
+    ------
+    InputError
+        Names file, table, key and what is allowed.
+    """
+    if isinstance(source, Study):
+        if source.kind != kind:
+            message = f"{source.name} is a {source.kind} study; allowed: a {kind} study"
+            raise InputError(message)
+        return source
+    if isinstance(source, Mapping):
+        text = json.dumps(source, default=repr)
+        return _new_study(dict(source), kind, Path(), "python", text)
+    require_kind("study", source, str | Path)
+    path = Path(source)
+    try:
+        content = path.read_text(encoding="utf-8")
+        return _new_study(tomllib.loads(content), kind, path.parent, path.stem, content)
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        message = f"{path}: {error}; allowed: TOML"
+        raise InputError(message) from error
+    except InputError as error:
+        message = f"{path}: {error}"
+        raise InputError(message) from error
+
+
+def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: str) -> Study:
+    """Return the study that a table describes."""
+    _require_words("the study", given, _WORDS)
+    for table in ("fixed", "design", "temperature", "parameters"):
+        if not isinstance(given.get(table, {}), dict):
+            message = f"{table} = {given[table]!r} is not allowed; allowed: a table [{table}]"
+            raise InputError(message)
+    name = given.get("name", name)
+    if (
+        not isinstance(name, str)
+        or not name.strip()
+        or not name.isprintable()
+        or Path(name).name != name
+    ):
+        message = f"name = {name!r} is not allowed; allowed: the name of a file, without folders"
+        raise InputError(message)
+    written = given.get("format", FORMATS[0])
+    if written not in FORMATS:
+        message = f"format = {written!r} is not known; allowed: {', '.join(FORMATS)}"
+        raise InputError(message)
+    base, density = _fix(_base_case(given, folder), given.get("fixed", {}))
+    parameters = _parameters(given.get("parameters", {}), base)
+    temperature = _temperature(given.get("temperature"), parameters)
+    names = {parameter.name for parameter in parameters}
+    if "mass" in names and (density is not None or DENSITY.name in names):
+        message = "mass and density are both given; allowed: one of them"
+        raise InputError(message)
+    design, size, seed = _design(given.get("design", {}), kind, parameters)
+    return Study(
+        name, kind, base, parameters, design, size, seed, density, temperature, written, text
+    )
+
+
+def _require_words(place: str, given: Mapping[str, object], known: tuple[str, ...]) -> None:
+    """Complain about words that mean nothing."""
+    for word in given:
+        if word not in known:
+            message = f"{place}: {word!r} is not known; allowed: {', '.join(known)}"
+            raise InputError(message)
+
+
+def _base_case(given: Mapping[str, Any], folder: Path) -> Case:
+    """Return the case from which sets differ: of a file, or the default, with its model."""
+    path = given.get("case")
+    if path is not None and not isinstance(path, str):
+        message = f"case = {path!r} is not allowed; allowed: the path of a namelist file"
+        raise InputError(message)
+    case = Case() if path is None else read_case(folder / path)
+    model = given.get("fixed", {}).get("model")
+    if model is not None and (case.model is None or model != case.model.name):
+        case = replace(case, model=new_model(model, {}))
+    if case.model is None:
+        message = f"case = {path!r} has no source model; allowed: a case with one"
+        raise InputError(message)
+    if isinstance(case.model, FiniteElement):
+        case = replace(case, model=replace(case.model, snapshot_interval=0.0))
+    return replace(case, modes=None)
+
+
+def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
+    """Return the case with the keys that the study fixes, and a density if it fixes one."""
+    values: dict[str, object] = {}
+    for name, entry in fixed.items():
+        if name == "model":
+            continue
+        place = f"[fixed] {name}"
+        key, place_in_list = find_key(name, case.model.name)  # type: ignore[union-attr]
+        if key == TEMPERATURE:
+            message = f"{place} is not allowed; allowed: temperature in [parameters]"
+            raise InputError(message)
+        given = entry if isinstance(entry, dict) else {"value": entry}
+        _require_words(place, given, ("value", "unit"))
+        power = power_of(given.get("unit", key.unit or "1"), key.unit, place)
+        value = given.get("value")
+        if key.kind == "list" and place_in_list is None:
+            entries = value if isinstance(value, list) else [value]
+            values[name] = tuple(checked(place, key, item, power) for item in entries)
+        else:
+            values[name] = checked(place, key, value, power)
+    density = values.pop(DENSITY.name, None)
+    if density is not None and "mass" in values:
+        message = "[fixed] mass and density are both given; allowed: one of them"
+        raise InputError(message)
+    return put(case, values), density  # type: ignore[return-value]
+
+
+def _parameters(given: Mapping[str, Any], base: Case) -> tuple[Parameter, ...]:
+    """Return what varies."""
+    if not given:
+        message = "[parameters] is empty; allowed: one parameter or more"
+        raise InputError(message)
+    model = base.model.name  # type: ignore[union-attr]
+    return tuple(
+        new_parameter(name, spread, model, value_in(base, name)) for name, spread in given.items()
+    )
+
+
+def value_in(base: Case, name: str) -> Value | None:
+    """Return the value of a key in a case; None where it has none, or a list of them."""
+    groups = (base.ball, base.drop, base.sampling, base.levels, base.limits, base.model)
+    values = (getattr(group, name, None) for group in groups)
+    return next((value for value in values if isinstance(value, Value)), None)
+
+
+def _temperature(given: Mapping[str, Any] | None, parameters: tuple[Parameter, ...]) -> Any:  # noqa: ANN401
+    """Return the law of the modulus."""
+    varies = any(parameter.key == TEMPERATURE for parameter in parameters)
+    if varies != (given is not None):
+        message = (
+            "temperature needs both a parameter and the table [temperature]; "
+            "allowed: reference, degC, and coefficient, 1/K, in [temperature]"
+        )
+        raise InputError(message)
+    if given is None:
+        return None
+    words = ("reference", "coefficient")
+    _require_words("[temperature]", given, words)
+    numbers = (checked(f"[temperature] {w}", TEMPERATURE, given.get(w), 0) for w in words)
+    return Temperature(*map(float, numbers))
+
+
+def _design(
+    given: Mapping[str, Any], kind: str, parameters: tuple[Parameter, ...]
+) -> tuple[str, int, int]:
+    """Return kind, size and seed of the design."""
+    allowed = DESIGNS[kind]
+    design = given.get("kind", allowed[0])
+    if design not in allowed:
+        message = f"[design] kind = {design!r} is not allowed; allowed: {', '.join(allowed)}"
+        raise InputError(message)
+    words = ("kind", "size", "seed") if design in DRAWN else ("kind",)
+    _require_words(f"[design] of kind {design}", given, words)
+    for parameter in parameters:
+        spread = parameter.spread
+        if design in DRAWN and isinstance(spread, Uniform) and spread.count:
+            message = (
+                f"[parameters] {parameter.name}: count has no use in a {design} design; "
+                f"allowed: low, high and scale"
+            )
+            raise InputError(message)
+        gridless = isinstance(spread, Normal) or (isinstance(spread, Uniform) and not spread.count)
+        if design not in DRAWN and gridless:
+            message = (
+                f"[parameters] {parameter.name} has no values for a {design} design; "
+                f"allowed: values = [...], or low, high and count"
+            )
+            raise InputError(message)
+    if design == "list" and len({len(p.spread.grid()) for p in parameters}) > 1:
+        message = "[parameters] differ in their number of values; allowed: the same for all"
+        raise InputError(message)
+    if design not in DRAWN:
+        return design, 0, 0
+    size, seed = given.get("size", 0), given.get("seed", 0)
+    for word, number, least, most in (("size", size, 1, 2**30), ("seed", seed, 0, _LARGEST_SEED)):
+        if not isinstance(number, int) or isinstance(number, bool) or not least <= number <= most:
+            message = (
+                f"[design] {word} = {number!r} is not allowed; "
+                f"allowed: {least} <= {word} <= {most}, whole"
+            )
+            raise InputError(message)
+    if design in {"sobol", "saltelli"} and size & (size - 1):
+        near = 1 << size.bit_length() - 1
+        message = (
+            f"[design] size = {size} breaks the balance of Sobol's points; "
+            f"allowed: powers of 2, such as {near} or {2 * near}"
+        )
+        raise InputError(message)
+    return design, size, seed

@@ -1,0 +1,147 @@
+"""How surely a ball conforms: Monte Carlo over tolerances of manufacture and temperature."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Unpack
+
+import numpy as np
+from scipy.special import ndtri
+
+from thud.errors import InputError
+from thud.levels import get_bands, octave_limits
+from thud.studies.run import sweep
+from thud.studies.study import read_study
+
+if TYPE_CHECKING:
+    import os
+
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from thud.studies.run import How
+    from thud.studies.study import Source
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Uncertainty:
+    """Distribution of the levels, and the probability of conformity.
+
+    Attributes
+    ----------
+    dataset : Dataset
+        Every set.
+    levels : ndarray, shape (n_set, 5)
+        Octave levels of the force that is judged, dB; sets without results are left out.
+    source : str
+        Source whose limits apply.
+    conforming, computed, failed : int
+        Sets that meet all criteria, that have results, and that have none.
+    """
+
+    dataset: xr.Dataset
+    levels: NDArray[np.float64]
+    source: str
+    conforming: int
+    computed: int
+    failed: int
+
+    @property
+    def probability(self) -> float:
+        """Share of the computed sets that conform."""
+        return self.conforming / self.computed
+
+    @property
+    def standard_error(self) -> float:
+        """Monte Carlo standard error of the probability."""
+        return math.sqrt(self.probability * (1 - self.probability) / self.computed)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's interval of the probability, of 95 %; it also holds for none and for all."""
+        return wilson_interval(self.conforming, self.computed)
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        lower, upper = octave_limits(self.source)
+        rows: list[tuple[str, ...]] = [
+            ("octave, Hz", "mean, dB", "std, dB", "2.5 to 97.5 %, dB", "within its limits")
+        ]
+        for i, band in enumerate(get_bands().nominal):
+            level = self.levels[:, i]
+            low, high = np.quantile(level, [0.025, 0.975])
+            share = np.mean((level >= lower[i]) & (level <= upper[i]))
+            rows.append(
+                (
+                    f"{band:g}",
+                    f"{level.mean():.2f}",
+                    f"{level.std(ddof=1):.2f}",
+                    f"{low:.2f} to {high:.2f}",
+                    f"{100 * share:.1f} %",
+                )
+            )
+        low, high = self.interval
+        rows.append(
+            (
+                "all criteria",
+                f"{100 * self.probability:.1f} %",
+                f"± {100 * self.standard_error:.1f} %",
+                f"{100 * low:.1f} to {100 * high:.1f} %",
+                f"{self.conforming} of {self.computed}",
+            )
+        )
+        return rows
+
+
+def wilson_interval(hits: int, trials: int) -> tuple[float, float]:
+    """Return Wilson's score interval of a probability (Wilson 1927), of 95 %."""
+    z = float(ndtri((1 + CONFIDENCE) / 2))
+    share = hits / trials
+    middle = (share + z * z / (2 * trials)) / (1 + z * z / trials)
+    spread = math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)
+    half = z / (1 + z * z / trials) * spread
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def uncertainty(
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+) -> Uncertainty:
+    """Compute how tolerances spread the levels, and how probably the ball conforms.
+
+    Parameters
+    ----------
+    study
+        Path of a TOML file, or what would stand in it; its parameters are independent.
+    output, **how
+        See `sweep`.
+
+    Returns
+    -------
+    Uncertainty
+        Levels of the force that the base case judges, and the probability of conformity.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; also where fewer than two sets have results.
+    """
+    plan = read_study(study, "uncertainty")
+    dataset = sweep(plan, output, **how).load()
+    good = dataset["status"].values == 0
+    if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
+        reasons = [text for text in dataset["reason"].values if text]
+        message = f"only {good.sum()} of {plan.size} sets have results"
+        message += f" ({reasons[0]})" if reasons else ""
+        message += "; allowed: two or more"
+        raise InputError(message)
+    return Uncertainty(
+        dataset,
+        dataset[f"{plan.base.levels.force}_level"].values[good],
+        plan.base.limits.source,
+        int(dataset["conforms"].values[good].sum()),
+        int(good.sum()),
+        int((~good).sum()),
+    )

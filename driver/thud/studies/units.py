@@ -1,0 +1,55 @@
+"""Units of the namelist and their common multiples; all of them are powers of ten."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from thud.errors import InputError
+
+# By the unit of a key: units that may be given, and their power of ten.
+MULTIPLES: dict[str, dict[str, int]] = {
+    "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
+    "s": {"s": 0, "ms": -3, "us": -6},
+    "Hz": {"Hz": 0, "kHz": 3},
+    "Pa": {"Pa": 0, "hPa": 2, "kPa": 3, "MPa": 6, "GPa": 9, "N/m2": 0, "N/mm2": 6, "bar": 5},
+    "kg": {"kg": 0, "g": -3},
+    "kg/m3": {"kg/m3": 0, "g/cm3": 3},
+    "m/s2": {"m/s2": 0},
+    "s/m": {"s/m": 0, "ms/m": -3},
+    "degC": {"degC": 0},
+    "K": {"K": 0},
+    "": {"1": 0, "%": -2},
+}
+
+
+def power_of(unit: object, key_unit: str, place: str) -> int:
+    """Return the power of ten that brings a unit to that of a key.
+
+    Parameters
+    ----------
+    unit
+        The unit that is given.
+    key_unit
+        The unit of the key.
+    place
+        Where the unit stands, for the message.
+
+    Raises
+    ------
+    InputError
+        Where the unit does not fit; lists those that do.
+    """
+    multiples = MULTIPLES[key_unit]
+    if not isinstance(unit, str) or unit not in multiples:
+        message = f"{place}: unit {unit!r} does not fit; allowed: {', '.join(multiples)}"
+        raise InputError(message)
+    return multiples[unit]
+
+
+def scaled(value: float, power: int) -> float:
+    """Return a number times a power of ten, as exactly as if it had been written that way.
+
+    >>> scaled(35, -3)
+    0.035
+    """
+    return float(Decimal(repr(value)).scaleb(power))

@@ -1,0 +1,124 @@
+"""Maps of conformity against a closed form and against single drops."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+from thud.studies import figures
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+MODAL: dict[str, Any] = {
+    "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
+    "fixed": {"loss_factor": 0.2},
+    "parameters": {
+        "wall_thickness": {"values": [32, 30.6, 29], "unit": "mm"},
+        "youngs_modulus": {"values": [1.6, 1.8, 2.0], "unit": "MPa"},
+    },
+}
+
+
+def test_margin_of_a_source_with_known_levels() -> None:
+    # With a given contact time the level is 20 lg M + 10 lg h + c.
+    options = {"contact_time": 0.02, "restitution": 0.8}
+    found = thud.design_map(
+        {
+            "fixed": {"model": "hunt_crossley", "source": "tyre", **options},
+            "parameters": {
+                "mass": {"low": 3, "high": 9, "count": 4},
+                "height": {"low": 0.4, "high": 1, "count": 3},
+            },
+        }
+    ).dataset
+    one = thud.solve(thud.Ball(mass=1), thud.Drop(1), "hunt_crossley", **options)
+    gain = 20 * np.log10(found["mass"]) + 10 * np.log10(found["height"])
+    expected = [
+        np.minimum(level + gain - limit.lower, limit.upper - level - gain)
+        for level, limit in zip(one.levels(), one.conformity("tyre").criteria[:5], strict=True)
+    ]
+    np.testing.assert_allclose(found["margin"], np.min(expected, axis=0), atol=1e-6)
+
+
+def test_map_holds_the_verdicts_of_single_drops() -> None:
+    result = thud.design_map(MODAL)
+    assert result.axes == ("wall_thickness", "youngs_modulus")
+    assert result.dataset["wall_thickness"].values.tolist() == [0.029, 0.0306, 0.032]
+    verdicts = []
+    for thickness in (0.029, 0.0306, 0.032):
+        for modulus in (1.6e6, 1.8e6, 2.0e6):
+            ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
+            options = {"damping_law": "rising", "loss_factor": 0.2}
+            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).conformity()))
+    assert result.dataset["conforms"].values.ravel().tolist() == verdicts
+    assert any(verdicts)
+    assert not all(verdicts)
+    assert (result.dataset["margin"].values.ravel() >= 0).tolist() == verdicts
+
+
+def test_ball_of_the_paper_is_marked() -> None:
+    result = thud.design_map(MODAL)
+    assert (result.mark, result.mark_name) == ((0.032, 1.6e6), "paper's ball")
+    axes, _ = figures.draw_design_map(result).axes
+    (star,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.6))
+    assert axes.get_xlabel() == "Wall thickness, mm"
+    assert axes.get_ylabel() == "Young's modulus, MPa"
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["octave limits", "all criteria met", "paper's ball"]
+
+
+def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
+    study = {
+        "fixed": {"model": "modal_ball"},
+        "parameters": {"loss_factor": {"values": [0.1, 0.2]}, "height": {"values": [2.0, 1.5]}},
+    }
+    result = thud.design_map(study)
+    assert (result.mark, result.mark_name) == (None, "base case")
+    axes, _ = figures.draw_design_map(result).axes
+    assert axes.get_legend() is None
+    study["parameters"]["height"] = {"values": [1.0, 1.5]}
+    assert thud.design_map(study).mark == (0.1, 1.0)
+
+
+def test_places_without_results_stay_empty() -> None:
+    study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
+    result = thud.design_map(study)
+    assert int(np.isnan(result.dataset["margin"]).sum()) == 3
+    figures.draw_design_map(result)
+    assert ("sets", "9") in result.table()
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [
+        {"height": {"values": [1, 2]}},
+        {"height": {"values": [1, 2]}, "mass": {"values": [2, 2]}},
+        {"height": {"values": [1, 2]}, "momentum_flux": {"values": ["none", "retarding"]}},
+        {name: {"values": [1, 2]} for name in ("height", "mass", "gravity")},
+    ],
+)
+def test_what_is_no_map_is_told(parameters: dict[str, Any]) -> None:
+    with pytest.raises(thud.InputError, match="are no map; allowed: two numeric ones"):
+        thud.design_map({"parameters": parameters})
+
+
+def test_command_writes_figure_and_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    study = tmp_path / "design.toml"
+    study.write_text("parameters = {mass={values=[2, 3]}, height={values=[1, 2]}}")
+    assert cli.main(["design", "-q", str(study), "-o", str(tmp_path)]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "design.nc",
+        "design.png",
+        "design.svg",
+        "design.toml",
+    ]
+    assert capsys.readouterr() == ("", "")

@@ -1,0 +1,121 @@
+"""Sobol indices against closed forms: Ishigami's function, and a source whose levels are a sum."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+from thud.studies import figures, sets
+from thud.studies.influence import sobol_indices
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from thud.studies import Sensitivity
+
+# With a given contact time the level is 20 lg M + 10 lg h + c, whatever the radius.
+LUMPED: dict[str, Any] = {
+    "name": "lumped",
+    "fixed": {"model": "hunt_crossley", "contact_time": 0.02, "restitution": 0.8},
+    "design": {"size": 128, "seed": 3},
+    "parameters": {
+        "mass": {"low": 2.0, "high": 3.0},
+        "height": {"low": 0.5, "high": 2.0},
+        "outer_radius": {"low": 8, "high": 9, "unit": "cm"},
+    },
+}
+
+
+@pytest.fixture(scope="module")
+def lumped() -> Sensitivity:
+    """Return the indices of the lumped source."""
+    return thud.sensitivity(LUMPED)
+
+
+def test_indices_of_ishigami() -> None:
+    # Ishigami and Homma (1990): sin x1 + 7 sin(x2)^2 + 0.1 x3^4 sin x1, x between -pi and pi.
+    x = np.pi * (2 * sets.unit_sets("saltelli", 3, 2048, 1, 0, 2048 * 5) - 1)
+    values = np.sin(x[:, 0]) + 7 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
+    first, first_interval, total, total_interval = sobol_indices(values, 3)
+    a, b = 7.0, 0.1
+    alone = [0.5 * (1 + b * np.pi**4 / 5) ** 2, a**2 / 8, 0.0]
+    both = b**2 * np.pi**8 * (1 / 18 - 1 / 50)
+    whole = sum(alone) + both
+    exact_total = np.add(alone, [both, 0, both]) / whole
+    # Intervals of 95 % are two standard errors: four are left to chance.
+    assert np.all(np.abs(first - np.array(alone) / whole) <= 2 * first_interval)
+    assert np.all(np.abs(total - exact_total) <= 2 * total_interval)
+    assert np.all(first_interval < 0.1)
+    assert np.all(total_interval < 0.1)
+
+
+def test_indices_of_a_source_whose_levels_are_a_sum(lumped: Sensitivity) -> None:
+    m, h = np.linspace(2, 3, 10001), np.linspace(0.5, 2, 10001)
+    share = np.array([np.var(20 * np.log10(m)), np.var(10 * np.log10(h)), 0])
+    share /= share.sum()
+    levels = lumped.indices.isel(output=slice(0, 5))
+    for name in ("first_order", "total"):
+        error = np.abs(levels[name] - share)
+        assert (error <= 2 * levels[f"{name}_interval"] + 1e-9).all()
+    assert (np.abs(levels["total"].sel(parameter="outer_radius")) < 1e-12).all()
+    assert lumped.indices["output"].values.tolist()[-2:] == ["contact time", "peak force"]
+    assert lumped.left_out == 0
+
+
+def test_what_does_not_vary_has_no_indices(lumped: Sensitivity) -> None:
+    # Contact time is the one that was asked for.
+    assert np.isnan(lumped.indices.sel(output="contact time")["total"]).all()
+
+
+def test_samples_without_results_are_left_out() -> None:
+    study = {**LUMPED, "parameters": {**LUMPED["parameters"], "mass": {"low": -0.5, "high": 3.0}}}
+    result = thud.sensitivity(study)
+    # A base sample is lost with its own mass or with that of its other matrix.
+    assert 0 < result.left_out < 64
+    assert np.isfinite(result.indices["total"].sel(output="peak force")).all()
+    study["parameters"]["mass"] = {"low": -3.0, "high": -2.0}
+    with pytest.raises(thud.InputError, match=r"only 0 of 128 base samples .*mass.*; allowed: ran"):
+        thud.sensitivity(study)
+
+
+def test_figure_shows_every_index(lumped: Sensitivity) -> None:
+    (axes,) = figures.draw_sensitivity(lumped).axes
+    widths = [bar.get_width() for bars in axes.containers[1::2] for bar in bars]
+    expected = lumped.indices["total"].transpose("parameter", "output").values.ravel()
+    np.testing.assert_array_equal(widths, expected)
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["first order", "mass", "height", "outer radius"]
+
+
+def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "lumped.toml"
+    path.write_text(
+        "fixed = {model='hunt_crossley', contact_time=0.02}\ndesign.size = 16\n"
+        "parameters = {mass={low=2, high=3}, height={low=1, high=2}}"
+    )
+    assert cli.main(["sensitivity", str(path), "-o", str(tmp_path)]) == 0
+    lines = (tmp_path / "lumped_indices.csv").read_text().splitlines()
+    assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"
+    assert len(lines) == 1 + 7 * 2
+    assert (tmp_path / "lumped.png").exists()
+    assert "total index of" in capsys.readouterr().out
+
+
+def test_useless_designs_are_told() -> None:
+    with pytest.raises(thud.InputError, match="kind = 'grid' is not allowed; allowed: saltelli"):
+        thud.sensitivity({**LUMPED, "design": {"kind": "grid"}})
+    with pytest.raises(thud.InputError, match="such as 64 or 128"):
+        thud.sensitivity({**LUMPED, "design": {"size": 100}})
+
+
+@pytest.mark.parametrize("kind", ["sweep", "sensitivity", "design", "uncertainty"])
+def test_inputs_of_the_repository_are_studies(kind: str) -> None:
+    study = thud.read_study(REPOSITORY / f"inputs/studies/{kind}.toml", kind)
+    assert 0 < sets.count(study) < 1000
+    if kind == "sensitivity":
+        assert sets.count(study) == study.size * (len(study.parameters) + 2)

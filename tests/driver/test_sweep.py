@@ -1,0 +1,515 @@
+"""Sweeps: designs, units, datasets, stores that survive, and bad input."""
+
+from __future__ import annotations
+
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import REPOSITORY
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.stats import qmc
+
+import thud
+from thud import cli
+from thud.studies import evaluation, sets
+from thud.studies.keys import known_keys
+from thud.studies.units import MULTIPLES, scaled
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
+# Several blocks of the modal ball, about one second.
+LONG = """
+name = "long"
+fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 48, rings = 20 }
+design = { kind = "random", size = 400, seed = 4 }
+parameters = { height = { low = 0.9, high = 1.1 } }
+"""
+
+
+def values(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset without the date of its making."""
+    return dataset.drop_attrs(deep=False).load()
+
+
+def test_grid_holds_what_single_drops_give() -> None:
+    found = thud.sweep(
+        {
+            "parameters": {
+                "wall_thickness": {"values": [30, 35], "unit": "mm"},
+                "momentum_flux": {"values": ["none", "retarding"]},
+                "youngs_modulus": {"low": 1.5, "high": 1.7, "count": 3, "unit": "MPa"},
+            }
+        }
+    )
+    assert found["contact_time"].dims == ("wall_thickness", "momentum_flux", "youngs_modulus")
+    assert (found["status"] == 0).all()
+    for thickness in (0.030, 0.035):
+        for flux in ("none", "retarding"):
+            for modulus in (1.5e6, 1.6e6, 1.7e6):
+                ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
+                impact = thud.solve(ball, momentum_flux=flux)
+                cell = found.sel(
+                    wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
+                )
+                for name in evaluation.SCALARS:
+                    assert float(cell[name]) == getattr(impact, name)
+                for force in ("elastic", "floor"):
+                    np.testing.assert_array_equal(
+                        cell[f"{force}_level"], impact.levels(force=force)
+                    )
+                verdict = impact.conformity()
+                assert bool(cell["conforms"]) == verdict.conforms
+                margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
+                assert float(cell["margin"]) == min(margins)
+
+
+def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
+    path = tmp_path / "two.toml"
+    path.write_text('[parameters]\nheight = { values = [50, 100], unit = "cm" } # two\n')
+    thud.sweep(path, tmp_path)
+    with xr.open_dataset(tmp_path / "two.nc", engine="h5netcdf") as found:
+        assert found["height"].attrs["units"] == "m"
+        assert found["height"].values.tolist() == [0.5, 1.0]
+        for variable in (*found.data_vars.values(), *found.coords.values()):
+            assert variable.attrs["units"]
+            assert variable.attrs["long_name"]
+        assert found.attrs["study"] == path.read_text()
+        assert found.attrs["thud_version"] == thud.__version__
+        assert found.attrs["compiler"].startswith("GCC version")
+        assert "/" not in found.attrs["compiler"]
+        assert "youngs_modulus = 1600000.0" in found.attrs["base_case"]
+
+
+def test_every_unit_of_a_key_has_multiples() -> None:
+    for model in thud.models.MODELS:
+        for key in known_keys(model).values():
+            assert MULTIPLES[key.unit][key.unit or "1"] == 0, key
+            assert key.meaning
+            assert (key.kind == "choice") == bool(key.choices)
+
+
+def test_multiples_are_exact() -> None:
+    assert [scaled(i, -3) for i in range(1000)] == [float(f"{i}e-3") for i in range(1000)]
+    assert scaled(1.6, 6) == 1.6e6
+
+
+@pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
+def test_drawn_designs_fill_their_range(design: str) -> None:
+    whole = sets.unit_sets(design, 3, 256, 5, 0, 256)
+    parts = [sets.unit_sets(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))]
+    np.testing.assert_array_equal(np.concatenate(parts), whole)
+    assert not np.array_equal(sets.unit_sets(design, 3, 256, 6, 0, 256), whole)
+    if design == "random":
+        # Six standard errors of the mean of a uniform distribution.
+        assert abs(whole.mean() - 0.5) < 6 / np.sqrt(12 * whole.size)
+    else:
+        # One point in each of n strata, for every parameter.
+        strata = np.sort((whole * 256).astype(int), axis=0)
+        np.testing.assert_array_equal(strata, np.arange(256)[:, None].repeat(3, axis=1))
+    if design == "sobol":
+        assert qmc.discrepancy(whole) < 0.2 * qmc.discrepancy(
+            np.random.default_rng(1).random((256, 3))
+        )
+
+
+def test_spreads_have_their_quantiles() -> None:
+    study = thud.read_study(
+        {
+            "design": {"kind": "latin_hypercube", "size": 4000},
+            "fixed": {"model": "modal_ball"},
+            "parameters": {
+                "mass": {"std": 100, "unit": "g"},
+                "height": {"low": 0.01, "high": 100, "scale": "log"},
+                "rings": {"low": 10, "high": 12},
+                "damping_law": {"values": ["constant", "rising"]},
+            },
+        }
+    )
+    found = sets.parameter_columns(study, 0, 4000)
+    assert np.quantile(found["mass"], [0.0228, 0.5, 0.9772]) == pytest.approx(
+        [2.3, 2.5, 2.7], abs=2e-3
+    )
+    assert np.median(found["height"]) == pytest.approx(1.0, rel=0.01)
+    assert np.unique(found["rings"], return_counts=True)[1] == pytest.approx(4000 / 3, rel=0.01)
+    assert (found["damping_law"] == "rising").mean() == pytest.approx(0.5, abs=1e-3)
+
+
+def test_list_pairs_values_and_entries_of_lists() -> None:
+    found = thud.sweep(
+        {
+            "fixed": {
+                "model": "measured_modes",
+                "frequency": [24, 89],
+                "damping_ratio": [0.05, 0.05],
+                "effective_mass": [2.4, 0.1],
+            },
+            "design": {"kind": "list"},
+            "parameters": {
+                "frequency(2)": {"values": [80, 0.09], "unit": "Hz"},
+                "damping_ratio(1)": {"values": [4, 6], "unit": "%"},
+            },
+        }
+    )
+    assert found["contact_time"].dims == ("set",)
+    options = {"damping_ratio": [0.04, 0.05], "effective_mass": [2.4, 0.1]}
+    impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **options)
+    assert float(found["peak_force"][0]) == impact.peak_force
+    assert found["frequency_2"].values.tolist() == [80.0, 0.09]
+
+
+def test_key_named_as_a_result_keeps_both() -> None:
+    found = thud.sweep(
+        {
+            "fixed": {"model": "hunt_crossley", "restitution": 0.8},
+            "parameters": {"contact_time": {"values": [18, 22], "unit": "ms"}},
+        }
+    )
+    np.testing.assert_allclose(found["contact_time"], found["hunt_crossley_contact_time"])
+
+
+def test_density_and_temperature_act_on_mass_and_modulus() -> None:
+    density = 2.5 / (4 / 3 * np.pi * (0.089**3 - 0.057**3))
+    study: dict[str, Any] = {
+        "fixed": {"density": density},
+        "temperature": {"reference": 20, "coefficient": -0.01},
+        "parameters": {"temperature": {"values": [20, 30]}, "outer_radius": {"values": [0.089]}},
+    }
+    found = thud.sweep(study).isel(outer_radius=0)
+    for place, modulus in enumerate((1.6e6, 1.44e6)):
+        impact = thud.solve(thud.Ball(youngs_modulus=modulus))
+        assert float(found["contact_time"][place]) == pytest.approx(impact.contact_time, rel=1e-12)
+
+
+def test_failing_sets_say_why_and_disturb_no_other() -> None:
+    found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}})
+    assert found["status"].values.tolist() == [0, 1, 2]
+    assert found["reason"].values[0] == ""
+    assert "&drop: height = -1.0" in str(found["reason"].values[1])
+    assert "closes the shell" in str(found["reason"].values[2])
+    assert found["peak_force"].values[0] == thud.solve().peak_force
+    assert np.isnan(found["elastic_level"].values[1:]).all()
+
+
+def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = values(thud.sweep(HEIGHTS))
+    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path)
+    assert (tmp_path / "a.zarr").is_dir()
+    assert values(found).identical(expected)
+    # Whatever is larger than a byte is Zarr now, and written one variable at a time.
+    monkeypatch.setattr("thud.studies.store.LARGE", 1)
+    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
+    assert values(found).identical(expected)
+
+
+def test_ensemble_is_used_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    study = {"parameters": {"height": {"values": [0.5, 1.0, -1.0]}, "mass": {"values": [2.4, 2.5]}}}
+    expected = thud.sweep(study)
+    asked = []
+
+    def solve_many(parameters: dict[str, Any], **options: Any) -> SimpleNamespace:  # noqa: ANN401
+        asked.append(options)
+        size = len(parameters["height"])
+        case = thud.Case()
+        columns = {k: np.broadcast_to(v, size) for k, v in parameters.items()}
+        found = evaluation._one_by_one(case, columns)  # noqa: SLF001 - stands in for the library
+        found |= {f"{force}_levels": found[f"{force}_level"] for force in ("elastic", "floor")}
+        return SimpleNamespace(**found)
+
+    monkeypatch.setattr(thud, "solve_many", solve_many, raising=False)
+    assert values(thud.sweep(study)).identical(values(expected))
+    sampling = {"sample_rate": 44100.0, "duration": 0.05, "substeps": 1}
+    assert asked == [{"threads": 1, "bands": "octave", **sampling}]
+    thud.sweep({**study, "fixed": {"force": "floor"}})
+    thud.sweep({**study, "fixed": {"model": "modal_ball"}})
+    assert len(asked) == 1
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """Return the results of the long study, computed at a stretch."""
+    path = tmp_path_factory.mktemp("whole") / "long.toml"
+    path.write_text(LONG)
+    return thud.sweep(path)
+
+
+def start(study: str, folder: Path) -> subprocess.Popen[str]:
+    """Start a study in a process of its own, and return when it has finished some of its sets."""
+    (folder / "long.toml").write_text(study)
+    command = [sys.executable, "-m", "thud.cli", "sweep", "long.toml", "-q", "-o", "."]
+    command += ["--workers", "1"]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 30
+    while not list(folder.glob("long.partial/block_*.nc")):
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return process
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
+def test_ended_study_goes_on_where_it_stopped(
+    end: signal.Signals, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process = start(LONG, tmp_path)
+    process.send_signal(end)
+    _, errors = process.communicate()
+    if end == signal.SIGINT:
+        assert process.returncode == 130
+        assert errors == "thud-driver: interrupted; what was finished is kept\n"
+    else:
+        assert process.returncode == -signal.SIGKILL
+    assert not (tmp_path / "long.nc").exists()
+    finished = thud.read_sweep(tmp_path / "long.partial")
+    assert 0 < finished.sizes["set"] < 400
+    known = np.isin(whole["height"], finished["height"])
+    assert values(finished).identical(values(whole.isel(set=known)))
+
+    computed = []
+    evaluate = evaluation.evaluate
+
+    def count(block: evaluation.Block) -> dict[str, Any]:
+        computed.append(len(block.columns["height"]))
+        return evaluate(block)
+
+    monkeypatch.setattr("thud.studies.backends.evaluate", count)
+    resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
+    assert sum(computed) == 400 - finished.sizes["set"]
+    assert values(resumed).identical(values(whole))
+    assert not (tmp_path / "long.partial").exists()
+    again = thud.sweep(tmp_path / "long.toml", tmp_path)
+    assert again.identical(resumed)
+    assert sum(computed) == 400 - finished.sizes["set"]
+
+
+def test_full_disk_is_told_and_loses_nothing(
+    whole: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "long.toml").write_text(LONG)
+    arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    size = evaluation.block_size(thud.read_study(tmp_path / "long.toml").base)
+    blocks = -(-whole.sizes["set"] // size)
+    assert blocks > 1
+    block, end = (
+        len(bytes(part.to_netcdf(engine="h5netcdf")))
+        for part in (whole.isel(set=slice(0, size)), whole)
+    )
+    # The disk is full for the first block already, then for the end, which is larger.
+    for limit, partial in ((block // 2, 0), ((block + end) // 2, blocks)):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+        try:
+            assert cli.main(arguments) == 1
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        errors = capsys.readouterr().err
+        assert "File too large; allowed: a place that you may write to" in errors
+        assert errors.count("\n") == 1
+        assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
+        assert not list(tmp_path.rglob(".*part"))
+    assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
+
+
+def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
+    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
+    before = (tmp_path / "a.nc").read_bytes()
+    other = {"name": "a", "parameters": {"height": {"values": [1]}}}
+    with pytest.raises(thud.InputError, match=r"a\.nc belongs to another study.*allowed: another"):
+        thud.sweep(other, tmp_path)
+    (tmp_path / "a.nc").rename(tmp_path / "b.nc")
+    with pytest.raises(thud.InputError, match=r"b\.nc belongs to another study"):
+        thud.sweep({**other, "name": "b"}, tmp_path)
+    assert (tmp_path / "b.nc").read_bytes() == before
+    (tmp_path / "c.nc").write_text("no dataset")
+    with pytest.raises(thud.InputError, match=r"c\.nc cannot be read; allowed: "):
+        thud.sweep({**other, "name": "c"}, tmp_path)
+    (tmp_path / "d.partial").mkdir()
+    (tmp_path / "d.partial/study").write_text("something else")
+    (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
+    with pytest.raises(thud.InputError, match=r"d\.partial belongs to another study"):
+        thud.sweep({**other, "name": "d"}, tmp_path)
+    assert len(list((tmp_path / "d.partial").iterdir())) == 2
+    (tmp_path / "e.partial").mkdir()
+    (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
+    with pytest.raises(thud.InputError, match="holds no finished sets"):
+        thud.read_sweep(tmp_path / "e.partial")
+    assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
+
+
+def test_many_sets_need_a_word(tmp_path: Path) -> None:
+    many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
+    many["parameters"] = {"height": {"low": 0.5, "high": 1}}
+    with pytest.raises(
+        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about 89 MB .*yes"
+    ):
+        thud.sweep(many, tmp_path)
+    spread = {"low": 1, "high": 2, "count": 10**6}
+    many = {"name": "a", "parameters": dict.fromkeys(("height", "mass", "gravity"), spread)}
+    with pytest.raises(thud.InputError, match="are free; allowed: fewer sets"):
+        thud.sweep(many, tmp_path, yes=True)
+    assert not (tmp_path / "a.partial").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", r"\[parameters\] is empty; allowed: one"),
+        ("[parameters]\n[parameters]", "allowed: TOML"),
+        ("sets = 3", "'sets' is not known; allowed: name, case"),
+        ("parameters = 3", r"parameters = 3 .*allowed: a table"),
+        ("name = 'a/b'\nparameters.height.values = [1]", "name = 'a/b'.*without folders"),
+        ("format = 'csv'\nparameters.height.values = [1]", "allowed: auto, netcdf, zarr"),
+        ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
+        ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere; allowed: outer"),
+        ("parameters.loss_factor.values = [1]", "allowed: outer_radius, wall_thickness, mass"),
+        ("parameters.height = 1", r"height = 1 has no values; allowed: a table"),
+        ("parameters.height.values = []", r"values = \[\] is empty"),
+        ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
+        ("parameters.height.values = [inf]", "allowed: finite numbers"),
+        ("parameters.height = {values=[1], unit='s'}", "unit 's' does not fit; allowed: m, cm, mm"),
+        ("parameters.height = {values=[1], unit=['m']}", "does not fit; allowed: m, cm"),
+        ("parameters.height = {values=[1], count=2}", "count is not known beside values; allowed:"),
+        ("parameters.height = {low=1, high=2}", "no values for a grid design; allowed: values"),
+        ("parameters.height = {low=1}", "no high end; allowed: high"),
+        ("parameters.height = {low=2, high=1, count=3}", "low = 2 is not allowed; allowed: low <"),
+        ("parameters.height = {low=0, high=1, count=3, scale='log'}", "allowed: low < high, 0"),
+        ("parameters.height = {low=1, high=2, count=1}", "allowed: 2 <= count, whole"),
+        ("parameters.height = {std=1}", "no values for a grid design"),
+        ("parameters.substeps.values = [1.5]", "values = 1.5 is not allowed; allowed: whole"),
+        ("parameters.substeps = {std=1}", "allowed: values"),
+        ("parameters.momentum_flux.values = ['some']", "allowed: 'momentum_balance', 'retarding'"),
+        ("parameters.momentum_flux = {low=1, high=2}", "is not a number; allowed: values"),
+        ("parameters.bands.values = ['third']", "'bands' is not a key"),
+        ("fixed.hight = 1\nparameters.mass.values = [1]", "'hight' is not a key"),
+        ("fixed.model = 'cube'\nparameters.mass.values = [1]", "allowed: 'hollow_sphere', 'modal"),
+        ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),
+        ("fixed = {mass=1, density=1000}\nparameters.height.values = [1]", "mass and density"),
+        ("fixed.density = 1000\nparameters.mass.values = [1]", "mass and density are both given"),
+        ("fixed.temperature = 1\nparameters.mass.values = [1]", r"temperature in \[parameters\]"),
+        ("parameters.temperature.values = [1]", "allowed: reference, degC, and coefficient"),
+        ("temperature.reference = 1\nparameters.temperature.values = [1]", "coefficient = None"),
+        ("design.kind = 'cube'\nparameters.mass.values = [1]", "allowed: grid, list, random"),
+        ("design.size = 3\nparameters.mass.values = [1]", "'size' is not known; allowed: kind"),
+        ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*allowed: 1 <= size"),
+        ("design = {kind='sobol', size=100}\nparameters.mass.values = [1]", "as 64 or 128"),
+        (
+            "design = {kind='random', size=9}\nparameters.mass = {low=1, high=2, count=3}",
+            "count has no use in a random design; allowed: low, high and scale",
+        ),
+        (
+            "design.kind = 'list'\nparameters.mass.values = [1]\nparameters.height.values = [1, 2]",
+            "differ in their number of values; allowed: the same",
+        ),
+        (
+            "fixed.model = 'measured_modes'\nparameters.frequency.values = [1]",
+            r"frequency is a list; allowed: one entry of it, such as 'frequency\(1\)'",
+        ),
+        (
+            "fixed = {model='measured_modes', frequency=[1], 'frequency(2)'=3}\nparameters.mass={}",
+            r"frequency\(2\) does not exist; allowed: an entry of the 1 that",
+        ),
+    ],
+)  # fmt: skip
+def test_bad_studies_are_told(
+    text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 1
+    errors = capsys.readouterr().err
+    assert errors.startswith(f"thud-driver: {path}: ")
+    assert "allowed: " in errors
+    with pytest.raises(thud.InputError, match=words):
+        thud.read_study(path)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_study_that_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["sweep", str(tmp_path / "no.toml")]) == 1
+    assert "no.toml: No such file or directory" in capsys.readouterr().err
+    with pytest.raises(thud.InputError, match="study = 3 is not allowed"):
+        thud.sweep(3)  # type: ignore[arg-type]
+
+
+SWEEP = (REPOSITORY / "inputs/studies/sweep.toml").read_text()
+
+
+@given(
+    start=st.integers(0, len(SWEEP)),
+    length=st.integers(0, 30),
+    insertion=st.text(st.characters(codec="utf-8"), max_size=12),
+)
+@settings(
+    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+def test_any_damage_to_a_study(
+    start: int, length: int, insertion: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    folder = tmp_path_factory.getbasetemp() / "damage/studies"
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copy(REPOSITORY / "inputs/rubber_ball_100cm.nml", folder.parent)
+    path = folder / "sweep.toml"
+    path.write_bytes((SWEEP[:start] + insertion + SWEEP[start + length :]).encode())
+    try:
+        study = thud.read_study(path)
+    except thud.InputError as error:
+        assert "\n" not in str(error)
+        assert "allowed: " in str(error)
+    else:
+        assert sets.count(study) > 0
+
+
+def test_command_writes_figure_and_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
+    folder = tmp_path / "outputs/sweep"
+    assert sorted(path.name for path in folder.iterdir()) == ["sweep.nc", "sweep.png", "sweep.svg"]
+    printed = capsys.readouterr()
+    assert "80 sets of hollow_sphere, about 0.085 MB on disk" in printed.err
+    assert "peak_force, N" in printed.out
+    assert "Results: outputs/sweep" in printed.out
+
+
+def test_study_without_results_is_a_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "high.toml"
+    path.write_text("parameters.height.values = [1000, 2000]")
+    assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 2
+    assert "2 of 2 sets have no results, such as: " in capsys.readouterr().err
+
+
+def test_study_of_another_kind_is_told() -> None:
+    study = thud.read_study(HEIGHTS)
+    for function in (thud.sensitivity, thud.design_map, thud.uncertainty):
+        with pytest.raises(thud.InputError, match="python is a sweep study; allowed: a "):
+            function(study)
+
+
+def test_missing_packages_are_told(tmp_path: Path) -> None:
+    code = "import sys; sys.modules['xarray'] = None; from thud import cli; sys.exit(cli.main())"
+    command = [sys.executable, "-c", code, "sweep", "study.toml"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    sentence = "xarray is not installed; allowed: studies with pip install 'thud[studies]'"
+    assert done.stderr == f"thud-driver: {sentence}\n"
+
+
+def test_import_stays_light() -> None:
+    code = "import sys, thud; print({'xarray', 'scipy', 'SALib', 'matplotlib'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "set()\n"

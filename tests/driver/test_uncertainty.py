@@ -1,0 +1,121 @@
+"""Monte Carlo against linear propagation, exact probabilities and SciPy's interval."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+from scipy.stats import binomtest
+
+import thud
+from thud import cli
+from thud.studies import figures
+from thud.studies.tolerances import wilson_interval
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+SIZE = 600
+SMALL: dict[str, Any] = {
+    "design": {"size": SIZE, "seed": 11},
+    "temperature": {"reference": 20, "coefficient": -0.01},
+    "parameters": {
+        "wall_thickness": {"std": 0.05, "unit": "mm"},
+        "mass": {"low": 2.49, "high": 2.51},
+        "temperature": {"mean": 20, "std": 0.2},
+    },
+}
+
+
+def test_small_tolerances_propagate_linearly() -> None:
+    result = thud.uncertainty(SMALL)
+    standard = thud.Ball()
+    # By parameter: its standard deviation, and that of the temperature for the modulus.
+    spread = {
+        "wall_thickness": 5e-5,
+        "mass": 0.02 / np.sqrt(12),
+        "youngs_modulus": 0.2 * 0.01 * standard.youngs_modulus,
+    }
+    variance = np.zeros(5)
+    for name, deviation in spread.items():
+        middle = getattr(standard, name)
+        above, below = (
+            thud.solve(thud.Ball(**{name: middle + side * deviation})).levels() for side in (1, -1)
+        )
+        variance += ((above - below) / 2) ** 2
+    # The deviation of n samples errs by 1 / sqrt(2 n); four of these.
+    chance = 4 / np.sqrt(2 * SIZE)
+    np.testing.assert_allclose(result.levels.std(axis=0, ddof=1), np.sqrt(variance), rtol=chance)
+    error = np.sqrt(variance / SIZE)
+    assert np.all(np.abs(result.levels.mean(axis=0) - thud.solve().levels()) < 4 * error)
+
+
+def test_probability_of_a_criterion_that_is_known() -> None:
+    # This ball has 0.2 dB to spare; the height conforms from 0.99 to 1.01 m.
+    result = thud.uncertainty(
+        {
+            "case": str(REPOSITORY / "inputs/rubber_ball_modal_rising.nml"),
+            "fixed": {"loss_factor": 0.2, "wall_thickness": 0.0306, "youngs_modulus": 1.8e6},
+            "design": {"size": 100, "seed": 5},
+            "parameters": {"height": {"low": 98, "high": 102, "unit": "cm"}},
+        }
+    )
+    height = result.dataset["height"].values
+    assert result.conforming == np.sum((height >= 0.99) & (height <= 1.01))
+    assert result.probability == result.conforming / 100
+    assert result.standard_error == pytest.approx(
+        np.sqrt(result.probability * (1 - result.probability) / 100)
+    )
+    low, high = result.interval
+    assert low < 0.5 < high
+
+
+@pytest.mark.parametrize(("hits", "trials"), [(0, 10), (10, 10), (3, 7), (368, 500)])
+def test_interval_is_wilson_s(hits: int, trials: int) -> None:
+    expected = binomtest(hits, trials).proportion_ci(0.95, "wilson")
+    assert wilson_interval(hits, trials) == pytest.approx((expected.low, expected.high), abs=1e-12)
+
+
+def test_sets_without_results_are_counted_apart() -> None:
+    study = {"design": {"size": 50}, "parameters": {"height": {"low": -1, "high": 1}}}
+    result = thud.uncertainty(study)
+    assert result.failed == np.sum(result.dataset["height"].values <= 0) > 0
+    assert result.computed + result.failed == 50
+    assert result.levels.shape == (result.computed, 5)
+    study["parameters"] = {"height": {"low": -2, "high": -1}}
+    with pytest.raises(
+        thud.InputError, match=r"only 0 of 50 sets .*height.*; allowed: two or more"
+    ):
+        thud.uncertainty(study)
+
+
+def test_figure_shows_distribution_over_tolerance() -> None:
+    result = thud.uncertainty({**SMALL, "design": {"size": 40}})
+    (axes,) = figures.draw_uncertainty(result).axes
+    limits = thud.solve().conformity().criteria[:5]
+    boxes = [body.get_datalim(axes.transData).intervaly for body in axes.collections[:5]]
+    half = [(c.upper - c.lower) / 2 for c in limits]
+    np.testing.assert_allclose(boxes, [(-h, h) for h in half])
+    medians = axes.lines[0].get_ydata()
+    nominal = [(c.upper + c.lower) / 2 for c in limits]
+    np.testing.assert_allclose(medians, np.median(result.levels, axis=0) - nominal)
+    low, high = result.interval
+    title = f"Conforms: {100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
+    assert axes.get_legend().get_title().get_text() == title
+
+
+def test_command_writes_figure_and_table(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text("design.size = 30\nparameters.mass = {std=0.05}")
+    assert cli.main(["uncertainty", str(path), "-o", str(tmp_path)]) == 0
+    assert (tmp_path / "small.svg").exists()
+    assert "all criteria   0.0 %" in capsys.readouterr().out
+
+
+def test_only_independent_sets_are_taken() -> None:
+    with pytest.raises(thud.InputError, match="kind = 'sobol' is not allowed; allowed: random"):
+        thud.uncertainty({**SMALL, "design": {"kind": "sobol", "size": 8}})
