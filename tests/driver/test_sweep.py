@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import doctest
 import resource
 import shutil
 import signal
@@ -21,12 +22,13 @@ from scipy.stats import qmc
 
 import thud
 from thud import cli
-from thud.studies import evaluation, sets
+from thud.studies import evaluation, run, sets, units
 from thud.studies.keys import known_keys
 from thud.studies.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
     from pathlib import Path
+    from types import ModuleType
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 # Several blocks of the modal ball, about one second.
@@ -90,6 +92,13 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
         assert found.attrs["compiler"].startswith("GCC version")
         assert "/" not in found.attrs["compiler"]
         assert "youngs_modulus = 1600000.0" in found.attrs["base_case"]
+
+
+@pytest.mark.parametrize("module", [run, units])
+def test_examples_are_true(module: ModuleType) -> None:
+    found = doctest.testmod(module)
+    assert found.attempted > 0
+    assert found.failed == 0
 
 
 def test_every_unit_of_a_key_has_multiples() -> None:

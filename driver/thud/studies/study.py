@@ -15,8 +15,9 @@ from thud.case import Case, read_case
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.models import FiniteElement, new_model
+from thud.studies.designs import read_design, require_words
 from thud.studies.keys import DENSITY, TEMPERATURE, Value, find_key, put
-from thud.studies.parameters import Normal, Parameter, Uniform, checked, new_parameter
+from thud.studies.parameters import Parameter, checked, new_parameter
 from thud.studies.units import power_of
 
 if TYPE_CHECKING:
@@ -25,17 +26,8 @@ if TYPE_CHECKING:
 # What `read_study` reads.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
 
-# By study: the designs that it takes, the default first.
-DESIGNS = {
-    "sweep": ("grid", "list", "random", "latin_hypercube", "sobol"),
-    "sensitivity": ("saltelli",),
-    "design": ("grid",),
-    "uncertainty": ("random",),
-}
-DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 FORMATS = ("auto", "netcdf", "zarr")
 _WORDS = ("name", "case", "format", "fixed", "design", "temperature", "parameters")
-_LARGEST_SEED = 2**32 - 1
 
 
 @dataclass(frozen=True)
@@ -149,7 +141,7 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
 
 def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: str) -> Study:
     """Return the study that a table describes."""
-    _require_words("the study", given, _WORDS)
+    require_words("the study", given, _WORDS)
     for table in ("fixed", "design", "temperature", "parameters"):
         if not isinstance(given.get(table, {}), dict):
             message = f"{table} = {given[table]!r} is not allowed; allowed: a table [{table}]"
@@ -174,18 +166,10 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
     if "mass" in names and (density is not None or DENSITY.name in names):
         message = "mass and density are both given; allowed: one of them"
         raise InputError(message)
-    design, size, seed = _design(given.get("design", {}), kind, parameters)
+    design, size, seed = read_design(given.get("design", {}), kind, parameters)
     return Study(
         name, kind, base, parameters, design, size, seed, density, temperature, written, text
     )
-
-
-def _require_words(place: str, given: Mapping[str, object], known: tuple[str, ...]) -> None:
-    """Complain about words that mean nothing."""
-    for word in given:
-        if word not in known:
-            message = f"{place}: {word!r} is not known; allowed: {', '.join(known)}"
-            raise InputError(message)
 
 
 def _base_case(given: Mapping[str, Any], folder: Path) -> Case:
@@ -218,7 +202,7 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
             message = f"{place} is not allowed; allowed: temperature in [parameters]"
             raise InputError(message)
         given = entry if isinstance(entry, dict) else {"value": entry}
-        _require_words(place, given, ("value", "unit"))
+        require_words(place, given, ("value", "unit"))
         power = power_of(given.get("unit", key.unit or "1"), key.unit, place)
         value = given.get("value")
         if key.kind == "list" and place_in_list is None:
@@ -263,55 +247,6 @@ def _temperature(given: Mapping[str, Any] | None, parameters: tuple[Parameter, .
     if given is None:
         return None
     words = ("reference", "coefficient")
-    _require_words("[temperature]", given, words)
+    require_words("[temperature]", given, words)
     numbers = (checked(f"[temperature] {w}", TEMPERATURE, given.get(w), 0) for w in words)
     return Temperature(*map(float, numbers))
-
-
-def _design(
-    given: Mapping[str, Any], kind: str, parameters: tuple[Parameter, ...]
-) -> tuple[str, int, int]:
-    """Return kind, size and seed of the design."""
-    allowed = DESIGNS[kind]
-    design = given.get("kind", allowed[0])
-    if design not in allowed:
-        message = f"[design] kind = {design!r} is not allowed; allowed: {', '.join(allowed)}"
-        raise InputError(message)
-    words = ("kind", "size", "seed") if design in DRAWN else ("kind",)
-    _require_words(f"[design] of kind {design}", given, words)
-    for parameter in parameters:
-        spread = parameter.spread
-        if design in DRAWN and isinstance(spread, Uniform) and spread.count:
-            message = (
-                f"[parameters] {parameter.name}: count has no use in a {design} design; "
-                f"allowed: low, high and scale"
-            )
-            raise InputError(message)
-        gridless = isinstance(spread, Normal) or (isinstance(spread, Uniform) and not spread.count)
-        if design not in DRAWN and gridless:
-            message = (
-                f"[parameters] {parameter.name} has no values for a {design} design; "
-                f"allowed: values = [...], or low, high and count"
-            )
-            raise InputError(message)
-    if design == "list" and len({len(p.spread.grid()) for p in parameters}) > 1:
-        message = "[parameters] differ in their number of values; allowed: the same for all"
-        raise InputError(message)
-    if design not in DRAWN:
-        return design, 0, 0
-    size, seed = given.get("size", 0), given.get("seed", 0)
-    for word, number, least, most in (("size", size, 1, 2**30), ("seed", seed, 0, _LARGEST_SEED)):
-        if not isinstance(number, int) or isinstance(number, bool) or not least <= number <= most:
-            message = (
-                f"[design] {word} = {number!r} is not allowed; "
-                f"allowed: {least} <= {word} <= {most}, whole"
-            )
-            raise InputError(message)
-    if design in {"sobol", "saltelli"} and size & (size - 1):
-        near = 1 << size.bit_length() - 1
-        message = (
-            f"[design] size = {size} breaks the balance of Sobol's points; "
-            f"allowed: powers of 2, such as {near} or {2 * near}"
-        )
-        raise InputError(message)
-    return design, size, seed

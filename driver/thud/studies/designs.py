@@ -1,0 +1,93 @@
+"""Designs: which sets a study has, as its table ``[design]`` says."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from thud.errors import InputError
+from thud.studies.parameters import Normal, Parameter, Uniform
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+# By study: the designs that it takes, the default first.
+DESIGNS = {
+    "sweep": ("grid", "list", "random", "latin_hypercube", "sobol"),
+    "sensitivity": ("saltelli",),
+    "design": ("grid",),
+    "uncertainty": ("random",),
+}
+DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
+_LARGEST_SEED = 2**32 - 1
+
+
+def require_words(place: str, given: Mapping[str, object], known: tuple[str, ...]) -> None:
+    """Complain about words that mean nothing."""
+    for word in given:
+        if word not in known:
+            message = f"{place}: {word!r} is not known; allowed: {', '.join(known)}"
+            raise InputError(message)
+
+
+def read_design(
+    given: Mapping[str, Any], kind: str, parameters: tuple[Parameter, ...]
+) -> tuple[str, int, int]:
+    """Return kind, size and seed of a design.
+
+    Parameters
+    ----------
+    given
+        The table ``[design]``.
+    kind
+        The kind of study.
+    parameters
+        Its parameters.
+
+    Raises
+    ------
+    InputError
+        Where the design does not suit the study or its parameters.
+    """
+    allowed = DESIGNS[kind]
+    design = given.get("kind", allowed[0])
+    if design not in allowed:
+        message = f"[design] kind = {design!r} is not allowed; allowed: {', '.join(allowed)}"
+        raise InputError(message)
+    words = ("kind", "size", "seed") if design in DRAWN else ("kind",)
+    require_words(f"[design] of kind {design}", given, words)
+    for parameter in parameters:
+        spread = parameter.spread
+        if design in DRAWN and isinstance(spread, Uniform) and spread.count:
+            message = (
+                f"[parameters] {parameter.name}: count has no use in a {design} design; "
+                f"allowed: low, high and scale"
+            )
+            raise InputError(message)
+        gridless = isinstance(spread, Normal) or (isinstance(spread, Uniform) and not spread.count)
+        if design not in DRAWN and gridless:
+            message = (
+                f"[parameters] {parameter.name} has no values for a {design} design; "
+                f"allowed: values = [...], or low, high and count"
+            )
+            raise InputError(message)
+    if design == "list" and len({len(p.spread.grid()) for p in parameters}) > 1:
+        message = "[parameters] differ in their number of values; allowed: the same for all"
+        raise InputError(message)
+    if design not in DRAWN:
+        return design, 0, 0
+    size, seed = given.get("size", 0), given.get("seed", 0)
+    for word, number, least, most in (("size", size, 1, 2**30), ("seed", seed, 0, _LARGEST_SEED)):
+        if not isinstance(number, int) or isinstance(number, bool) or not least <= number <= most:
+            message = (
+                f"[design] {word} = {number!r} is not allowed; "
+                f"allowed: {least} <= {word} <= {most}, whole"
+            )
+            raise InputError(message)
+    if design in {"sobol", "saltelli"} and size & (size - 1):
+        near = 1 << size.bit_length() - 1
+        message = (
+            f"[design] size = {size} breaks the balance of Sobol's points; "
+            f"allowed: powers of 2, such as {near} or {2 * near}"
+        )
+        raise InputError(message)
+    return design, size, seed
