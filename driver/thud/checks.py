@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
+import threading
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from thud.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from types import UnionType
 
 
@@ -28,6 +32,22 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
             shown = f"an object of {type(value).__name__}"
         message = f"{name} = {shown} is not allowed; allowed: an object of {expected}"
         raise InputError(message)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold an interrupt back until something short is done: libraries of files leave noise else."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if held:
+        raise KeyboardInterrupt
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.checks import replace_file
+from thud.checks import replace_file, uninterrupted
 from thud.errors import InputError
 from thud.studies import sets
 from thud.studies.dataset import disk_space, grid_of, new_dataset
@@ -203,7 +203,7 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
     """Open a file or Zarr group."""
-    with _readable(path):
+    with _readable(path), uninterrupted():
         if path.suffix == ".zarr":
             dataset = xr.open_zarr(path, consolidated=False)
         else:
@@ -224,7 +224,8 @@ def _readable(path: Path) -> Iterator[None]:
 
 def _write(dataset: xr.Dataset, path: Path) -> None:
     """Write a NetCDF file, completely or not at all."""
-    replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
+    with uninterrupted():
+        replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
 
 
 @contextmanager
