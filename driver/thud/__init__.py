@@ -23,6 +23,7 @@ from thud.case import (
     read_case,
     write_case,
 )
+from thud.ensemble import Ensemble, solve_many
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
 from thud.impact import Impact, solve, solve_case
@@ -41,6 +42,7 @@ __all__ = [
     "Conformity",
     "Criterion",
     "Drop",
+    "Ensemble",
     "FiniteElement",
     "FitWarning",
     "FreeModes",
@@ -67,6 +69,7 @@ __all__ = [
     "read_results",
     "solve",
     "solve_case",
+    "solve_many",
     "write_case",
 ]
 
