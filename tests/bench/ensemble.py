@@ -218,7 +218,12 @@ def stream(count: int, path: Path, chunk: int = 50_000) -> None:
                 "youngs_modulus": random.uniform(1.4e6, 1.8e6, n),
                 "wall_thickness": random.uniform(0.030, 0.034, n),
             }, threads=1)  # fmt: skip
-            rows = [found.contact_time, found.peak_force, found.restitution, *found.elastic_levels.T]
+            rows = [
+                found.contact_time,
+                found.peak_force,
+                found.restitution,
+                *found.elastic_levels.T,
+            ]
             np.column_stack(rows).tofile(file)
     seconds = time.perf_counter() - start
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -244,7 +249,9 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
 
     bare, whole = run(bands=None), run()
     marching, complete = SETS / bare, SETS / whole
-    report("ensemble, trajectories", marching, "heyoka, batch mode", heyoka_rate(), "required: above 1")
+    report(
+        "ensemble, trajectories", marching, "heyoka, batch mode", heyoka_rate(), "required: above 1"
+    )
     report("ensemble, trajectories", marching, "JAX, RK4, float64", jax_rate(), "")
     report("ensemble, trajectories", marching, "SciPy DOP853", 1 / best(scipy_drop, 11), "")
     report("ensemble, five levels and verdict", complete, "numba RK4, SciPy ZoomFFT levels",

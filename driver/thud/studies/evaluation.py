@@ -142,7 +142,7 @@ def _has_ensemble(base: Case) -> bool:
     # The ensemble judges as these defaults do.
     same = base.limits == Limits() and base.levels.force == Levels.force
     same = same and base.levels.method == Levels.method
-    return hasattr(thud, "solve_many") and isinstance(base.model, HollowSphere) and same
+    return isinstance(base.model, HollowSphere) and same
 
 
 def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
