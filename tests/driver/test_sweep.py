@@ -223,27 +223,59 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values(found).identical(expected)
 
 
+@pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
+def test_ensemble_gives_what_single_drops_give(
+    fixed: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study: dict[str, Any] = {
+        "fixed": fixed,
+        "parameters": {
+            "height": {"values": [0.5, 1.0, -1.0]},
+            "mass": {"values": [2.4, 7.3]},
+            "momentum_flux": {"values": ["none", "retarding"]},
+        },
+    }
+    expected = thud.sweep({**study, "fixed": {**fixed, "model": "hollow_sphere"}})
+    if not hasattr(thud, "solve_many"):
+        monkeypatch.setattr(thud, "solve_many", stand_in, raising=False)
+    else:
+        monkeypatch.setattr(evaluation, "_suits_ensemble", lambda *_: False)
+    found = thud.sweep(study)
+    for name, variable in expected.data_vars.items():
+        if variable.dtype.kind == "f":
+            # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
+            decibel = 1e-6 if variable.attrs["units"] == "dB" else 0
+            np.testing.assert_allclose(found[name], variable, rtol=1e-9, atol=decibel)
+        else:
+            np.testing.assert_array_equal(found[name], variable)
+
+
+def stand_in(parameters: dict[str, Any], source: str, **_: object) -> SimpleNamespace:
+    """Return what an ensemble would, by single drops."""
+    size = len(parameters["height"])
+    columns = {name: np.broadcast_to(value, size) for name, value in parameters.items()}
+    found: dict[str, Any] = {}
+    for force in ("floor", "elastic"):
+        case = thud.Case(levels=thud.Levels(force=force), limits=thud.Limits(source))
+        found["floor_conforms"] = found.get("conforms")
+        found |= evaluation._one_by_one(case, columns)  # noqa: SLF001 - what it stands in for
+        found[f"{force}_levels"] = found[f"{force}_level"]
+    return SimpleNamespace(**found)
+
+
 def test_ensemble_is_used_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    study = {"parameters": {"height": {"values": [0.5, 1.0, -1.0]}, "mass": {"values": [2.4, 2.5]}}}
-    expected = thud.sweep(study)
     asked = []
 
-    def solve_many(parameters: dict[str, Any], **options: Any) -> SimpleNamespace:  # noqa: ANN401
-        asked.append(options)
-        size = len(parameters["height"])
-        case = thud.Case()
-        columns = {k: np.broadcast_to(v, size) for k, v in parameters.items()}
-        found = evaluation._one_by_one(case, columns)  # noqa: SLF001 - stands in for the library
-        found |= {f"{force}_levels": found[f"{force}_level"] for force in ("elastic", "floor")}
-        return SimpleNamespace(**found)
+    def count(parameters: dict[str, Any], **options: Any) -> SimpleNamespace:  # noqa: ANN401
+        asked.append(options["threads"])
+        return stand_in(parameters, **options)
 
-    monkeypatch.setattr(thud, "solve_many", solve_many, raising=False)
-    assert values(thud.sweep(study)).identical(values(expected))
-    sampling = {"sample_rate": 44100.0, "duration": 0.05, "substeps": 1}
-    assert asked == [{"threads": 1, "bands": "octave", **sampling}]
-    thud.sweep({**study, "fixed": {"force": "floor"}})
-    thud.sweep({**study, "fixed": {"model": "modal_ball"}})
-    assert len(asked) == 1
+    monkeypatch.setattr(thud, "solve_many", count, raising=False)
+    thud.sweep(HEIGHTS, workers=3)
+    thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
+    thud.sweep({**HEIGHTS, "fixed": {"model": "modal_ball"}})
+    thud.sweep({"parameters": {"sample_rate": {"values": [44100, 48000]}}})
+    assert asked == [3]
 
 
 @pytest.fixture(scope="module")
@@ -289,9 +321,9 @@ def test_ended_study_goes_on_where_it_stopped(
     computed = []
     evaluate = evaluation.evaluate
 
-    def count(block: evaluation.Block) -> dict[str, Any]:
+    def count(block: evaluation.Block, threads: int) -> dict[str, Any]:
         computed.append(len(block.columns["height"]))
-        return evaluate(block)
+        return evaluate(block, threads)
 
     monkeypatch.setattr("thud.studies.backends.evaluate", count)
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
