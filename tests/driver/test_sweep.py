@@ -66,15 +66,15 @@ def test_grid_holds_what_single_drops_give() -> None:
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
                 for name in evaluation.SCALARS:
-                    assert float(cell[name]) == getattr(impact, name)
+                    assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
-                    np.testing.assert_array_equal(
-                        cell[f"{force}_level"], impact.levels(force=force)
+                    np.testing.assert_allclose(
+                        cell[f"{force}_level"], impact.levels(force=force), rtol=0, atol=1e-6
                     )
                 verdict = impact.conformity()
                 assert bool(cell["conforms"]) == verdict.conforms
                 margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
-                assert float(cell["margin"]) == min(margins)
+                assert float(cell["margin"]) == pytest.approx(min(margins), abs=1e-6)
 
 
 def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
@@ -207,7 +207,7 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
     assert found["reason"].values[0] == ""
     assert "&drop: height = -1.0" in str(found["reason"].values[1])
     assert "closes the shell" in str(found["reason"].values[2])
-    assert found["peak_force"].values[0] == thud.solve().peak_force
+    assert found["peak_force"].values[0] == pytest.approx(thud.solve().peak_force, rel=1e-9)
     assert np.isnan(found["elastic_level"].values[1:]).all()
 
 
@@ -393,7 +393,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
     with pytest.raises(
-        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about 89 MB .*yes"
+        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about \d\d MB .*yes"
     ):
         thud.sweep(many, tmp_path)
     spread = {"low": 1, "high": 2, "count": 10**6}
