@@ -16,15 +16,16 @@ import thud
 from thud import cli
 from thud.studies import sets
 from thud.studies.backends import run_blocks
-from thud.studies.evaluation import Block, evaluate
+from thud.studies.evaluation import Block, block_size, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
 
-# Some of these sets fail.
-STUDY = {
+# Some of these sets fail; by this method of the levels they make several blocks.
+STUDY: dict[str, Any] = {
     "name": "some",
+    "fixed": {"method": "fft"},
     "design": {"kind": "latin_hypercube", "size": 400, "seed": 2},
     "parameters": {
         "height": {"low": -0.1, "high": 60},
@@ -46,6 +47,7 @@ def cluster() -> Iterator[LocalCluster]:
 def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     one = thud.sweep(STUDY, workers=1)
     assert set(one["status"].values) == {0, 1, 2}
+    assert one.sizes["set"] > block_size(thud.read_study(STUDY).base)
     for how in (
         {"workers": 3},
         {"backend": "processes", "workers": 2},
@@ -53,6 +55,13 @@ def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     ):
         other = thud.sweep(STUDY, **how)  # type: ignore[arg-type]
         assert other.drop_attrs(deep=False).identical(one.drop_attrs(deep=False)), how
+
+
+def test_threads_of_a_block_do_not_matter() -> None:
+    block = Block(0, thud.Case(), {"height": np.linspace(0, 60, 200)}, thud.__version__)
+    one, more = evaluate(block), evaluate(block, 3)
+    for name, values in one.items():
+        np.testing.assert_array_equal(more[name], values)
 
 
 def modal_blocks() -> list[Block]:

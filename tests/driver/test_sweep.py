@@ -64,12 +64,11 @@ def test_grid_holds_what_single_drops_give() -> None:
                 cell = found.sel(
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
-                # As near as the ensemble is to the single solver.
                 for name in evaluation.SCALARS:
-                    assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-10)
+                    assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
                     np.testing.assert_allclose(
-                        cell[f"{force}_level"], impact.levels(force=force), atol=1e-6
+                        cell[f"{force}_level"], impact.levels(force=force), rtol=0, atol=1e-6
                     )
                 verdict = impact.conformity()
                 assert bool(cell["conforms"]) == verdict.conforms
@@ -207,8 +206,7 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
     assert found["reason"].values[0] == ""
     assert "&drop: height = -1.0" in str(found["reason"].values[1])
     assert "closes the shell" in str(found["reason"].values[2])
-    peak = thud.solve().peak_force
-    assert found["peak_force"].values[0] == pytest.approx(peak, rel=1e-10)
+    assert found["peak_force"].values[0] == pytest.approx(thud.solve().peak_force, rel=1e-9)
     assert np.isnan(found["elastic_level"].values[1:]).all()
 
 
@@ -224,29 +222,45 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values(found).identical(expected)
 
 
+@pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
+def test_ensemble_gives_what_single_drops_give(
+    fixed: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study: dict[str, Any] = {
+        "fixed": fixed,
+        "parameters": {
+            "height": {"values": [0.5, 1.0, -1.0]},
+            "mass": {"values": [2.4, 7.3]},
+            "momentum_flux": {"values": ["none", "retarding"]},
+        },
+    }
+    expected = thud.sweep({**study, "fixed": {**fixed, "model": "hollow_sphere"}})
+    monkeypatch.setattr(evaluation, "_suits_ensemble", lambda *_: False)
+    found = thud.sweep(study)
+    for name, variable in expected.data_vars.items():
+        if variable.dtype.kind == "f":
+            # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
+            decibel = 1e-6 if variable.attrs["units"] == "dB" else 0
+            np.testing.assert_allclose(found[name], variable, rtol=1e-9, atol=decibel)
+        else:
+            np.testing.assert_array_equal(found[name], variable)
+
+
 def test_ensemble_is_used_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:
-    study = {"parameters": {"height": {"values": [0.5, 1.0, -1.0]}, "mass": {"values": [2.4, 2.5]}}}
-    together = thud.sweep(study)
     asked = []
+
     solve_many = thud.solve_many
 
-    def count(*arguments: Any, **options: Any) -> thud.Ensemble:  # noqa: ANN401
-        asked.append(options)
-        return solve_many(*arguments, **options)
+    def count(parameters: dict[str, Any], **options: Any) -> thud.Ensemble:  # noqa: ANN401
+        asked.append(options["threads"])
+        return solve_many(parameters, **options)
 
     monkeypatch.setattr(thud, "solve_many", count)
-    assert values(thud.sweep(study)).identical(values(together))
-    assert len(asked) == 1
-    thud.sweep({**study, "fixed": {"force": "floor"}})
-    thud.sweep({**study, "fixed": {"model": "modal_ball"}})
-    assert len(asked) == 1
-    monkeypatch.setattr(evaluation, "_suits_ensemble", lambda *_: False)
-    alone = thud.sweep(study)
-    assert len(asked) == 1
-    assert (alone["reason"] == together["reason"]).all()
-    for name in (*evaluation.SCALARS, "elastic_level", "floor_level", "margin"):
-        tolerance = {"atol": 1e-6} if "level" in name or name == "margin" else {"rtol": 1e-10}
-        np.testing.assert_allclose(together[name], alone[name], **tolerance)
+    thud.sweep(HEIGHTS, workers=3)
+    thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
+    thud.sweep({**HEIGHTS, "fixed": {"model": "modal_ball"}})
+    thud.sweep({"parameters": {"sample_rate": {"values": [44100, 48000]}}})
+    assert asked == [3]
 
 
 @pytest.fixture(scope="module")
@@ -292,9 +306,9 @@ def test_ended_study_goes_on_where_it_stopped(
     computed = []
     evaluate = evaluation.evaluate
 
-    def count(block: evaluation.Block) -> dict[str, Any]:
+    def count(block: evaluation.Block, threads: int) -> dict[str, Any]:
         computed.append(len(block.columns["height"]))
-        return evaluate(block)
+        return evaluate(block, threads)
 
     monkeypatch.setattr("thud.studies.backends.evaluate", count)
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
@@ -364,7 +378,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
     with pytest.raises(
-        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about [0-9]+ MB .*yes"
+        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about \d\d MB .*yes"
     ):
         thud.sweep(many, tmp_path)
     spread = {"low": 1, "high": 2, "count": 10**6}

@@ -61,13 +61,16 @@ def run_blocks(
     NumericalError
         Where the backend loses a block.
     """
-    with _open(*_checked(backend, workers, scheduler)) as (executor, width):
+    backend, workers, scheduler = _checked(backend, workers, scheduler)
+    with _open(backend, workers, scheduler) as (executor, width):
+        # An ensemble in this process uses all its threads; elsewhere blocks run side by side.
+        threads = width if backend == "threads" else 1
         running: dict[Future[dict[str, NDArray[Any]]], Block] = {}
         try:
             for block in blocks:
                 if len(running) >= 2 * width:
                     _collect(running, keep)
-                running[executor.submit(evaluate, block)] = block
+                running[executor.submit(evaluate, block, threads)] = block
             while running:
                 _collect(running, keep)
         except BaseException:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import thud
-from thud.case import Ball, Case, Drop, Levels, Limits
+from thud.case import Ball, Case, Drop, Levels
 from thud.errors import InputError, ThudError
 from thud.impact import FORCES, solve_case
 from thud.levels import octave_limits
@@ -66,13 +66,15 @@ class Block:
     version: str
 
 
-def evaluate(block: Block) -> Columns:
+def evaluate(block: Block, threads: int = 1) -> Columns:
     """Compute the sets of a block.
 
     Parameters
     ----------
     block
         The sets.
+    threads
+        Threads of an ensemble; it gives the same bits with any number of them.
 
     Returns
     -------
@@ -93,7 +95,7 @@ def evaluate(block: Block) -> Columns:
         )
         raise InputError(message)
     if _suits_ensemble(block.base, block.columns):
-        return _by_ensemble(block.base, block.columns)
+        return _by_ensemble(block.base, block.columns, threads)
     return _one_by_one(block.base, block.columns)
 
 
@@ -139,10 +141,8 @@ def block_size(base: Case) -> int:
 
 def _has_ensemble(base: Case) -> bool:
     """Return whether the library computes many sets of a case at once."""
-    # The ensemble judges as these defaults do.
-    same = base.limits == Limits() and base.levels.force == Levels.force
-    same = same and base.levels.method == Levels.method
-    return isinstance(base.model, HollowSphere) and same
+    exact = base.levels.method == Levels.method
+    return isinstance(base.model, HollowSphere) and exact
 
 
 def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
@@ -150,16 +150,21 @@ def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
     return _has_ensemble(base) and set(columns) <= _ENSEMBLE_KEYS
 
 
-def _by_ensemble(base: Case, columns: Columns) -> Columns:
-    """Compute sets by the ensemble of the shell model, on one thread: blocks run side by side."""
+def _by_ensemble(base: Case, columns: Columns, threads: int) -> Columns:
+    """Compute sets by the ensemble of the shell model."""
     shared = vars(base.ball) | vars(base.drop) | vars(base.model)
-    ensemble = thud.solve_many(shared | columns, threads=1, bands="octave", **vars(base.sampling))
+    source = base.limits.source
+    ensemble = thud.solve_many(
+        shared | columns, threads=threads, source=source, **vars(base.sampling)
+    )
     found = _empty(len(next(iter(columns.values()))))
-    for name in (*SCALARS, "conforms"):
+    for name in SCALARS:
         found[name][:] = getattr(ensemble, name)
+    judged_by_floor = base.levels.force == "floor"
+    found["conforms"][:] = ensemble.floor_conforms if judged_by_floor else ensemble.conforms
     for force in FORCES:
         found[f"{force}_level"][:] = getattr(ensemble, f"{force}_levels")
-    lower, upper = octave_limits(base.limits.source)
+    lower, upper = octave_limits(source)
     judged = found[f"{base.levels.force}_level"]
     found["margin"][:] = np.minimum(judged - lower, upper - judged).min(axis=1)
     # The single solver has the sentences.
