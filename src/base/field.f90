@@ -69,7 +69,7 @@ module thud_field
       procedure :: get_allowed
       procedure :: is_empty
       procedure, private :: complain
-      procedure, private :: contains => contains_value
+      procedure :: contains => contains_value
    end type field_type
 
 contains

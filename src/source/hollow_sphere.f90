@@ -15,8 +15,9 @@ module thud_hollow_sphere
    implicit none (type, external)
    private
 
-   public :: get_gas_energy, get_gas_force, get_hollow_sphere_fields, get_shell_stiffness
-   public :: hollow_sphere_type, shell_type, new_shell, solve_hollow_sphere
+   public :: compression_weights, flux_choices, get_gas_energy, get_gas_force, get_hollow_sphere_fields
+   public :: get_shell_stiffness, hollow_sphere_type, is_wild, new_shell, restitution_weights, shell_type
+   public :: solve_hollow_sphere
 
    !> Options of the model.
    type :: hollow_sphere_type
@@ -210,6 +211,18 @@ contains
       weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
    end function get_flux_weight
 
+   !> Whether a state is so far outside that not the shell has reached it but too long a step.
+   pure function is_wild(shell, state) result(wild)
+      !> The shell.
+      class(shell_type), intent(in) :: shell
+      !> State: [4].
+      real(wp), intent(in) :: state(:)
+      !> It is, or is not a number.
+      logical :: wild
+
+      wild = .not. abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp
+   end function is_wild
+
    !> Error of a drop that closes the shell.
    function get_failure(self, drop, time, state) result(error)
       !> The shell.
@@ -223,8 +236,7 @@ contains
       !> The error.
       type(error_type) :: error
 
-      ! A state far outside was not reached by the shell but by too long a step.
-      if (.not. abs(state(at_deflection)/self%closing_deflection - 0.5_wp) < 0.52_wp) then
+      if (is_wild(self, state)) then
          error = coarse_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if

@@ -8,7 +8,8 @@ module thud_sampling
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, sampling_type
+   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, least_contact_samples
+   public :: sampling_type
 
    !> Samples of one record; more would fill the memory and no drop needs them.
    real(wp), parameter :: most_samples = 5.0e6_wp

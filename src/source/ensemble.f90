@@ -1,0 +1,269 @@
+!> Many drops of `thud_hollow_sphere`, a block of lanes at a time: the same equation, steps and checks
+!> as `solve_hollow_sphere`, and the same numbers to 1e-10.
+!>
+!> Sets that cannot be computed have a status and NaN; they leave the others as they are.
+module thud_ensemble
+   use thud_ball, only: ball_type, get_ball_fields
+   use thud_constants, only: pi
+   use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
+   use thud_field, only: field_type
+   use thud_force_history, only: most_residual
+   use thud_hollow_sphere, only: compression_weights, get_shell_stiffness, is_wild, new_shell, restitution_weights, &
+      shell_type
+   use thud_kinds, only: wp
+   use thud_lumped, only: at_deflection, at_velocity
+   use thud_power, only: not_a_number
+   use thud_rk4, only: longest_valid, rk4_step
+   use thud_sampling, only: get_sample_count, least_contact_samples, sampling_type
+   use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_flux, set_is_fine, set_outlasts, set_range
+   use thud_shell_impacts, only: impact_lanes_type, solve_impacts
+   use thud_shell_lanes, only: lane_count, set_series
+   implicit none (type, external)
+   private
+
+   public :: block_size, get_set_fields, get_set_order, outcome_count, parameter_count, set_outcome_type, set_type
+   public :: solve_block
+
+   !> Sets of one block.
+   integer, parameter :: block_size = lane_count
+
+   !> Keys of a set that are numbers: those of ball and drop.
+   integer, parameter :: parameter_count = 10
+
+   !> One drop.
+   type :: set_type
+      !> The ball.
+      type(ball_type) :: ball
+      !> The drop.
+      type(drop_type) :: drop
+      !> Number of the choice of the flux term, as in `flux_choices`.
+      integer :: flux = 1
+   end type set_type
+
+   !> What one drop came to; NaN but for the status where it could not be computed.
+   type :: set_outcome_type
+      !> A code of `thud_set_status`.
+      integer :: status = set_is_fine
+      !> Time from first touch to release, s.
+      real(wp) :: contact_time = not_a_number
+      !> Largest elastic force, N.
+      real(wp) :: peak_force = not_a_number
+      !> Largest force on the floor, N.
+      real(wp) :: peak_floor_force = not_a_number
+      !> Largest deflection, m.
+      real(wp) :: max_deflection = not_a_number
+      !> Velocity at release over velocity at first touch.
+      real(wp) :: restitution = not_a_number
+      !> Time integral of the force on the floor, N s.
+      real(wp) :: impulse = not_a_number
+   end type set_outcome_type
+
+   !> Numbers of an outcome.
+   integer, parameter :: outcome_count = 6
+
+contains
+
+   !> Keys and allowed ranges of the numbers of a set, in the order of their status codes.
+   function get_set_fields(set) result(fields)
+      !> The set that the fields read and set.
+      type(set_type), intent(in), target :: set
+      !> One field per key: [parameter_count].
+      type(field_type) :: fields(parameter_count)
+
+      fields = [get_ball_fields(set%ball), get_drop_fields(set%drop)]
+   end function get_set_fields
+
+   !> The sets that can be computed, similar contact times side by side: a block takes as long as its
+   !> longest contact.
+   subroutine get_set_order(sets, status, order)
+      !> The sets: [n_set].
+      type(set_type), intent(in) :: sets(:)
+      !> Complaint about the input of each set, or `set_is_fine`: [n_set].
+      integer, intent(out) :: status(:)
+      !> Numbers of the sets without complaint: [n_valid].
+      integer, allocatable, intent(out) :: order(:)
+      !> Classes of contact times per doubling.
+      integer, parameter :: classes = 64
+      !> Most doublings that are told apart.
+      integer, parameter :: most = 64*classes
+      integer :: first(0:most + 1), class(size(sets)), i
+      type(set_type), target :: any_set
+      type(field_type) :: fields(parameter_count)
+
+      fields = get_set_fields(any_set)
+      first = 0
+      do i = 1, size(sets)
+         status(i) = get_complaint(sets(i), fields)
+         if (status(i) /= set_is_fine) cycle
+         class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
+         class(i) = min(max(class(i), 0), most)
+         first(class(i) + 1) = first(class(i) + 1) + 1
+      end do
+      do i = 1, most + 1
+         first(i) = first(i) + first(i - 1)
+      end do
+      allocate (order(first(most + 1)))
+      do i = 1, size(sets)
+         if (status(i) /= set_is_fine) cycle
+         first(class(i)) = first(class(i)) + 1
+         order(first(class(i))) = i
+      end do
+   end subroutine get_set_order
+
+   !> What is wrong with the input of a set.
+   function get_complaint(set, fields) result(status)
+      !> The set.
+      type(set_type), intent(in) :: set
+      !> Ranges of the numbers: [parameter_count].
+      type(field_type), intent(inout) :: fields(:)
+      !> A code of `thud_set_status`.
+      integer :: status
+      integer :: i
+
+      associate (ball => set%ball)
+         ! The one range that depends on the set.
+         fields(2)%upper = ball%outer_radius
+         i = findloc(fields%contains([ball%outer_radius, ball%wall_thickness, ball%mass, ball%youngs_modulus, &
+            ball%poisson_ratio, ball%gauge_pressure, ball%ambient_pressure, ball%heat_capacity_ratio, &
+            set%drop%height, set%drop%gravity]), .false., dim=1)
+      end associate
+      status = set_is_fine
+      if (set%flux < 1 .or. set%flux > size(compression_weights)) status = set_flux
+      if (i > 0) status = set_range + i
+   end function get_complaint
+
+   !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
+   !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like sets.
+   pure function get_rough_contact_time(set) result(time)
+      !> The set.
+      type(set_type), intent(in) :: set
+      !> The time, s.
+      real(wp) :: time
+      real(wp) :: linear, cubic, speed
+
+      associate (ball => set%ball)
+         linear = (get_shell_stiffness(ball) + 2*pi*ball%outer_radius*ball%gauge_pressure)/ball%mass
+         cubic = 1.5_wp*pi*ball%heat_capacity_ratio*(ball%ambient_pressure + ball%gauge_pressure) &
+            /(ball%outer_radius*ball%mass)
+      end associate
+      speed = get_impact_velocity(set%drop)
+      time = pi/sqrt(linear + 0.75_wp*cubic*2*speed**2/(linear + sqrt(linear**2 + 2*cubic*speed**2)))
+   end function get_rough_contact_time
+
+   !> Outcomes and forces of up to `block_size` sets.
+   subroutine solve_block(sets, sampling, force, outcomes)
+      !> The sets, their input checked: [n_set].
+      type(set_type), intent(in) :: sets(:)
+      !> Sampling of all.
+      type(sampling_type), intent(in) :: sampling
+      !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
+      real(wp), intent(inout) :: force(:, :)
+      !> The outcomes: [n_set].
+      type(set_outcome_type), intent(out) :: outcomes(:)
+      type(impact_lanes_type) :: impacts
+      real(wp) :: step
+      integer :: i
+
+      step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
+      do i = 1, block_size
+         ! Lanes without a set repeat the last one.
+         call set_lane(impacts, i, sets(min(i, size(sets))), step)
+      end do
+      call set_series(impacts%shell)
+      call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force)
+      do i = 1, size(sets)
+         outcomes(i)%status = get_lane_status(impacts, i, sets(i), sampling)
+         if (outcomes(i)%status /= set_is_fine) cycle
+         associate (diameter => 2*sets(i)%ball%outer_radius)
+            outcomes(i)%contact_time = impacts%contact(i)*step
+            outcomes(i)%peak_force = impacts%peak_force(i)
+            outcomes(i)%peak_floor_force = impacts%peak_floor_force(i)
+            outcomes(i)%max_deflection = impacts%max_deflection(i)*diameter
+            outcomes(i)%restitution = -impacts%state%velocity(i)/impacts%impact_velocity(i)
+            outcomes(i)%impulse = impacts%state%impulse(i)*sets(i)%ball%mass*diameter/step
+         end associate
+      end do
+   end subroutine solve_block
+
+   !> Equation and beginning of one lane; see `thud_shell_lanes` for the units.
+   pure subroutine set_lane(impacts, i, set, step)
+      !> The impacts.
+      type(impact_lanes_type), intent(inout) :: impacts
+      !> Number of the lane.
+      integer, intent(in) :: i
+      !> The set.
+      type(set_type), intent(in) :: set
+      !> The step, s.
+      real(wp), intent(in) :: step
+      real(wp) :: pressure_unit
+
+      associate (ball => set%ball, shell => impacts%shell)
+         pressure_unit = 2*pi*ball%outer_radius*step**2/ball%mass
+         shell%stiffness(i) = get_shell_stiffness(ball)*step**2/ball%mass
+         shell%gas_pressure(i) = pressure_unit*(ball%ambient_pressure + ball%gauge_pressure)
+         shell%air_pressure(i) = pressure_unit*ball%ambient_pressure
+         shell%exponent(i) = -ball%heat_capacity_ratio
+         shell%closing(i) = (ball%outer_radius - ball%wall_thickness)/ball%outer_radius
+         impacts%compression_weight(i) = compression_weights(set%flux)
+         impacts%restitution_weight(i) = restitution_weights(set%flux)
+         impacts%impact_velocity(i) = get_impact_velocity(set%drop)*step/(2*ball%outer_radius)
+         impacts%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
+      end associate
+   end subroutine set_lane
+
+   !> What became of one lane, asked in the order of `solve_lumped`.
+   function get_lane_status(impacts, i, set, sampling) result(status)
+      !> The impacts.
+      type(impact_lanes_type), intent(in) :: impacts
+      !> Number of the lane.
+      integer, intent(in) :: i
+      !> Its set.
+      type(set_type), intent(in) :: set
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> A code of `thud_set_status`.
+      integer :: status
+      real(wp) :: change, energy
+
+      associate (z => impacts%state%velocity(i), z0 => impacts%impact_velocity(i))
+         if (impacts%left(i)) then
+            status = get_reason(impacts, i, set, 1/(sampling%sample_rate*real(sampling%substeps, wp)))
+         else if (.not. impacts%released(i)) then
+            status = set_outlasts
+         else if (impacts%contact(i) < least_contact_samples*sampling%substeps) then
+            status = set_few_samples
+         else
+            change = abs(impacts%state%impulse(i) - (z0 - z))/(z0 - z)
+            energy = abs(z**2 + 2*impacts%state%loss(i) - z0**2)/z0**2
+            ! Asked so that NaN fails too.
+            status = merge(set_is_fine, set_coarse, max(change, energy) <= most_residual)
+         end if
+      end associate
+   end function get_lane_status
+
+   !> Why a lane has left the domain of the equation: the single solver's own question, asked of the
+   !> last state inside.
+   function get_reason(impacts, i, set, step) result(status)
+      !> The impacts.
+      type(impact_lanes_type), intent(in) :: impacts
+      !> Number of the lane.
+      integer, intent(in) :: i
+      !> Its set.
+      type(set_type), intent(in) :: set
+      !> The step, s.
+      real(wp), intent(in) :: step
+      !> `set_closes` or `set_coarse`.
+      integer :: status
+      type(shell_type) :: shell
+      real(wp) :: state(4), last(4)
+      logical :: valid
+
+      shell = new_shell(set%ball, impacts%shell%weight(i), impacts%shell%weight(i))
+      state = 0.0_wp
+      state(at_deflection) = impacts%state%deflection(i)*2*set%ball%outer_radius
+      state(at_velocity) = impacts%state%velocity(i)*2*set%ball%outer_radius/step
+      call rk4_step(shell, 0.0_wp, state, longest_valid(shell, 0.0_wp, state, step), last, valid)
+      status = merge(set_coarse, set_closes, is_wild(shell, last))
+   end function get_reason
+
+end module thud_ensemble
