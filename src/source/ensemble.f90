@@ -3,6 +3,8 @@
 !>
 !> Sets that cannot be computed have a status and NaN; they leave the others as they are.
 module thud_ensemble
+   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
+   use thud_aligned, only: get_aligned_start, line_length
    use thud_ball, only: ball_type, get_ball_fields
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
@@ -157,12 +159,15 @@ contains
       !> Sampling of all.
       type(sampling_type), intent(in) :: sampling
       !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
-      real(wp), intent(inout) :: force(:, :)
+      real(wp), intent(inout), contiguous :: force(:, :)
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
-      type(impact_lanes_type) :: impacts
+      type(impact_lanes_type), pointer :: impacts
+      real(wp), target :: room(storage_size(impacts)/storage_size(1.0_wp) + line_length)
       real(wp) :: step
       integer :: i
+
+      call c_f_pointer(c_loc(room(get_aligned_start(room))), impacts)
 
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       do i = 1, block_size

@@ -7,7 +7,7 @@
 module thud_shell_impacts
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_shell_lanes, only: anchor_lanes_type, get_elastic_force, get_pressures, lane_count, set_anchors, &
+   use thud_shell_lanes, only: anchor_lanes_type, get_forces, get_pressures, lane_count, set_anchors, &
       shell_lanes_type, state_lanes_type, take_step
    implicit none (type, external)
    private
@@ -18,7 +18,8 @@ module thud_shell_impacts
    !> volume by 2e-3 in as many, so that the series mostly holds between; see `thud_shell_lanes`.
    integer, parameter :: anchor_interval = 8
 
-   !> Impacts, in the units of `thud_shell_lanes` unless said otherwise.
+   !> Impacts, in the units of `thud_shell_lanes` unless said otherwise. Fastest where it begins with a
+   !> line of the cache, see `thud_aligned`.
    type :: impact_lanes_type
       !> The equations.
       type(shell_lanes_type) :: shell
@@ -32,6 +33,18 @@ module thud_shell_impacts
       real(wp) :: force_unit(lane_count)
       !> State at release; where a lane did not get there, at the beginning of its last step.
       type(state_lanes_type) :: state
+      !> State at the end of the step under way.
+      type(state_lanes_type) :: next
+      !> Where pressures are known.
+      type(anchor_lanes_type) :: anchor
+      !> A x**(-gamma) at the beginning of the step: [lane_count].
+      real(wp) :: pressure(lane_count)
+      !> Length of the step, 1 for a whole one: [lane_count].
+      real(wp) :: length(lane_count)
+      !> Elastic force of the sample under way, N: [lane_count].
+      real(wp) :: elastic_force(lane_count)
+      !> Force on the floor of the sample under way, N: [lane_count].
+      real(wp) :: floor_force(lane_count)
       !> Largest deflection: [lane_count].
       real(wp) :: max_deflection(lane_count)
       !> Largest elastic force, at samples and turning point, N: [lane_count].
@@ -62,7 +75,6 @@ contains
       !> Elastic forces, then floor forces, N, up to the last contact: [2 lane_count, n_sample].
       real(wp), intent(inout) :: force(2*lane_count, n_sample)
       real(wp), dimension(lane_count) :: start, last, length
-      type(anchor_lanes_type) :: anchor
       integer :: n_step
 
       n_step = (n_sample - 1)*substeps
@@ -73,19 +85,19 @@ contains
       impacts%peak_force = 0.0_wp
       impacts%peak_floor_force = 0.0_wp
       impacts%left = .false.
-      anchor%inverse = 1.0_wp
-      anchor%pressure = impacts%shell%gas_pressure
+      impacts%anchor%inverse = 1.0_wp
+      impacts%anchor%pressure = impacts%shell%gas_pressure
       impacts%shell%weight = impacts%compression_weight
 
       start = 0.0_wp
-      call march(impacts, anchor, .true., start, last, n_step, substeps, force)
-      call locate(impacts, anchor, .true., last < never .and. .not. impacts%left, length)
+      call march(impacts, .true., start, last, n_step, substeps, force)
+      call locate(impacts, .true., last < never .and. .not. impacts%left, length)
       start = merge(last + 1, never, last < never .and. .not. impacts%left)
-      call turn(impacts, anchor, start < never, length)
-      call march(impacts, anchor, .false., start, last, n_step, substeps, force)
+      call turn(impacts, start < never, length)
+      call march(impacts, .false., start, last, n_step, substeps, force)
       impacts%released = last < never .and. .not. impacts%left
-      call locate(impacts, anchor, .false., impacts%released, length)
-      call finish_step(impacts, anchor, impacts%released, length)
+      call locate(impacts, .false., impacts%released, length)
+      call finish_step(impacts, impacts%released, length)
       impacts%contact = last + length
       impacts%peak_floor_force = max(impacts%peak_force, impacts%peak_floor_force)
       ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
@@ -93,11 +105,9 @@ contains
    end subroutine solve_impacts
 
    !> Marches until every lane has come to the end of its phase, or to that of the record.
-   subroutine march(impacts, anchor, compressing, start, last, n_step, substeps, force)
+   subroutine march(impacts, compressing, start, last, n_step, substeps, force)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> The anchors.
-      type(anchor_lanes_type), intent(inout) :: anchor
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       !> Step with which each lane begins: [lane_count].
@@ -110,30 +120,27 @@ contains
       integer, intent(in) :: substeps
       !> Forces, N: [2 lane_count, n_sample].
       real(wp), intent(inout) :: force(2*lane_count, *)
-      type(state_lanes_type) :: new
-      real(wp), dimension(lane_count) :: pressure, whole
+      real(wp) :: latest
       integer :: n, first
       logical :: done
 
-      whole = 1.0_wp
+      impacts%length = 1.0_wp
+      latest = maxval(start, mask=start < never)
       last = merge(never, -1.0_wp, start < never)
       first = int(min(minval(start), real(n_step, wp)))
       do n = first, n_step - 1
-         call get_pressures(impacts%shell, impacts%state%deflection, anchor, pressure)
+         call get_pressures(impacts%shell, impacts%state%deflection, impacts%anchor, impacts%pressure)
          ! A lane has new anchors where it begins and at fixed times: nothing that depends on others.
-         if (mod(n, anchor_interval) == 0) then
-            pressure = not_a_number
-            call set_anchors(impacts%shell, impacts%state%deflection, pressure, anchor)
-         else if (any(abs(start - n) < 0.5_wp)) then
-            where (abs(start - n) < 0.5_wp) pressure = not_a_number
-            call set_anchors(impacts%shell, impacts%state%deflection, pressure, anchor)
+         if (n <= latest .or. mod(n, anchor_interval) == 0) then
+            where (abs(start - n) < 0.5_wp .or. mod(n, anchor_interval) == 0) impacts%pressure = not_a_number
+            call set_anchors(impacts%shell, impacts%state%deflection, impacts%pressure, impacts%anchor)
          end if
-         if (mod(n, substeps) == 0) call record(impacts, pressure, real(n, wp), start, last, force(:, n/substeps + 1))
-         call take_step(impacts%shell, impacts%state, whole, pressure, anchor, new)
+         if (mod(n, substeps) == 0) call record(impacts, real(n, wp), start, last, force(:, n/substeps + 1))
+         call take_step(impacts%shell, impacts%state, impacts%length, impacts%pressure, impacts%anchor, impacts%next)
          if (compressing) then
-            call settle(impacts, new, new%velocity, real(n, wp), start, last, done)
+            call settle(impacts, impacts%next%velocity, real(n, wp), start, last, done)
          else
-            call settle(impacts, new, new%deflection, real(n, wp), start, last, done)
+            call settle(impacts, impacts%next%deflection, real(n, wp), start, last, done)
          end if
          if (done) exit
       end do
@@ -142,11 +149,9 @@ contains
 
    !> Forces of one sample: those of moving lanes, none after the contact; lanes whose turn is still to
    !> come keep what they have.
-   pure subroutine record(impacts, pressure, n, start, last, force)
+   pure subroutine record(impacts, n, start, last, force)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> A x**(-gamma): [lane_count].
-      real(wp), intent(in) :: pressure(lane_count)
       !> Number of the step.
       real(wp), intent(in) :: n
       !> Step with which each lane begins: [lane_count].
@@ -155,37 +160,33 @@ contains
       real(wp), intent(in) :: last(lane_count)
       !> The sample, N: [2 lane_count].
       real(wp), intent(inout) :: force(2*lane_count)
-      real(wp) :: elastic, floor_force
       integer :: i
 
-      !$omp simd private(elastic, floor_force)
+      call get_forces(impacts%shell, impacts%state, impacts%pressure, impacts%force_unit, impacts%elastic_force, &
+         impacts%floor_force)
+      !$omp simd
       do i = 1, lane_count
-         elastic = get_elastic_force(impacts%state%deflection(i), impacts%shell%stiffness(i), &
-            pressure(i) - impacts%shell%air_pressure(i))
-         floor_force = elastic + (1 - impacts%shell%weight(i))*impacts%state%velocity(i)**2
-         elastic = impacts%force_unit(i)*elastic
-         floor_force = impacts%force_unit(i)*floor_force
-         if (n > last(i)) then
-            elastic = 0.0_wp
-            floor_force = 0.0_wp
-         end if
-         if (n < start(i)) then
-            elastic = force(i)
-            floor_force = force(lane_count + i)
-         end if
-         force(i) = elastic
-         force(lane_count + i) = floor_force
-         impacts%peak_force(i) = max(impacts%peak_force(i), elastic)
-         impacts%peak_floor_force(i) = max(impacts%peak_floor_force(i), floor_force)
+         associate (elastic => impacts%elastic_force, whole => impacts%floor_force)
+            if (n > last(i)) then
+               elastic(i) = 0.0_wp
+               whole(i) = 0.0_wp
+            end if
+            if (n < start(i)) then
+               elastic(i) = force(i)
+               whole(i) = force(lane_count + i)
+            end if
+            force(i) = elastic(i)
+            force(lane_count + i) = whole(i)
+            impacts%peak_force(i) = max(impacts%peak_force(i), elastic(i))
+            impacts%peak_floor_force(i) = max(impacts%peak_floor_force(i), whole(i))
+         end associate
       end do
    end subroutine record
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
-   pure subroutine settle(impacts, new, watched, n, start, last, done)
+   pure subroutine settle(impacts, watched, n, start, last, done)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> State at the end of the step.
-      type(state_lanes_type), intent(in) :: new
       !> What the end of the phase brings to zero: [lane_count].
       real(wp), intent(in) :: watched(lane_count)
       !> Number of the step.
@@ -196,39 +197,37 @@ contains
       real(wp), intent(inout) :: last(lane_count)
       !> All lanes have stopped.
       logical, intent(out) :: done
-      real(wp) :: on, stays, moving, lost
+      real(wp) :: on, finite, stays, moving, lost
       integer :: i
 
       moving = 0.0_wp
       lost = 0.0_wp
-      !$omp simd private(on, stays) reduction(max: moving, lost)
+      ! Products of ones and zeros, because compilers do not vectorise conditions joined by `.and.`.
+      !$omp simd private(on, finite, stays) reduction(max: moving, lost)
       do i = 1, lane_count
-         associate (state => impacts%state)
-            on = merge(1.0_wp, 0.0_wp, n >= start(i) .and. n < last(i))
-            lost = max(lost, merge(0.0_wp, on, abs(new%velocity(i)) <= huge(1.0_wp)))
-            stays = merge(on, 0.0_wp, watched(i) > 0.0_wp .and. abs(new%velocity(i)) <= huge(1.0_wp))
-            last(i) = merge(n, last(i), on > stays)
-            if (stays > 0.0_wp) then
-               state%deflection(i) = new%deflection(i)
-               state%velocity(i) = new%velocity(i)
-               state%impulse(i) = new%impulse(i)
-               state%loss(i) = new%loss(i)
-            end if
-            moving = max(moving, merge(1.0_wp, 0.0_wp, last(i) > n))
-         end associate
+         on = merge(1.0_wp, 0.0_wp, n >= start(i))*merge(1.0_wp, 0.0_wp, n < last(i))
+         finite = merge(1.0_wp, 0.0_wp, abs(impacts%next%velocity(i)) <= huge(1.0_wp))
+         stays = on*finite*merge(1.0_wp, 0.0_wp, watched(i) > 0.0_wp)
+         if (stays > 0.0_wp) then
+            impacts%state%deflection(i) = impacts%next%deflection(i)
+            impacts%state%velocity(i) = impacts%next%velocity(i)
+            impacts%state%impulse(i) = impacts%next%impulse(i)
+            impacts%state%loss(i) = impacts%next%loss(i)
+         end if
+         if (on > stays) last(i) = n
+         moving = max(moving, merge(1.0_wp, 0.0_wp, last(i) > n))
+         lost = max(lost, on*(1 - finite))
       end do
       done = .not. moving > 0.0_wp
-      if (.not. lost > 0.0_wp) return
-      where (abs(last - n) < 0.5_wp .and. .not. abs(new%velocity) <= huge(1.0_wp)) impacts%left = .true.
+      if (lost > 0.0_wp) impacts%left = impacts%left &
+         .or. (abs(last - n) < 0.5_wp .and. .not. abs(impacts%next%velocity) <= huge(1.0_wp))
    end subroutine settle
 
    !> Parts of the step at whose end the phase ends, to rounding: `locate_zero` of `thud_rk4` for all
    !> lanes at once. Lanes without such an end get the whole step.
-   subroutine locate(impacts, anchor, compressing, ends, length)
+   subroutine locate(impacts, compressing, ends, length)
       !> The impacts, at the beginning of the step.
-      type(impact_lanes_type), intent(in) :: impacts
-      !> The anchors.
-      type(anchor_lanes_type), intent(inout) :: anchor
+      type(impact_lanes_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       !> The phase of the lane ends in this step: [lane_count].
@@ -236,19 +235,16 @@ contains
       !> The parts: [lane_count].
       real(wp), intent(out) :: length(lane_count)
       integer, parameter :: most_iterations = 200
-      real(wp), dimension(lane_count) :: pressure, left, right, left_value, right_value, value
-      type(state_lanes_type) :: new
+      real(wp), dimension(lane_count) :: left, right, left_value, right_value, value
       logical, dimension(lane_count) :: open, left_moved, right_moved
       integer :: iteration
 
-      pressure = not_a_number
-      call set_anchors(impacts%shell, impacts%state%deflection, pressure, anchor)
       left = 0.0_wp
       left_value = merge(impacts%state%velocity, impacts%state%deflection, compressing)
       right = 1.0_wp
-      length = 1.0_wp
-      call take_step(impacts%shell, impacts%state, length, pressure, anchor, new)
-      right_value = merge(new%velocity, new%deflection, compressing)
+      length = right
+      call try_step(impacts, length)
+      right_value = merge(impacts%next%velocity, impacts%next%deflection, compressing)
       left_moved = .false.
       right_moved = .false.
       do iteration = 1, most_iterations
@@ -256,8 +252,8 @@ contains
          if (.not. any(open)) exit
          length = right - right_value*(right - left)/(right_value - left_value)
          where (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
-         call take_step(impacts%shell, impacts%state, length, pressure, anchor, new)
-         value = merge(new%velocity, new%deflection, compressing)
+         call try_step(impacts, length)
+         value = merge(impacts%next%velocity, impacts%next%deflection, compressing)
          ! An end that stays twice has its value halved, or regula falsi would creep.
          where (open .and. value > 0.0_wp)
             left = length
@@ -275,50 +271,56 @@ contains
    end subroutine locate
 
    !> From the turning point to the end of its step, with the flux term of restitution.
-   subroutine turn(impacts, anchor, turns, length)
+   subroutine turn(impacts, turns, length)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> The anchors.
-      type(anchor_lanes_type), intent(inout) :: anchor
       !> The lane has a turning point: [lane_count].
       logical, intent(in) :: turns(lane_count)
       !> Part of the step before the turning point: [lane_count].
       real(wp), intent(in) :: length(lane_count)
-      real(wp) :: pressure(lane_count)
 
-      call finish_step(impacts, anchor, turns, length)
+      call finish_step(impacts, turns, length)
       where (turns) impacts%state%velocity = 0.0_wp
       impacts%max_deflection = impacts%state%deflection
-      pressure = not_a_number
-      call set_anchors(impacts%shell, impacts%state%deflection, pressure, anchor)
-      where (turns) impacts%peak_force = max(impacts%peak_force, impacts%force_unit &
-         *get_elastic_force(impacts%state%deflection, impacts%shell%stiffness, pressure - impacts%shell%air_pressure))
-      where (turns) impacts%shell%weight = impacts%restitution_weight
-      call finish_step(impacts, anchor, turns, 1 - length)
+      impacts%pressure = not_a_number
+      call set_anchors(impacts%shell, impacts%state%deflection, impacts%pressure, impacts%anchor)
+      call get_forces(impacts%shell, impacts%state, impacts%pressure, impacts%force_unit, impacts%elastic_force, &
+         impacts%floor_force)
+      where (turns)
+         impacts%peak_force = max(impacts%peak_force, impacts%elastic_force)
+         impacts%shell%weight = impacts%restitution_weight
+      end where
+      call finish_step(impacts, turns, 1 - length)
    end subroutine turn
 
    !> Takes a part of a step in some of the lanes.
-   subroutine finish_step(impacts, anchor, goes, length)
+   subroutine finish_step(impacts, goes, length)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> The anchors.
-      type(anchor_lanes_type), intent(inout) :: anchor
       !> The lane takes the step: [lane_count].
       logical, intent(in) :: goes(lane_count)
       !> Its length: [lane_count].
       real(wp), intent(in) :: length(lane_count)
-      type(state_lanes_type) :: new
-      real(wp) :: pressure(lane_count)
 
-      pressure = not_a_number
-      call set_anchors(impacts%shell, impacts%state%deflection, pressure, anchor)
-      call take_step(impacts%shell, impacts%state, length, pressure, anchor, new)
+      call try_step(impacts, length)
       where (goes)
-         impacts%state%deflection = new%deflection
-         impacts%state%velocity = new%velocity
-         impacts%state%impulse = new%impulse
-         impacts%state%loss = new%loss
+         impacts%state%deflection = impacts%next%deflection
+         impacts%state%velocity = impacts%next%velocity
+         impacts%state%impulse = impacts%next%impulse
+         impacts%state%loss = impacts%next%loss
       end where
    end subroutine finish_step
+
+   !> Where a part of a step would lead.
+   subroutine try_step(impacts, length)
+      !> The impacts.
+      type(impact_lanes_type), intent(inout) :: impacts
+      !> Its length: [lane_count].
+      real(wp), intent(in) :: length(lane_count)
+
+      impacts%pressure = not_a_number
+      call set_anchors(impacts%shell, impacts%state%deflection, impacts%pressure, impacts%anchor)
+      call take_step(impacts%shell, impacts%state, length, impacts%pressure, impacts%anchor, impacts%next)
+   end subroutine try_step
 
 end module thud_shell_impacts

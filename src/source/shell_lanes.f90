@@ -19,7 +19,7 @@ module thud_shell_lanes
    implicit none (type, external)
    private
 
-   public :: anchor_lanes_type, get_elastic_force, get_pressures, lane_count, set_anchors, set_series, shell_lanes_type
+   public :: anchor_lanes_type, get_forces, get_pressures, lane_count, set_anchors, set_series, shell_lanes_type
    public :: state_lanes_type, take_step
 
    !> Balls side by side: several vectors, so that the latency of one is filled by the others, and
@@ -86,7 +86,7 @@ contains
       end do
    end subroutine set_series
 
-   !> Elastic force e.
+   !> Elastic force e; private, so that compilers put it into the loops.
    elemental function get_elastic_force(deflection, stiffness, overpressure) result(force)
       !> y.
       real(wp), intent(in) :: deflection
@@ -161,6 +161,31 @@ contains
       if (missed > 0.0_wp) call set_anchors(shell, y, pressure, anchor)
    end subroutine get_pressures
 
+   !> Forces of the present states.
+   pure subroutine get_forces(shell, state, pressure, unit, elastic_force, floor_force)
+      !> The equations.
+      type(shell_lanes_type), intent(in) :: shell
+      !> The states.
+      type(state_lanes_type), intent(in) :: state
+      !> A x**(-gamma): [lane_count].
+      real(wp), intent(in) :: pressure(lane_count)
+      !> Unit of the forces, N: [lane_count].
+      real(wp), intent(in) :: unit(lane_count)
+      !> Force of shell and gas, N: [lane_count].
+      real(wp), intent(out) :: elastic_force(lane_count)
+      !> Force on the floor, N: [lane_count].
+      real(wp), intent(out) :: floor_force(lane_count)
+      real(wp) :: force
+      integer :: i
+
+      !$omp simd private(force)
+      do i = 1, lane_count
+         force = get_elastic_force(state%deflection(i), shell%stiffness(i), pressure(i) - shell%air_pressure(i))
+         elastic_force(i) = unit(i)*force
+         floor_force(i) = unit(i)*(force + (1 - shell%weight(i))*state%velocity(i)**2)
+      end do
+   end subroutine get_forces
+
    !> One classical step, or part of one, as `rk4_step`.
    pure subroutine take_step(shell, state, length, start_pressure, anchor, new)
       !> The equations.
@@ -175,31 +200,28 @@ contains
       type(anchor_lanes_type), intent(inout) :: anchor
       !> State at the end; NaN where a stage has left the domain of the equation.
       type(state_lanes_type), intent(out) :: new
-      real(wp), dimension(lane_count) :: half, y, z2, z3, z4, net_sum, pressure
-      real(wp) :: net, flux_sum, sixth
+      real(wp), dimension(lane_count) :: half, y2, y3, y4, z2, z3, z4, net1, net2, net3, pressure
+      real(wp) :: net4, flux_sum, sixth
       integer :: i
 
       half = length/2
-      pressure = start_pressure
-      y = state%deflection
-      net_sum = 0.0_wp
-      call take_stage(shell, state, state%velocity, 1.0_wp, half, pressure, y, z2, net_sum)
-      call get_pressures(shell, y, anchor, pressure)
-      call take_stage(shell, state, z2, 2.0_wp, half, pressure, y, z3, net_sum)
-      call get_pressures(shell, y, anchor, pressure)
-      call take_stage(shell, state, z3, 2.0_wp, length, pressure, y, z4, net_sum)
-      call get_pressures(shell, y, anchor, pressure)
-      !$omp simd private(net, flux_sum, sixth)
+      call take_stage(shell, state, state%deflection, state%velocity, start_pressure, half, net1, y2, z2)
+      call get_pressures(shell, y2, anchor, pressure)
+      call take_stage(shell, state, y2, z2, pressure, half, net2, y3, z3)
+      call get_pressures(shell, y3, anchor, pressure)
+      call take_stage(shell, state, y3, z3, pressure, length, net3, y4, z4)
+      call get_pressures(shell, y4, anchor, pressure)
+      !$omp simd private(net4, flux_sum, sixth)
       do i = 1, lane_count
          associate (y0 => state%deflection(i), z0 => state%velocity(i), s => shell%weight(i))
-            net = s*z4(i)**2 - get_elastic_force(y(i), shell%stiffness(i), pressure(i) - shell%air_pressure(i))
+            net4 = s*z4(i)**2 - get_elastic_force(y4(i), shell%stiffness(i), pressure(i) - shell%air_pressure(i))
             sixth = length(i)/6
             new%deflection(i) = y0 + sixth*(z0 + 2*(z2(i) + z3(i)) + z4(i))
             ! The velocities of the stages hold the accelerations of those before.
-            new%velocity(i) = (z2(i) + 2*z3(i) + z4(i) - z0)/3 + sixth*(net/(1 - y(i)))
+            new%velocity(i) = (z2(i) + 2*z3(i) + z4(i) - z0)/3 + sixth*(net4/(1 - y4(i)))
             ! The floor bears the elastic force and (1 - s) times the flux: flux - net.
             flux_sum = z0**2 + 2*(z2(i)**2 + z3(i)**2) + z4(i)**2
-            new%impulse(i) = state%impulse(i) + sixth*(flux_sum - (net_sum(i) + net))
+            new%impulse(i) = state%impulse(i) + sixth*(flux_sum - (net1(i) + 2*(net2(i) + net3(i)) + net4))
             flux_sum = z0**3 + 2*(z2(i)**3 + z3(i)**3) + z4(i)**3
             new%loss(i) = state%loss(i) + sixth*((0.5_wp - s)*flux_sum)
          end associate
@@ -207,34 +229,33 @@ contains
    end subroutine take_step
 
    !> Acceleration of one stage, and the place of the next.
-   pure subroutine take_stage(shell, state, z, factor, portion, pressure, y, next_z, net_sum)
+   pure subroutine take_stage(shell, state, y, z, pressure, portion, net, next_y, next_z)
       !> The equations.
       type(shell_lanes_type), intent(in) :: shell
       !> State at the beginning of the step.
       type(state_lanes_type), intent(in) :: state
+      !> Deflection of this stage: [lane_count].
+      real(wp), intent(in) :: y(lane_count)
       !> Velocity of this stage: [lane_count].
       real(wp), intent(in) :: z(lane_count)
-      !> Factor of the stage in sums.
-      real(wp), intent(in) :: factor
-      !> How far to go for the next stage, in steps: [lane_count].
-      real(wp), intent(in) :: portion(lane_count)
       !> A x**(-gamma) of this stage: [lane_count].
       real(wp), intent(in) :: pressure(lane_count)
-      !> Deflection of this stage, then of the next: [lane_count].
-      real(wp), intent(inout) :: y(lane_count)
+      !> How far to go for the next stage, in steps: [lane_count].
+      real(wp), intent(in) :: portion(lane_count)
+      !> (1 - y) dz/dt of this stage: [lane_count].
+      real(wp), intent(out) :: net(lane_count)
+      !> Deflection of the next stage: [lane_count].
+      real(wp), intent(out) :: next_y(lane_count)
       !> Velocity of the next stage: [lane_count].
       real(wp), intent(out) :: next_z(lane_count)
-      !> Weighted sum of m dz/dt: [lane_count].
-      real(wp), intent(inout) :: net_sum(lane_count)
-      real(wp) :: net
       integer :: i
 
-      !$omp simd private(net)
+      !$omp simd
       do i = 1, lane_count
-         net = shell%weight(i)*z(i)**2 - get_elastic_force(y(i), shell%stiffness(i), pressure(i) - shell%air_pressure(i))
-         net_sum(i) = net_sum(i) + factor*net
-         next_z(i) = state%velocity(i) + portion(i)*(net/(1 - y(i)))
-         y(i) = state%deflection(i) + portion(i)*z(i)
+         net(i) = shell%weight(i)*z(i)**2 &
+            - get_elastic_force(y(i), shell%stiffness(i), pressure(i) - shell%air_pressure(i))
+         next_z(i) = state%velocity(i) + portion(i)*(net(i)/(1 - y(i)))
+         next_y(i) = state%deflection(i) + portion(i)*z(i)
       end do
    end subroutine take_stage
 
