@@ -23,6 +23,7 @@ from thud.case import (
     read_case,
     write_case,
 )
+from thud.ensemble import Ensemble, solve_many
 from thud.errors import InputError, NumericalError, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
 from thud.impact import Impact, solve, solve_case
@@ -41,6 +42,7 @@ __all__ = [
     "Conformity",
     "Criterion",
     "Drop",
+    "Ensemble",
     "FiniteElement",
     "FreeModes",
     "HollowSphere",
@@ -66,6 +68,7 @@ __all__ = [
     "read_results",
     "solve",
     "solve_case",
+    "solve_many",
     "write_case",
 ]
 

@@ -3,3 +3,4 @@ from typing import Any
 
 thud_door: Any
 thud_level_door: Any
+thud_ensemble_door: Any

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 door = _core.thud_door
 level_door = _core.thud_level_door
+ensemble_door = _core.thud_ensemble_door
 
 
 def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:

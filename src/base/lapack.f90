@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgels, dgemv, dpbtrf, dpbtrs, dposv, dpotrf, dsbmv, dsygv, dsyrk, dtrsm, dtrsv
+   public :: dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
 
    interface
       !> Generalised symmetric eigenproblem.
@@ -47,6 +47,31 @@ module thud_lapack
          real(wp), intent(in) :: a(lda, *)
          real(wp), intent(inout) :: x(*)
       end subroutine dtrsv
+
+      !> Matrix times matrix.
+      pure subroutine dgemm(transa, transb, m, n, k, alpha, a, lda, b, ldb, beta, c, ldc)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: transa, transb
+         integer, intent(in) :: m, n, k, lda, ldb, ldc
+         real(wp), intent(in) :: alpha, beta
+         real(wp), intent(in) :: a(lda, *), b(ldb, *)
+         real(wp), intent(inout) :: c(ldc, *)
+      end subroutine dgemm
+
+      !> Some eigenvectors of a symmetric tridiagonal matrix.
+      pure subroutine dstevr(jobz, range, n, d, e, vl, vu, il, iu, abstol, m, w, z, ldz, isuppz, work, lwork, iwork, &
+         liwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: jobz, range
+         integer, intent(in) :: n, il, iu, ldz, lwork, liwork
+         real(wp), intent(in) :: vl, vu, abstol
+         real(wp), intent(inout) :: d(*), e(*)
+         integer, intent(out) :: m, isuppz(*), iwork(*), info
+         real(wp), intent(out) :: w(*), work(*)
+         real(wp), intent(inout) :: z(ldz, *)
+      end subroutine dstevr
 
       !> Matrix times vector.
       pure subroutine dgemv(trans, m, n, alpha, a, lda, x, incx, beta, y, incy)

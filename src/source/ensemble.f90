@@ -153,13 +153,15 @@ contains
    end function get_rough_contact_time
 
    !> Outcomes and forces of up to `block_size` sets.
-   subroutine solve_block(sets, sampling, force, outcomes)
+   subroutine solve_block(sets, sampling, force, last_sample, outcomes)
       !> The sets, their input checked: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> Sampling of all.
       type(sampling_type), intent(in) :: sampling
       !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
       real(wp), intent(inout), contiguous :: force(:, :)
+      !> Number of the last sample that was written.
+      integer, intent(out) :: last_sample
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
       type(impact_lanes_type), pointer :: impacts
@@ -175,7 +177,7 @@ contains
          call set_lane(impacts, i, sets(min(i, size(sets))), step)
       end do
       call set_series(impacts%shell)
-      call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force)
+      call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, last_sample)
       do i = 1, size(sets)
          outcomes(i)%status = get_lane_status(impacts, i, sets(i), sampling)
          if (outcomes(i)%status /= set_is_fine) cycle

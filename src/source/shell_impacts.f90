@@ -65,7 +65,7 @@ module thud_shell_impacts
 contains
 
    !> Impacts from first touch to release, and their forces.
-   subroutine solve_impacts(impacts, n_sample, substeps, force)
+   subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
       !> Samples of the record.
@@ -74,10 +74,13 @@ contains
       integer, intent(in) :: substeps
       !> Elastic forces, then floor forces, N, up to the last contact: [2 lane_count, n_sample].
       real(wp), intent(inout) :: force(2*lane_count, n_sample)
+      !> Number of the last sample that was written.
+      integer, intent(out) :: last_sample
       real(wp), dimension(lane_count) :: start, last, length
-      integer :: n_step
+      integer :: n_step, last_step
 
       n_step = (n_sample - 1)*substeps
+      last_step = 0
       impacts%state%deflection = 0.0_wp
       impacts%state%velocity = impacts%impact_velocity
       impacts%state%impulse = 0.0_wp
@@ -90,22 +93,23 @@ contains
       impacts%shell%weight = impacts%compression_weight
 
       start = 0.0_wp
-      call march(impacts, .true., start, last, n_step, substeps, force)
+      call march(impacts, .true., start, last, n_step, substeps, force, last_step)
       call locate(impacts, .true., last < never .and. .not. impacts%left, length)
       start = merge(last + 1, never, last < never .and. .not. impacts%left)
       call turn(impacts, start < never, length)
-      call march(impacts, .false., start, last, n_step, substeps, force)
+      call march(impacts, .false., start, last, n_step, substeps, force, last_step)
       impacts%released = last < never .and. .not. impacts%left
       call locate(impacts, .false., impacts%released, length)
       call finish_step(impacts, impacts%released, length)
       impacts%contact = last + length
+      last_sample = last_step/substeps + 1
       impacts%peak_floor_force = max(impacts%peak_force, impacts%peak_floor_force)
       ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
 
    !> Marches until every lane has come to the end of its phase, or to that of the record.
-   subroutine march(impacts, compressing, start, last, n_step, substeps, force)
+   subroutine march(impacts, compressing, start, last, n_step, substeps, force, last_step)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
@@ -120,6 +124,8 @@ contains
       integer, intent(in) :: substeps
       !> Forces, N: [2 lane_count, n_sample].
       real(wp), intent(inout) :: force(2*lane_count, *)
+      !> Last step of any lane; unchanged where none began.
+      integer, intent(inout) :: last_step
       real(wp) :: latest
       integer :: n, first
       logical :: done
@@ -142,6 +148,7 @@ contains
          else
             call settle(impacts, impacts%next%deflection, real(n, wp), start, last, done)
          end if
+         last_step = n
          if (done) exit
       end do
       where (.not. start < never) last = never

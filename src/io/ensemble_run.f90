@@ -1,0 +1,279 @@
+!> An ensemble from sets to levels and verdicts: blocks of drops, each with its levels while its forces
+!> are in cache, blocks shared out among threads.
+!>
+!> Every number of a set comes from its own lane of matrices and vectors of fixed shape: it does not
+!> depend on the number of threads, on the other sets or on the place among them.
+module thud_ensemble_run
+   use thud_aligned, only: get_aligned_start, line_length
+   use thud_band, only: band_type, get_octaves, octave_count
+   use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
+      new_band_projection
+   use thud_constants, only: reference_force, reference_time
+   use thud_ensemble, only: block_size, get_set_order, set_outcome_type, set_type, solve_block
+   use thud_error, only: error_type
+   use thud_kinds, only: wp
+   use thud_power, only: not_a_number
+   use thud_sampling, only: check_sampling, get_sample_count, sampling_type
+   use thud_set_status, only: set_is_fine
+   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
+      get_source_limits, source_limits_type
+   implicit none (type, external)
+   private
+
+   public :: force_count, new_projections, projections_type, solve_ensemble, verdict_type
+
+   !> Kinds of force: elastic, on the floor.
+   integer, parameter :: force_count = 2
+
+   !> Matrices of the levels, one per window length, made when first needed.
+   type :: projections_type
+      !> Samples per second, Hz.
+      real(wp) :: sample_rate = 0.0_wp
+      !> The bands, octaves first: [n_band].
+      type(band_type), allocatable :: bands(:)
+      !> The matrices: [n_window].
+      type(band_projection_type), allocatable :: window(:)
+   end type projections_type
+
+   !> Levels and verdict of a set, for each kind of force.
+   type :: verdict_type
+      !> The source conforms: [force_count].
+      logical :: conforms(force_count) = .false.
+   end type verdict_type
+
+   !> Arrays of one thread.
+   type :: room_type
+      !> Room for the forces: [2 block_size n_row + line_length].
+      real(wp), allocatable :: force(:)
+      !> Room for folded forces: [2 block_size n_row].
+      real(wp), allocatable :: folded(:)
+      !> Criteria of the standards, one set's values at a time.
+      type(criterion_type) :: criteria(criterion_count)
+   end type room_type
+
+contains
+
+   !> No matrices yet.
+   pure function new_projections(sample_rate, bands, n_sample) result(projections)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> The bands besides the octaves: [n_more].
+      type(band_type), intent(in) :: bands(:)
+      !> Samples of the longest record.
+      integer, intent(in) :: n_sample
+      !> Room for them.
+      type(projections_type) :: projections
+
+      projections%sample_rate = sample_rate
+      allocate (projections%bands(octave_count + size(bands)))
+      projections%bands(:octave_count) = get_octaves()
+      projections%bands(octave_count + 1:) = bands
+      allocate (projections%window(get_window_class(n_sample)))
+   end function new_projections
+
+   !> Outcomes, levels and verdicts of all sets.
+   subroutine solve_ensemble(sets, sampling, source, threads, projections, outcomes, levels, verdicts, forces, error)
+      !> The sets: [n_set].
+      type(set_type), intent(in) :: sets(:)
+      !> Sampling of all.
+      type(sampling_type), intent(in) :: sampling
+      !> Source whose limits apply.
+      character(len=*), intent(in) :: source
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Matrices of the levels for this sampling rate.
+      type(projections_type), intent(inout) :: projections
+      !> The outcomes: [n_set].
+      type(set_outcome_type), intent(out) :: outcomes(:)
+      !> Force exposure levels, dB, NaN without outcome: [n_band, force_count, n_set].
+      real(wp), intent(out) :: levels(:, :, :)
+      !> The verdicts: [n_set].
+      type(verdict_type), intent(out) :: verdicts(:)
+      !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
+      real(wp), intent(out) :: forces(:, :, :)
+      !> The sampling cannot be used or the source is not known.
+      type(error_type), allocatable, intent(out) :: error
+      type(source_limits_type) :: limits
+      integer, allocatable :: order(:)
+
+      levels = not_a_number
+      forces = not_a_number
+      call check_sampling(sampling, error)
+      if (.not. allocated(error)) call get_source_limits(source, limits, error)
+      if (allocated(error)) return
+      call get_set_order(sets, outcomes%status, order)
+      !$omp parallel num_threads(threads)
+      call run_blocks()
+      !$omp end parallel
+
+   contains
+
+      !> The blocks of one thread, in its own room.
+      subroutine run_blocks()
+         type(room_type) :: room
+         integer :: block
+
+         call set_room(room, limits, get_class_window(size(projections%window)))
+         !$omp do schedule(dynamic)
+         do block = 1, size(order), block_size
+            call run_block(room, order(block:min(block + block_size - 1, size(order))))
+         end do
+         !$omp end do
+      end subroutine run_blocks
+
+      !> One block, from its sets to its verdicts.
+      subroutine run_block(room, members)
+         !> Arrays of the thread.
+         type(room_type), intent(inout) :: room
+         !> Numbers of the sets: [n_member].
+         integer, intent(in) :: members(:)
+         type(set_outcome_type) :: found(size(members))
+         real(wp) :: found_levels(size(levels, 1), force_count, size(members))
+         logical :: met(force_count, size(members))
+         integer :: i
+
+         call solve_room(room, sets(members), sampling, projections, found, found_levels, met)
+         do i = 1, size(members)
+            outcomes(members(i)) = found(i)
+            levels(:, :, members(i)) = found_levels(:, :, i)
+            verdicts(members(i))%conforms = met(:, i)
+            if (size(forces) > 0 .and. found(i)%status == set_is_fine) call copy_forces(room, i, forces(:, :, members(i)))
+         end do
+      end subroutine run_block
+
+   end subroutine solve_ensemble
+
+   !> Arrays of a thread.
+   subroutine set_room(room, limits, n_row)
+      !> The arrays.
+      type(room_type), intent(out) :: room
+      !> Limits of the source.
+      type(source_limits_type), intent(in) :: limits
+      !> Samples of the longest window.
+      integer, intent(in) :: n_row
+      real(wp) :: nothing(octave_count)
+
+      allocate (room%force(force_count*block_size*n_row + line_length), source=0.0_wp)
+      allocate (room%folded(force_count*block_size*n_row), source=0.0_wp)
+      nothing = 0.0_wp
+      room%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
+   end subroutine set_room
+
+   !> Outcomes, levels and verdicts of one block.
+   subroutine solve_room(room, sets, sampling, projections, outcomes, levels, met)
+      !> Arrays of the thread.
+      type(room_type), intent(inout), target :: room
+      !> The sets: [n_set].
+      type(set_type), intent(in) :: sets(:)
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> Matrices of the levels.
+      type(projections_type), intent(inout) :: projections
+      !> The outcomes: [n_set].
+      type(set_outcome_type), intent(out) :: outcomes(:)
+      !> Levels, dB: [n_band, force_count, n_set].
+      real(wp), intent(out) :: levels(:, :, :)
+      !> The source conforms: [force_count, n_set].
+      logical, intent(out) :: met(:, :)
+      real(wp), pointer, contiguous :: force(:, :)
+      real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
+      integer :: class(size(sets)), i, j, row, last_sample, window
+
+      force => get_force(room)
+      call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
+      force(:, last_sample + 1:) = 0.0_wp
+      levels = not_a_number
+      met = .false.
+      class = 0
+      do i = 1, size(sets)
+         if (outcomes(i)%status == set_is_fine) &
+            class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
+      end do
+      ! The window is the set's own, so that its levels do not depend on its neighbours.
+      do window = minval(class, mask=class > 0), maxval(class)
+         if (.not. any(class == window)) cycle
+         call require_window(projections, window)
+         call get_band_energies(projections%window(window), force_count*block_size, force, room%folded, energy, square_sum)
+         do i = 1, size(sets)
+            if (class(i) /= window) cycle
+            do j = 1, force_count
+               row = i + (j - 1)*block_size
+               levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
+                  /(reference_force**2*reference_time))
+               met(j, i) = is_conforming(room%criteria, sets(i), outcomes(i), levels(:, j, i), force(row, :), sampling)
+            end do
+         end do
+      end do
+   end subroutine solve_room
+
+   !> The forces of the block in a room: [force_count block_size, n_row].
+   function get_force(room) result(force)
+      !> Arrays of the thread.
+      type(room_type), intent(in), target :: room
+      !> Elastic forces, then floor forces, N.
+      real(wp), pointer, contiguous :: force(:, :)
+      integer :: first
+
+      first = get_aligned_start(room%force)
+      force(1:force_count*block_size, 1:size(room%folded)/(force_count*block_size)) => &
+         room%force(first:first + size(room%folded) - 1)
+   end function get_force
+
+   !> Makes the matrices of a window unless they are there.
+   subroutine require_window(projections, window)
+      !> The matrices.
+      type(projections_type), intent(inout) :: projections
+      !> Number of the window.
+      integer, intent(in) :: window
+
+      !$omp critical (thud_projections)
+      if (projections%window(window)%n_sample == 0) call new_band_projection(get_class_window(window), &
+         projections%sample_rate, projections%bands, projections%window(window))
+      !$omp end critical (thud_projections)
+   end subroutine require_window
+
+   !> Whether a set meets all criteria. Peaks are counted last: that takes longer than all the rest.
+   function is_conforming(criteria, set, outcome, levels, force, sampling) result(met)
+      !> The criteria; their values are overwritten: [criterion_count].
+      type(criterion_type), intent(inout) :: criteria(:)
+      !> The set.
+      type(set_type), intent(in) :: set
+      !> Its outcome.
+      type(set_outcome_type), intent(in) :: outcome
+      !> Levels, dB, octaves first: [n_band].
+      real(wp), intent(in) :: levels(:)
+      !> The force, N: [n_row].
+      real(wp), intent(in) :: force(:)
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> They are met.
+      logical :: met
+      integer :: peaks
+
+      criteria%value = [levels(:octave_count), outcome%contact_time, outcome%restitution, 1.0_wp, set%ball%mass, &
+         set%drop%height]
+      met = all(conforms(criteria))
+      if (.not. met) return
+      peaks = get_peak_count(force(:get_sample_count(sampling)), sampling%sample_rate)
+      criteria(octave_count + 3)%value = real(peaks, wp)
+      met = all(conforms(criteria))
+   end function is_conforming
+
+   !> Copies the forces of one set.
+   subroutine copy_forces(room, i, forces)
+      !> Arrays of the thread.
+      type(room_type), intent(in), target :: room
+      !> Number of the set in the block.
+      integer, intent(in) :: i
+      !> Its forces, N: [n_sample, force_count].
+      real(wp), intent(out) :: forces(:, :)
+      real(wp), pointer, contiguous :: force(:, :)
+      integer :: j
+
+      force => get_force(room)
+      do j = 1, force_count
+         forces(:, j) = force(i + (j - 1)*block_size, :size(forces, 1))
+      end do
+   end subroutine copy_forces
+
+end module thud_ensemble_run

@@ -1,0 +1,283 @@
+!> Band energies of many records at once, by two matrix products.
+!>
+!> The energy of a record f in a band is f'Qf with the sinc kernel Q of the band (see
+!> `thud_force_exposure`). All bands lie below one frequency W, and the kernel of everything below W
+!> has few eigenvectors with eigenvalues that matter: about 2 W T for records of the length T, the
+!> discrete prolate spheroidal sequences (Slepian 1978). They commute with a tridiagonal matrix, which
+!> gives them quickly and without cancellation. A record is projected on them once for all bands; the
+!> spectrum of the projection at Gauss-Legendre nodes gives the energies. The sequences are
+!> symmetric or antisymmetric, so records are folded first, which halves the work.
+!>
+!> What the projection drops changes the root of a band's energy by at most sqrt(dropped) times the
+!> norm of the record, see `dropped`; the quadrature errs by less than `quadrature_error`.
+module thud_band_projection
+   use thud_band, only: band_type
+   use thud_blas_threads, only: use_one_blas_thread
+   use thud_constants, only: pi
+   use thud_kinds, only: wp
+   use thud_lapack, only: dgemm, dstevr
+   use thud_legendre, only: get_gauss_legendre
+   implicit none (type, external)
+   private
+
+   public :: band_projection_type, get_band_energies, get_class_window, get_window_class, new_band_projection
+
+   !> Energy of the sequences that are left out, all bands together, over that of white noise in them.
+   real(wp), parameter :: dropped = 1.0e-22_wp
+
+   !> Error of a quadrature over a band, relative to the largest value of its integrand.
+   real(wp), parameter :: quadrature_error = 1.0e-17_wp
+
+   !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
+   integer, parameter :: margin = 32
+
+   !> Window lengths per doubling: a window is at most 1/11 longer than the record needs.
+   integer, parameter :: windows_per_octave = 8
+
+   !> Shortest window, samples.
+   integer, parameter :: shortest_window = 16
+
+   !> Matrices for records of one length, one sampling rate and one choice of bands.
+   type :: band_projection_type
+      !> Samples of a record, even.
+      integer :: n_sample = 0
+      !> First halves of the symmetric sequences: [n_sample/2, n_even].
+      real(wp), allocatable :: even(:, :)
+      !> First halves of the antisymmetric sequences: [n_sample/2, n_odd].
+      real(wp), allocatable :: odd(:, :)
+      !> Spectra of the symmetric sequences at the nodes, times the root of the weight: [n_even, n_node].
+      real(wp), allocatable :: cosine(:, :)
+      !> Spectra of the antisymmetric sequences, likewise: [n_odd, n_node].
+      real(wp), allocatable :: sine(:, :)
+      !> Number of nodes up to the end of each band: [n_band].
+      integer, allocatable :: last_node(:)
+   end type band_projection_type
+
+contains
+
+   !> Number of the shortest window that holds so many samples.
+   elemental function get_window_class(n_sample) result(class)
+      !> Samples of the record.
+      integer, intent(in) :: n_sample
+      !> Number of the window, from 1.
+      integer :: class
+
+      class = 1
+      do while (get_class_window(class) < n_sample)
+         class = class + 1
+      end do
+   end function get_window_class
+
+   !> Length of a window.
+   elemental function get_class_window(class) result(n_sample)
+      !> Number of the window, from 1.
+      integer, intent(in) :: class
+      !> Samples, even.
+      integer :: n_sample
+
+      n_sample = 2*nint(shortest_window/2*2.0_wp**(real(class - 1, wp)/windows_per_octave))
+   end function get_class_window
+
+   !> Matrices of a length, a rate and bands.
+   subroutine new_band_projection(n_sample, sample_rate, bands, projection)
+      !> Samples of the records, even.
+      integer, intent(in) :: n_sample
+      !> Samples per second, Hz; at least twice the highest edge.
+      real(wp), intent(in) :: sample_rate
+      !> The bands: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> The matrices.
+      type(band_projection_type), intent(out) :: projection
+      real(wp), allocatable :: node(:), root_weight(:), angle(:, :)
+      integer :: i
+
+      call use_one_blas_thread()
+      projection%n_sample = n_sample
+      call set_sequences(projection, maxval(bands%upper)/sample_rate)
+      call get_nodes(bands, real(n_sample, wp)/sample_rate, node, root_weight, projection%last_node)
+      ! Angles from the middle of the record; each half of a sequence stands for both.
+      allocate (angle(n_sample/2, size(node)))
+      do i = 1, n_sample/2
+         angle(i, :) = 2*pi/sample_rate*(i - (n_sample + 1)/2.0_wp)*node
+      end do
+      root_weight = 2*root_weight/sample_rate
+      call get_spectra(projection%even, cos(angle), root_weight, projection%cosine)
+      call get_spectra(projection%odd, sin(angle), root_weight, projection%sine)
+      call drop_sequences(projection%even, projection%cosine)
+      call drop_sequences(projection%odd, projection%sine)
+   end subroutine new_band_projection
+
+   !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
+   subroutine set_sequences(projection, half_width)
+      !> The projection.
+      type(band_projection_type), intent(inout) :: projection
+      !> W over the sampling rate.
+      real(wp), intent(in) :: half_width
+      real(wp), dimension(projection%n_sample) :: diagonal, beside, values
+      real(wp) :: work(20*projection%n_sample)
+      real(wp), allocatable :: vectors(:, :)
+      integer :: support(2*projection%n_sample), whole_work(10*projection%n_sample)
+      integer :: i, n, rank, found, status
+
+      n = projection%n_sample
+      rank = min(n, int(2*n*half_width) + margin)
+      diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
+      beside = [(i*(n - i)/2.0_wp, i=1, n)]
+      allocate (vectors(n, rank))
+      call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, found, values, vectors, n, &
+         support, work, size(work), whole_work, size(whole_work), status)
+      ! The largest value belongs to the first, symmetric sequence; then they take turns.
+      vectors = vectors(:, rank:1:-1)
+      projection%even = (vectors(:n/2, 1::2) + vectors(n:n/2 + 1:-1, 1::2))/2
+      projection%odd = (vectors(:n/2, 2::2) - vectors(n:n/2 + 1:-1, 2::2))/2
+   end subroutine set_sequences
+
+   !> Nodes of the quadrature over each band.
+   subroutine get_nodes(bands, duration, node, root_weight, last_node)
+      !> The bands: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> Length of the record, s.
+      real(wp), intent(in) :: duration
+      !> Frequencies, Hz: [n_node].
+      real(wp), allocatable, intent(out) :: node(:)
+      !> Roots of the weights of |F|**2, both signs of the frequency together: [n_node].
+      real(wp), allocatable, intent(out) :: root_weight(:)
+      !> Number of nodes up to the end of each band: [n_band].
+      integer, allocatable, intent(out) :: last_node(:)
+      integer :: count(size(bands)), i
+
+      count = get_node_count(pi*(bands%upper - bands%lower)*duration)
+      last_node = [(sum(count(:i)), i=1, size(bands))]
+      allocate (node(sum(count)), root_weight(sum(count)))
+      do i = 1, size(bands)
+         associate (width => bands(i)%upper - bands(i)%lower, middle => (bands(i)%upper + bands(i)%lower)/2, &
+            first => last_node(i) - count(i) + 1, last => last_node(i))
+            call get_gauss_legendre(node(first:last), root_weight(first:last))
+            node(first:last) = middle + width/2*node(first:last)
+            root_weight(first:last) = sqrt(width*root_weight(first:last))
+         end associate
+      end do
+   end subroutine get_nodes
+
+   !> Gauss-Legendre nodes that integrate cos(a x + b) over [-1, 1] to `quadrature_error`: |F|**2 is a
+   !> sum of such functions. The remainder with N nodes is at most a**(2N) 2**(2N + 1) (N!)**4
+   !> / ((2N + 1) ((2N)!)**3).
+   elemental function get_node_count(a) result(count)
+      !> Largest angle a.
+      real(wp), intent(in) :: a
+      !> N.
+      integer :: count
+      real(wp) :: logarithm
+
+      count = 0
+      do
+         count = count + 1
+         logarithm = 2*count*log(a) + (2*count + 1)*log(2.0_wp) + 4*log_gamma(count + 1.0_wp) &
+            - log(2*count + 1.0_wp) - 3*log_gamma(2*count + 1.0_wp)
+         if (logarithm < log(quadrature_error)) exit
+      end do
+   end function get_node_count
+
+   !> Spectra of sequences at the nodes.
+   subroutine get_spectra(sequences, waves, weight, spectra)
+      !> Halves of the sequences: [n_half, n_sequence].
+      real(wp), intent(in) :: sequences(:, :)
+      !> Cosines or sines: [n_half, n_node].
+      real(wp), intent(in) :: waves(:, :)
+      !> Weights of the nodes: [n_node].
+      real(wp), intent(in) :: weight(:)
+      !> Weighted spectra: [n_sequence, n_node].
+      real(wp), allocatable, intent(out) :: spectra(:, :)
+      integer :: i
+
+      spectra = matmul(transpose(sequences), waves)
+      do i = 1, size(weight)
+         spectra(:, i) = weight(i)*spectra(:, i)
+      end do
+   end subroutine get_spectra
+
+   !> Leaves out the last sequences, as far as they hold no energy in the bands.
+   subroutine drop_sequences(sequences, spectra)
+      !> Halves of the sequences: [n_half, n_sequence].
+      real(wp), allocatable, intent(inout) :: sequences(:, :)
+      !> Their weighted spectra: [n_sequence, n_node].
+      real(wp), allocatable, intent(inout) :: spectra(:, :)
+      real(wp) :: energy(size(spectra, 1))
+      integer :: count
+
+      energy = sum(spectra**2, dim=2)
+      count = findloc(energy > dropped*maxval(energy), .true., dim=1, back=.true.)
+      sequences = sequences(:, :count)
+      spectra = spectra(:count, :)
+   end subroutine drop_sequences
+
+   !> Energies of records in bands.
+   subroutine get_band_energies(projection, n_record, record, folded, energy, square_sum)
+      !> Matrices for the length of the records.
+      type(band_projection_type), intent(in) :: projection
+      !> Number of records.
+      integer, intent(in) :: n_record
+      !> The records, N: [n_record, n_sample].
+      real(wp), intent(in) :: record(n_record, *)
+      !> Room for as much: [n_record, n_sample].
+      real(wp), intent(inout) :: folded(n_record, *)
+      !> Energies, N^2 s: [n_record, n_band].
+      real(wp), intent(out) :: energy(n_record, *)
+      !> Sums of the squared samples, N^2: [n_record].
+      real(wp), intent(out) :: square_sum(n_record)
+      real(wp) :: spectrum(n_record, size(projection%cosine, 2))
+      integer :: half, i, band, first
+
+      half = projection%n_sample/2
+      square_sum = 0.0_wp
+      do i = 1, half
+         associate (front => record(:, i), back => record(:, 2*half + 1 - i))
+            folded(:, i) = front + back
+            folded(:, half + i) = front - back
+            square_sum = square_sum + front**2 + back**2
+         end associate
+      end do
+      energy(:, :size(projection%last_node)) = 0.0_wp
+      call project(n_record, folded, projection%even, projection%cosine, spectrum)
+      call add_squares()
+      call project(n_record, folded(1, half + 1), projection%odd, projection%sine, spectrum)
+      call add_squares()
+
+   contains
+
+      !> Adds the squared spectra of each band.
+      subroutine add_squares()
+         first = 1
+         do band = 1, size(projection%last_node)
+            do i = first, projection%last_node(band)
+               energy(:, band) = energy(:, band) + spectrum(:, i)**2
+            end do
+            first = projection%last_node(band) + 1
+         end do
+      end subroutine add_squares
+
+   end subroutine get_band_energies
+
+   !> Spectra of folded records.
+   subroutine project(n_record, folded, sequences, spectra, spectrum)
+      !> Number of records.
+      integer, intent(in) :: n_record
+      !> Folded records: [n_record, n_half].
+      real(wp), intent(in) :: folded(n_record, *)
+      !> Halves of the sequences: [n_half, n_sequence].
+      real(wp), intent(in) :: sequences(:, :)
+      !> Weighted spectra of the sequences: [n_sequence, n_node].
+      real(wp), intent(in) :: spectra(:, :)
+      !> Weighted spectra of the records: [n_record, n_node].
+      real(wp), intent(inout) :: spectrum(n_record, *)
+      real(wp) :: coefficient(n_record, size(sequences, 2))
+
+      associate (half => size(sequences, 1), rank => size(sequences, 2))
+         call dgemm('N', 'N', n_record, rank, half, 1.0_wp, folded, n_record, sequences, half, 0.0_wp, coefficient, &
+            n_record)
+         call dgemm('N', 'N', n_record, size(spectra, 2), rank, 1.0_wp, coefficient, n_record, spectra, rank, 0.0_wp, &
+            spectrum, n_record)
+      end associate
+   end subroutine project
+
+end module thud_band_projection
