@@ -138,36 +138,44 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
     sampling = (_real("sample_rate", sample_rate), _real("duration", duration))
     steps = _whole("substeps", substeps, 10_000)
     (n_sample,) = call(ensemble_door.ensemble_size, *sampling, steps)
-    numbers = np.ascontiguousarray(np.stack([columns[key] for key in _KEYS], axis=1))
+    # f2py knows no empty arrays; a set of zeros, which is out of range, stands in for none.
     n_set = len(flux)
+    numbers = np.zeros((max(n_set, 1), len(_KEYS)))
+    numbers[:n_set] = np.stack([columns[key] for key in _KEYS], axis=1)
     with _ONE_AT_A_TIME:
         status, scalars, levels, met, force = call(
             ensemble_door.solve_sets,
             numbers.T,
-            flux + 1,
+            np.resize(flux + 1, len(numbers)),
             *sampling,
             steps,
             str(source).encode("ascii", "replace"),
             _threads(threads),
             more,
-            n_set if forces else 0,
+            len(numbers) if forces else 0,
             n_sample if forces else 0,
         )
-    levels = np.moveaxis(levels, 2, 0)
+    levels = np.moveaxis(levels, 2, 0)[:n_set]
     wanted = levels[:, octaves:] if more else levels
+    contact_time, peak_force, peak_floor_force, max_deflection, restitution, impulse = scalars
     return Ensemble(
         columns | {_FLUX: np.array(_FLUX_CHOICES)[flux]},
-        status,
-        *scalars,
-        wanted[:, :, 0],
-        wanted[:, :, 1],
-        levels[:, :octaves, 0],
-        levels[:, :octaves, 1],
-        met[0] != 0,
-        met[1] != 0,
-        force[:, 0].T if forces else None,
-        force[:, 1].T if forces else None,
-        sampling[0],
+        status[:n_set],
+        contact_time[:n_set],
+        peak_force[:n_set],
+        peak_floor_force[:n_set],
+        max_deflection[:n_set],
+        restitution[:n_set],
+        impulse[:n_set],
+        elastic_levels=wanted[:, :, 0],
+        floor_levels=wanted[:, :, 1],
+        elastic_octaves=levels[:, :octaves, 0],
+        floor_octaves=levels[:, :octaves, 1],
+        conforms=met[0, :n_set] != 0,
+        floor_conforms=met[1, :n_set] != 0,
+        elastic_force=force[:, 0, :n_set].T if forces else None,
+        floor_force=force[:, 1, :n_set].T if forces else None,
+        sample_rate=sampling[0],
     )
 
 

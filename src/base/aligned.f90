@@ -16,8 +16,8 @@ contains
 
    !> First element of a buffer at the beginning of a line; `line_length` elements may be skipped.
    function get_aligned_start(buffer) result(first)
-      !> The buffer: [n].
-      real(wp), intent(in), target :: buffer(*)
+      !> The beginning of the buffer: [line_length].
+      real(wp), intent(in), target :: buffer(line_length)
       !> Index of the element.
       integer :: first
       integer(c_intptr_t) :: address

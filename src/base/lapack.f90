@@ -68,7 +68,8 @@ module thud_lapack
          integer, intent(in) :: n, il, iu, ldz, lwork, liwork
          real(wp), intent(in) :: vl, vu, abstol
          real(wp), intent(inout) :: d(*), e(*)
-         integer, intent(out) :: m, isuppz(*), iwork(*), info
+         integer, intent(out) :: m, info
+         integer, intent(out) :: isuppz(*), iwork(*)
          real(wp), intent(out) :: w(*), work(*)
          real(wp), intent(inout) :: z(ldz, *)
       end subroutine dstevr

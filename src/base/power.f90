@@ -26,12 +26,15 @@ module thud_power
    !> Natural logarithm of 2.
    real(wp), parameter :: ln2 = log(2.0_wp)
 
-   !> Coefficients of the series of the logarithm in s**2, 2/(ln 2 (2j + 1)): [0:9].
-   real(wp), parameter :: a(0:9) = 2/(ln2*[1.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 9.0_wp, 11.0_wp, 13.0_wp, 15.0_wp, &
+   !> Highest powers of the series of the logarithm, in s**2, and of the power of 2.
+   integer, parameter :: log_degree = 9, exp_degree = 13
+
+   !> Coefficients of the series of the logarithm in s**2, 2/(ln 2 (2j + 1)): [0:log_degree].
+   real(wp), parameter :: a(0:log_degree) = 2/(ln2*[1.0_wp, 3.0_wp, 5.0_wp, 7.0_wp, 9.0_wp, 11.0_wp, 13.0_wp, 15.0_wp, &
       17.0_wp, 19.0_wp])
 
-   !> Coefficients of the series of the power of 2, (ln 2)**j/j!: [0:13].
-   real(wp), parameter :: b(0:13) = [1.0_wp, ln2, ln2**2/2, ln2**3/6, ln2**4/24, ln2**5/120, ln2**6/720, &
+   !> Coefficients of the series of the power of 2, (ln 2)**j/j!: [0:exp_degree].
+   real(wp), parameter :: b(0:exp_degree) = [1.0_wp, ln2, ln2**2/2, ln2**3/6, ln2**4/24, ln2**5/120, ln2**6/720, &
       ln2**7/5040, ln2**8/40320, ln2**9/362880, ln2**10/3628800, ln2**11/39916800, ln2**12/479001600, &
       ln2**13/6227020800.0_wp]
 

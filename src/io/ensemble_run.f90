@@ -177,7 +177,8 @@ contains
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
-      integer :: class(size(sets)), i, j, row, last_sample, window
+      integer :: class(size(sets))
+      integer :: i, j, row, last_sample, window
 
       force => get_force(room)
       call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
@@ -186,8 +187,8 @@ contains
       met = .false.
       class = 0
       do i = 1, size(sets)
-         if (outcomes(i)%status == set_is_fine) &
-            class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
+         if (outcomes(i)%status /= set_is_fine) cycle
+         class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)

@@ -56,26 +56,26 @@ module thud_band_projection
 contains
 
    !> Number of the shortest window that holds so many samples.
-   elemental function get_window_class(n_sample) result(class)
+   elemental function get_window_class(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
       !> Number of the window, from 1.
-      integer :: class
+      integer :: window
 
-      class = 1
-      do while (get_class_window(class) < n_sample)
-         class = class + 1
+      window = 1
+      do while (get_class_window(window) < n_sample)
+         window = window + 1
       end do
    end function get_window_class
 
    !> Length of a window.
-   elemental function get_class_window(class) result(n_sample)
+   elemental function get_class_window(window) result(n_sample)
       !> Number of the window, from 1.
-      integer, intent(in) :: class
+      integer, intent(in) :: window
       !> Samples, even.
       integer :: n_sample
 
-      n_sample = 2*nint(shortest_window/2*2.0_wp**(real(class - 1, wp)/windows_per_octave))
+      n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
    end function get_class_window
 
    !> Matrices of a length, a rate and bands.
@@ -144,7 +144,8 @@ contains
       real(wp), allocatable, intent(out) :: root_weight(:)
       !> Number of nodes up to the end of each band: [n_band].
       integer, allocatable, intent(out) :: last_node(:)
-      integer :: count(size(bands)), i
+      integer :: count(size(bands))
+      integer :: i
 
       count = get_node_count(pi*(bands%upper - bands%lower)*duration)
       last_node = [(sum(count(:i)), i=1, size(bands))]

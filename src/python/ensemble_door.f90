@@ -17,7 +17,7 @@ module thud_ensemble_door
    public :: ensemble_keys, ensemble_size, solve_sets, status_text
 
    !> Matrices of the levels, kept from call to call; Python lets one call in at a time.
-   type(projections_type), save :: projections
+   type(projections_type) :: projections
 
 contains
 
@@ -161,7 +161,8 @@ contains
       thirds = get_thirds()
       wanted = new_projections(sampling%sample_rate, thirds(:n_more), get_sample_count(sampling))
       if (allocated(projections%window)) then
-         if (abs(wanted%sample_rate - projections%sample_rate) <= 0.0_wp .and. size(wanted%bands) == size(projections%bands) &
+         if (abs(wanted%sample_rate - projections%sample_rate) <= 0.0_wp &
+            .and. size(wanted%bands) == size(projections%bands) &
             .and. size(wanted%window) == size(projections%window)) return
       end if
       projections = wanted

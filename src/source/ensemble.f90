@@ -88,7 +88,9 @@ contains
       integer, parameter :: classes = 64
       !> Most doublings that are told apart.
       integer, parameter :: most = 64*classes
-      integer :: first(0:most + 1), class(size(sets)), i
+      integer :: first(0:most + 1)
+      integer :: class(size(sets))
+      integer :: i
       type(set_type), target :: any_set
       type(field_type) :: fields(parameter_count)
 

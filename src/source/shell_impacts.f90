@@ -93,11 +93,11 @@ contains
       impacts%shell%weight = impacts%compression_weight
 
       start = 0.0_wp
-      call march(impacts, .true., start, last, n_step, substeps, force, last_step)
+      call march(impacts, .true., start, last, n_step, substeps, n_sample, force, last_step)
       call locate(impacts, .true., last < never .and. .not. impacts%left, length)
       start = merge(last + 1, never, last < never .and. .not. impacts%left)
       call turn(impacts, start < never, length)
-      call march(impacts, .false., start, last, n_step, substeps, force, last_step)
+      call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
       impacts%released = last < never .and. .not. impacts%left
       call locate(impacts, .false., impacts%released, length)
       call finish_step(impacts, impacts%released, length)
@@ -109,7 +109,7 @@ contains
    end subroutine solve_impacts
 
    !> Marches until every lane has come to the end of its phase, or to that of the record.
-   subroutine march(impacts, compressing, start, last, n_step, substeps, force, last_step)
+   subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
@@ -122,8 +122,10 @@ contains
       integer, intent(in) :: n_step
       !> Steps per sampling interval.
       integer, intent(in) :: substeps
+      !> Samples of the record.
+      integer, intent(in) :: n_sample
       !> Forces, N: [2 lane_count, n_sample].
-      real(wp), intent(inout) :: force(2*lane_count, *)
+      real(wp), intent(inout) :: force(2*lane_count, n_sample)
       !> Last step of any lane; unchanged where none began.
       integer, intent(inout) :: last_step
       real(wp) :: latest

@@ -1,0 +1,250 @@
+"""Ensembles: the same numbers as the single solver, whatever stands beside a set."""
+
+from __future__ import annotations
+
+import dataclasses
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import thud
+
+FLUX = ["momentum_balance", "retarding", "conservative", "none"]
+ARRAYS = [
+    field.name
+    for field in dataclasses.fields(thud.Ensemble)
+    if field.name not in {"parameters", "sample_rate", "elastic_force", "floor_force"}
+]
+
+
+def random_sets(count: int, seed: int) -> dict[str, np.ndarray]:
+    random = np.random.default_rng(seed)
+    radius = random.uniform(0.06, 0.15, count)
+    return {
+        "outer_radius": radius,
+        "wall_thickness": radius * random.uniform(0.15, 0.5, count),
+        "mass": random.uniform(1, 8, count),
+        "youngs_modulus": random.uniform(0.5e6, 5e6, count),
+        "poisson_ratio": random.uniform(0, 0.5, count),
+        "gauge_pressure": np.maximum(0, random.uniform(-3e4, 3e4, count)),
+        "ambient_pressure": random.uniform(0, 1.2e5, count),
+        "heat_capacity_ratio": random.uniform(1, 2, count),
+        "height": random.uniform(0.05, 2, count),
+        "gravity": random.uniform(1, 20, count),
+        "momentum_flux": np.resize(FLUX, count),
+    }
+
+
+def single(parameters: dict[str, np.ndarray], i: int, **options: object) -> thud.Impact:
+    one = {key: values[i] for key, values in parameters.items()}
+    flux = str(one.pop("momentum_flux"))
+    drop = thud.Drop(float(one.pop("height")), float(one.pop("gravity")))
+    ball = thud.Ball(**{key: float(value) for key, value in one.items()})
+    return thud.solve(ball, drop, momentum_flux=flux, **options)  # type: ignore[arg-type]
+
+
+def assert_same_bits(
+    one: thud.Ensemble, other: thud.Ensemble, order: np.ndarray | slice = slice(None)
+) -> None:
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(one, name)[order], getattr(other, name), name)
+
+
+def test_equals_the_single_solver() -> None:
+    parameters = random_sets(80, 1)
+    ensemble = thud.solve_many(parameters, forces=True, bands="third", duration=0.2)
+    assert not ensemble.status.any()
+    assert ensemble.elastic_force is not None
+    assert ensemble.floor_force is not None
+    for i in range(len(ensemble)):
+        impact = single(parameters, i, duration=0.2)
+        for force in ("elastic", "floor"):
+            expected = impact.force(force)
+            actual = getattr(ensemble, f"{force}_force")[i]
+            np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-10 * expected.max())
+            levels = impact.levels(force=force)
+            thirds = impact.levels("third", force=force)
+            np.testing.assert_allclose(getattr(ensemble, f"{force}_octaves")[i], levels, atol=1e-6)
+            np.testing.assert_allclose(getattr(ensemble, f"{force}_levels")[i], thirds, atol=1e-6)
+        for name in ("contact_time", "peak_force", "peak_floor_force", "max_deflection",
+                     "restitution", "impulse"):  # fmt: skip
+            assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
+        assert ensemble.conforms[i] == bool(impact.conformity())
+        assert ensemble.floor_conforms[i] == bool(impact.conformity(force="floor"))
+
+
+def test_fails_where_the_single_solver_fails() -> None:
+    heights = np.geomspace(0.1, 500, 60)
+    ensemble = thud.solve_many({"height": heights, "momentum_flux": np.resize(FLUX, 60)})
+    assert 0 < np.count_nonzero(ensemble.status) < 60
+    for height, flux, status in zip(heights, np.resize(FLUX, 60), ensemble.status, strict=True):
+        try:
+            thud.solve(drop=thud.Drop(float(height)), momentum_flux=str(flux))
+        except thud.NumericalError as error:
+            assert "closes the shell" in str(error)
+            assert status == 1
+        else:
+            assert status == 0
+
+
+def test_a_conforming_source_conforms() -> None:
+    # Limits that the shell model can meet are those of the tyre's lowest octave only; so the
+    # criteria are counted one by one against the verdict of the single solver.
+    random = np.random.default_rng(5)
+    count = 40
+    parameters = {"youngs_modulus": random.uniform(1.2e6, 2.2e6, count),
+                  "outer_radius": random.uniform(0.07, 0.11, count)}  # fmt: skip
+    ensemble = thud.solve_many(parameters, source="tyre")
+    for i in range(count):
+        ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
+        assert ensemble.conforms[i] == bool(thud.solve(ball).conformity("tyre"))
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_threads_and_order_change_no_bit(threads: int) -> None:
+    parameters = random_sets(301, 2)
+    parameters["height"][::17] = 500.0
+    parameters["mass"][5] = np.nan
+    reference = thud.solve_many(parameters, threads=1, duration=0.1)
+    assert_same_bits(reference, thud.solve_many(parameters, threads=threads, duration=0.1))
+    order = np.random.default_rng(3).permutation(301)
+    shuffled = {key: values[order] for key, values in parameters.items()}
+    found = thud.solve_many(shuffled, threads=threads, duration=0.1)
+    assert_same_bits(reference, found, order)
+    part = {key: values[order[:45]] for key, values in parameters.items()}
+    found = thud.solve_many(part, threads=threads, duration=0.1)
+    assert_same_bits(reference, found, order[:45])
+
+
+def test_invalid_sets_are_marked_and_leave_the_others() -> None:
+    parameters = random_sets(40, 4)
+    clean = thud.solve_many(parameters, threads=1)
+    broken = {key: values.copy() for key, values in parameters.items()}
+    broken["outer_radius"][3] = -1
+    broken["wall_thickness"][7] = 1
+    broken["height"][9] = 1e5
+    broken["youngs_modulus"][11] = 1e10
+    broken["mass"][13] = 500
+    broken["poisson_ratio"][15] = np.inf
+    ensemble = thud.solve_many(broken, threads=1)
+    bad = [3, 7, 9, 11, 13, 15]
+    reasons = ensemble.reasons()
+    assert [reasons[code] for code in ensemble.status[bad]] == [
+        "outer_radius lies outside its range",
+        "wall_thickness lies outside its range",
+        "the drop closes the shell",
+        "the steps are too coarse: substeps is too low",
+        "the contact outlasts the record: duration is too short",
+        "poisson_ratio lies outside its range",
+    ]
+    assert np.isnan(ensemble.contact_time[bad]).all()
+    assert np.isnan(ensemble.elastic_levels[bad]).all()
+    assert not ensemble.conforms[bad].any()
+    good = np.setdiff1d(np.arange(40), bad)
+    for name in ARRAYS:
+        np.testing.assert_array_equal(getattr(ensemble, name)[good], getattr(clean, name)[good])
+
+
+def test_forces_of_invalid_sets_are_nan() -> None:
+    ensemble = thud.solve_many({"height": [1.0, 900.0]}, forces=True)
+    assert ensemble.elastic_force is not None
+    assert np.isnan(ensemble.elastic_force[1]).all()
+    assert np.isfinite(ensemble.elastic_force[0]).all()
+    assert ensemble.elastic_force.shape == (2, 2205)
+
+
+def test_too_few_samples() -> None:
+    ensemble = thud.solve_many({"youngs_modulus": 7e10}, substeps=200)
+    assert list(ensemble.reasons().values()) == [
+        "the contact has too few samples: sample_rate is too low"
+    ]
+
+
+def test_an_empty_batch_is_empty() -> None:
+    ensemble = thud.solve_many({"height": []}, bands="third")
+    assert len(ensemble) == 0
+    assert ensemble.elastic_levels.shape == (0, 15)
+    assert ensemble.reasons() == {}
+
+
+def test_scalars_and_defaults() -> None:
+    ensemble = thud.solve_many({})
+    assert len(ensemble) == 1
+    assert ensemble.contact_time[0] == pytest.approx(thud.solve().contact_time, rel=1e-12)
+    assert set(ensemble.parameters) == set(random_sets(1, 0))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "options", "message"),
+    [
+        ({"radius": 1}, {}, "'radius' is not a known key; allowed: outer_radius, wall_thickness"),
+        ({"height": [1, 2], "mass": [1, 2, 3]}, {}, "do not fit each other: height (2,), mass"),
+        ({"height": [[1]]}, {}, "height has 2 dimensions"),
+        ({"height": [[1], [1, 2]]}, {}, "height is not an array"),
+        ({"height": ["one"]}, {}, "height is not an array of real numbers"),
+        ({"height": [1j]}, {}, "height is not an array of real numbers"),
+        ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, "height has masked entries"),
+        ({"momentum_flux": "some"}, {}, "momentum_flux = 'some' is not allowed; allowed: 'mom"),
+        ([1], {}, "parameters = [1] is not allowed"),
+        ({}, {"threads": 0}, "threads = 0 is not allowed; allowed: 1 to 1024"),
+        ({}, {"threads": 1.5}, "threads = 1.5 is not allowed"),
+        ({}, {"substeps": True}, "substeps = True is not allowed"),
+        ({}, {"bands": "fifth"}, "bands = 'fifth' is not known"),
+        ({}, {"sample_rate": 10}, "&sampling: sample_rate = 10.0"),
+        ({}, {"sample_rate": "44100"}, "sample_rate = '44100' is not a number"),
+        ({}, {"duration": 10**400}, "duration is a very large number"),
+        ({}, {"duration": 10.0, "sample_rate": 1e7}, "&sampling: duration = 10.0"),
+        ({}, {"source": "drum"}, "the source 'drum' is not known"),
+    ],
+)
+def test_bad_input_is_named(parameters: object, options: dict[str, object], message: str) -> None:
+    with pytest.raises(thud.InputError) as caught:
+        thud.solve_many(parameters, **options)  # type: ignore[arg-type]
+    assert message in str(caught.value)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.dictionaries(
+        st.sampled_from(sorted(random_sets(1, 0))),
+        st.one_of(
+            st.floats(),
+            st.integers(-(10**400), 10**400),
+            st.text(max_size=3),
+            st.lists(st.floats(), max_size=5),
+            st.none(),
+            st.lists(st.sampled_from(FLUX), max_size=3),
+        ),
+        max_size=4,
+    )
+)
+def test_any_input_gives_numbers_or_a_clear_error(parameters: dict[str, object]) -> None:
+    try:
+        ensemble = thud.solve_many(parameters, threads=1)  # type: ignore[arg-type]
+    except thud.InputError:
+        return
+    assert np.isfinite(ensemble.elastic_levels[ensemble.status == 0]).all()
+    assert np.isnan(ensemble.contact_time[ensemble.status != 0]).all()
+
+
+def test_a_streamed_run_keeps_its_memory() -> None:
+    # Twelve chunks take no more than two: nothing is left behind.
+    code = """
+import resource, sys
+import numpy as np, thud
+heights = np.linspace(0.5, 1.5, 20_000)
+for _ in range(2):
+    thud.solve_many({"height": heights}, duration=0.03)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+for _ in range(10):
+    thud.solve_many({"height": heights}, duration=0.03)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+    command = [sys.executable, "-c", code]
+    found = subprocess.run(command, check=True, capture_output=True, text=True)
+    # One chunk's results are 20 000 * (6 + 2 * 5 + 10) * 8 B = 4 MB.
+    assert int(found.stdout) < 8 * 1024
