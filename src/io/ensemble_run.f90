@@ -47,6 +47,8 @@ module thud_ensemble_run
       real(wp), allocatable :: force(:)
       !> Room for folded forces: [2 block_size n_row].
       real(wp), allocatable :: folded(:)
+      !> Number of the last sample that is not zero.
+      integer :: last_sample = 0
       !> Criteria of the standards, one set's values at a time.
       type(criterion_type) :: criteria(criterion_count)
    end type room_type
@@ -182,7 +184,6 @@ contains
 
       force => get_force(room)
       call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
-      force(:, last_sample + 1:) = 0.0_wp
       levels = not_a_number
       met = .false.
       class = 0
@@ -190,6 +191,8 @@ contains
          if (outcomes(i)%status /= set_is_fine) cycle
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
+      force(:, last_sample + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
+      room%last_sample = last_sample
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
@@ -201,7 +204,8 @@ contains
                row = i + (j - 1)*block_size
                levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
                   /(reference_force**2*reference_time))
-               met(j, i) = is_conforming(room%criteria, sets(i), outcomes(i), levels(:, j, i), force(row, :), sampling)
+               met(j, i) = is_conforming(room%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), row, &
+                  sampling)
             end do
          end do
       end do
@@ -234,7 +238,7 @@ contains
    end subroutine require_window
 
    !> Whether a set meets all criteria. Peaks are counted last: that takes longer than all the rest.
-   function is_conforming(criteria, set, outcome, levels, force, sampling) result(met)
+   function is_conforming(criteria, set, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
       !> The set.
@@ -243,20 +247,23 @@ contains
       type(set_outcome_type), intent(in) :: outcome
       !> Levels, dB, octaves first: [n_band].
       real(wp), intent(in) :: levels(:)
-      !> The force, N: [n_row].
-      real(wp), intent(in) :: force(:)
+      !> Forces, N, zero after that: [force_count block_size, n_sample].
+      real(wp), intent(in) :: force(:, :)
+      !> Row of the force of this set.
+      integer, intent(in) :: row
       !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> They are met.
       logical :: met
-      integer :: peaks
+      real(wp) :: record(get_sample_count(sampling))
 
       criteria%value = [levels(:octave_count), outcome%contact_time, outcome%restitution, 1.0_wp, set%ball%mass, &
          set%drop%height]
       met = all(conforms(criteria))
       if (.not. met) return
-      peaks = get_peak_count(force(:get_sample_count(sampling)), sampling%sample_rate)
-      criteria(octave_count + 3)%value = real(peaks, wp)
+      record = 0.0_wp
+      record(:size(force, 2)) = force(row, :)
+      criteria(octave_count + 3)%value = real(get_peak_count(record, sampling%sample_rate), wp)
       met = all(conforms(criteria))
    end function is_conforming
 
@@ -273,7 +280,8 @@ contains
 
       force => get_force(room)
       do j = 1, force_count
-         forces(:, j) = force(i + (j - 1)*block_size, :size(forces, 1))
+         forces(:, j) = 0.0_wp
+         forces(:room%last_sample, j) = force(i + (j - 1)*block_size, :room%last_sample)
       end do
    end subroutine copy_forces
 

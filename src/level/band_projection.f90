@@ -63,9 +63,10 @@ contains
       integer :: window
 
       window = 1
-      do while (get_class_window(window) < n_sample)
-         window = window + 1
-      end do
+      if (n_sample <= shortest_window) return
+      window = floor(windows_per_octave*log(real(n_sample, wp)/shortest_window)/log(2.0_wp)) + 1
+      ! Lengths are rounded: the next one may be it.
+      if (get_class_window(window) < n_sample) window = window + 1
    end function get_window_class
 
    !> Length of a window.
