@@ -74,7 +74,7 @@ contains
    end function new_projections
 
    !> Outcomes, levels and verdicts of all sets.
-   subroutine solve_ensemble(sets, sampling, source, threads, projections, outcomes, levels, verdicts, forces, error)
+   subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, outcomes, levels, verdicts, forces, error)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> Sampling of all.
@@ -83,6 +83,8 @@ contains
       character(len=*), intent(in) :: source
       !> Number of threads.
       integer, intent(in) :: threads
+      !> Levels and verdicts are wanted; without them they are NaN and not conforming.
+      logical, intent(in) :: judged
       !> Matrices of the levels for this sampling rate.
       type(projections_type), intent(inout) :: projections
       !> The outcomes: [n_set].
@@ -134,7 +136,7 @@ contains
          logical :: met(force_count, size(members))
          integer :: i
 
-         call solve_room(room, sets(members), sampling, projections, found, found_levels, met)
+         call solve_room(room, sets(members), sampling, judged, projections, found, found_levels, met)
          do i = 1, size(members)
             outcomes(members(i)) = found(i)
             levels(:, :, members(i)) = found_levels(:, :, i)
@@ -162,13 +164,15 @@ contains
    end subroutine set_room
 
    !> Outcomes, levels and verdicts of one block.
-   subroutine solve_room(room, sets, sampling, projections, outcomes, levels, met)
+   subroutine solve_room(room, sets, sampling, judged, projections, outcomes, levels, met)
       !> Arrays of the thread.
       type(room_type), intent(inout), target :: room
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> The sampling.
       type(sampling_type), intent(in) :: sampling
+      !> Levels and verdicts are wanted.
+      logical, intent(in) :: judged
       !> Matrices of the levels.
       type(projections_type), intent(inout) :: projections
       !> The outcomes: [n_set].
@@ -186,13 +190,14 @@ contains
       call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
       levels = not_a_number
       met = .false.
+      room%last_sample = last_sample
+      if (.not. judged) return
       class = 0
       do i = 1, size(sets)
          if (outcomes(i)%status /= set_is_fine) cycle
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
       force(:, last_sample + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
-      room%last_sample = last_sample
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle

@@ -84,8 +84,8 @@ contains
    end subroutine ensemble_size
 
    !> Outcomes of all sets; `ensemble_size` has checked the sampling.
-   subroutine solve_sets(parameters, flux, n_set, sample_rate, duration, substeps, source, threads, n_more, n_force, &
-      n_sample, set_status, scalars, levels, met, forces, status, message)
+   subroutine solve_sets(parameters, flux, n_set, sample_rate, duration, substeps, source, threads, judged, n_more, &
+      n_force, n_sample, set_status, scalars, levels, met, forces, status, message)
       !f2py threadsafe
       !f2py integer, intent(hide), depend(flux) :: n_set = len(flux)
       !> Number of sets.
@@ -104,6 +104,8 @@ contains
       character(len=*), intent(in) :: source
       !> Number of threads.
       integer, intent(in) :: threads
+      !> 0 where neither levels nor verdicts are wanted.
+      integer, intent(in) :: judged
       !> Bands besides the octaves: 15 thirds or none.
       integer, intent(in) :: n_more
       !> Sets whose forces are wanted: n_set or 0.
@@ -139,7 +141,8 @@ contains
             sets(i) = set_type(ball_type(p(1), p(2), p(3), p(4), p(5), p(6), p(7), p(8)), drop_type(p(9), p(10)), flux(i))
          end associate
       end do
-      call solve_ensemble(sets, sampling, source, threads, projections, outcomes, levels, verdicts, forces, error)
+      call solve_ensemble(sets, sampling, source, threads, judged /= 0, projections, outcomes, levels, verdicts, forces, &
+         error)
       do i = 1, n_set
          set_status(i) = outcomes(i)%status
          scalars(:, i) = [outcomes(i)%contact_time, outcomes(i)%peak_force, outcomes(i)%peak_floor_force, &

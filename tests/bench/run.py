@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
+from ensemble import bench_ensemble
 from finite_elements import bench_impact, bench_modes
 from scipy.integrate import solve_ivp
 from scipy.signal import ZoomFFT
@@ -155,6 +156,8 @@ def main() -> None:
         101,
     )
     row("levels, fft, five octaves", "NumPy rfft, 1 s", bins)
+    print()
+    bench_ensemble(scipy_drop)
     print()
     bench_modes(row, medians)
     print()

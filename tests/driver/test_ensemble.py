@@ -174,6 +174,17 @@ def test_an_empty_batch_is_empty() -> None:
     assert ensemble.reasons() == {}
 
 
+def test_without_levels_the_rest_is_the_same() -> None:
+    parameters = random_sets(50, 6)
+    whole = thud.solve_many(parameters)
+    bare = thud.solve_many(parameters, bands=None)
+    np.testing.assert_array_equal(bare.contact_time, whole.contact_time)
+    np.testing.assert_array_equal(bare.impulse, whole.impulse)
+    assert bare.elastic_levels.shape == (50, 0)
+    assert np.isnan(bare.floor_octaves).all()
+    assert not bare.conforms.any()
+
+
 def test_scalars_and_defaults() -> None:
     ensemble = thud.solve_many({})
     assert len(ensemble) == 1

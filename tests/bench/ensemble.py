@@ -1,0 +1,266 @@
+"""Ensembles against named competitors; each is skipped where it is not installed."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.signal import ZoomFFT
+
+import thud
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+RATE = 44100
+SETS = 32_768
+STREAMED = int(os.environ.get("THUD_BENCH_STREAMED", "500000"))
+
+# Additions and multiplications of one step in shell_lanes.f90, a multiply-add counted as two and a
+# division as one: three stages of 14, four pressures of 20, the end of the step 50, the record 9,
+# and an eighth of a power, 70.
+FLOPS_PER_STEP = 3 * 14 + 4 * 20 + 50 + 9 + 70 / 8
+
+RADIUS, MASS, P_A, GAMMA = 0.089, 2.5, 101325.0, 1.4
+STIFFNESS = 8 * 1.6e6 * 0.032**2 / (RADIUS * 3)
+
+
+def heights(count: int) -> np.ndarray:
+    """Return heights of drop, m."""
+    return np.linspace(0.9, 1.1, count)
+
+
+def best(function: Callable[[], object], runs: int = 5) -> float:
+    """Return the median time of a function, s, after one run to warm up."""
+    function()
+    times = []
+    for _ in range(runs):
+        start = time.perf_counter()
+        function()
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))
+
+
+def heyoka_rate(count: int = 2048) -> float | None:
+    """Return trajectories per second of heyoka's batch mode, all lanes run to their release."""
+    try:
+        import heyoka as hy  # noqa: PLC0415 - may be missing
+    except ImportError:
+        return None
+    lanes = hy.recommended_simd_size()
+    d, v = hy.make_vars("d", "v")
+    ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
+    gas = P_A * (ratio**-GAMMA - 1) * np.pi * d * (2 * RADIUS - d)
+    flux = hy.par[0] * MASS / (2 * RADIUS) * v**2
+    system = [(d, v), (v, (flux - STIFFNESS * d - gas) / (MASS * (1 - d / (2 * RADIUS))))]
+
+    def turn(ta: Any, _: int, lane: int) -> bool:  # noqa: ANN401
+        ta.pars[0, lane] = 1.0
+        return True
+
+    falling = hy.event_direction.negative
+    integrator = hy.taylor_adaptive_batch(
+        system, np.zeros((2, lanes)), tol=1e-12, pars=np.zeros((1, lanes)),
+        t_events=[hy.t_event_batch(v, callback=turn, direction=falling),
+                  hy.t_event_batch(d, direction=falling)],
+    )  # fmt: skip
+    speeds = np.sqrt(2 * 9.81 * heights(count)).reshape(-1, lanes)
+
+    def run() -> float:
+        for speed in speeds:
+            integrator.set_time(0.0)
+            integrator.pars[:] = 0.0
+            integrator.state[0] = 0.0
+            integrator.state[1] = speed
+            integrator.reset_cooldowns()
+            until = np.full(lanes, 0.05)
+            while True:
+                # The call returns when any lane stops; those that are done stay where they are.
+                integrator.propagate_until(until)
+                done = [result[0] == hy.taylor_outcome(-2) for result in integrator.propagate_res]
+                until[done] = integrator.time[done]
+                if (until < 0.05).all():  # noqa: PLR2004
+                    break
+        return float(integrator.time[-1])
+
+    expected = thud.solve_many({"height": heights(count)}).contact_time[-1]
+    print(f"  (heyoka's contact time differs by {abs(run() - expected):.1e} s)")
+    return count / best(run)
+
+
+def numba_rate(count: int = 200) -> float | None:
+    """Return complete cases per second of a scalar RK4 by numba with SciPy's ZoomFFT levels."""
+    try:
+        import numba  # noqa: PLC0415 - may be missing
+    except ImportError:
+        return None
+
+    @numba.njit(fastmath=True)  # type: ignore[untyped-decorator]
+    def elastic(d: float) -> float:
+        ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
+        return STIFFNESS * d + P_A * (ratio**-GAMMA - 1) * np.pi * d * (2 * RADIUS - d)
+
+    @numba.njit(fastmath=True)  # type: ignore[untyped-decorator]
+    def rate(d: float, v: float) -> float:
+        flux = MASS / (2 * RADIUS) * v * v if v < 0 else 0.0
+        return (flux - elastic(d)) / (MASS * (1 - d / (2 * RADIUS)))
+
+    @numba.njit(fastmath=True)  # type: ignore[untyped-decorator]
+    def drop(height: float, force: np.ndarray) -> int:
+        d, v, h = 0.0, np.sqrt(19.62 * height), 1 / RATE
+        for i in range(len(force)):
+            force[i] = elastic(d)
+            k1 = rate(d, v)
+            v2 = v + h / 2 * k1
+            k2 = rate(d + h / 2 * v, v2)
+            v3 = v + h / 2 * k2
+            k3 = rate(d + h / 2 * v2, v3)
+            v4 = v + h * k3
+            k4 = rate(d + h * v3, v4)
+            d += h / 6 * (v + 2 * v2 + 2 * v3 + v4)
+            v += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            if d <= 0:
+                return i + 1
+        return len(force)
+
+    bands = thud.get_bands()
+    edges = list(zip(bands.lower, bands.upper, strict=True))
+    transforms = [ZoomFFT(1102, [lower, upper], 64, fs=RATE) for lower, upper in edges]
+    force = np.zeros(1102)
+
+    def run() -> None:
+        for height in heights(count):
+            force[:] = 0
+            drop(height, force)
+            for transform, (lower, upper) in zip(transforms, edges, strict=True):
+                np.mean(np.abs(transform(force)) ** 2) * (upper - lower)
+
+    def bare() -> None:
+        for height in heights(count):
+            drop(height, force)
+
+    print(f"  (numba's trajectories alone: {count / best(bare):,.0f}/s)")
+    return count / best(run)
+
+
+def zoom_rate(count: int = 200) -> float:
+    """Return records per second whose five levels SciPy's ZoomFFT computes, 64 lines per band."""
+    bands = thud.get_bands()
+    edges = list(zip(bands.lower, bands.upper, strict=True))
+    transforms = [ZoomFFT(905, [lower, upper], 64, fs=RATE) for lower, upper in edges]
+    records = np.random.default_rng(1).normal(size=(count, 905))
+
+    def run() -> None:
+        for transform in transforms:
+            np.abs(transform(records)) ** 2
+
+    return count / best(run)
+
+
+def jax_rate(count: int = 4096) -> float | None:
+    """Return trajectories per second of a vectorised RK4 by JAX, a fixed number of steps."""
+    try:
+        import jax  # noqa: PLC0415 - may be missing
+        import jax.numpy as jnp  # noqa: PLC0415
+    except ImportError:
+        return None
+    jax.config.update("jax_enable_x64", True)  # noqa: FBT003 - JAX's own way
+
+    def rate(d: Any, v: Any) -> Any:  # noqa: ANN401
+        ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
+        gas = P_A * (ratio**-GAMMA - 1) * jnp.pi * d * (2 * RADIUS - d)
+        flux = jnp.where(v < 0, MASS / (2 * RADIUS) * v**2, 0.0)
+        return (flux - STIFFNESS * d - gas) / (MASS * (1 - d / (2 * RADIUS)))
+
+    def step(state: Any, _: None) -> Any:  # noqa: ANN401
+        d, v = state
+        h = 1 / RATE
+        k1 = rate(d, v)
+        v2 = v + h / 2 * k1
+        k2 = rate(d + h / 2 * v, v2)
+        v3 = v + h / 2 * k2
+        k3 = rate(d + h / 2 * v2, v3)
+        v4 = v + h * k3
+        k4 = rate(d + h * v3, v4)
+        new = (d + h / 6 * (v + 2 * (v2 + v3) + v4), v + h / 6 * (k1 + 2 * (k2 + k3) + k4))
+        return new, new[0]
+
+    @jax.jit
+    def march(v: Any) -> Any:  # noqa: ANN401
+        return jax.lax.scan(step, (jnp.zeros_like(v), v), None, length=905)[1]
+
+    speed = jnp.sqrt(19.62 * heights(count))
+    return count / best(lambda: march(speed).block_until_ready())
+
+
+def dgemm_rate() -> float:
+    """Return the machine's rate in products of matrices, flops per second."""
+    a = np.random.default_rng(1).normal(size=(1024, 1024))
+    return 2 * 1024**3 / best(lambda: a @ a)
+
+
+def stream(count: int, path: Path, chunk: int = 50_000) -> None:
+    """Compute so many random sets, write their outcomes and levels to disk, print the peak memory."""
+    random = np.random.default_rng(1)
+    start = time.perf_counter()
+    with path.open("wb") as file:
+        for first in range(0, count, chunk):
+            n = min(chunk, count - first)
+            found = thud.solve_many({
+                "height": random.uniform(0.9, 1.1, n),
+                "youngs_modulus": random.uniform(1.4e6, 1.8e6, n),
+                "wall_thickness": random.uniform(0.030, 0.034, n),
+            }, threads=1)  # fmt: skip
+            rows = [found.contact_time, found.peak_force, found.restitution, *found.elastic_levels.T]
+            np.column_stack(rows).tofile(file)
+    seconds = time.perf_counter() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"streamed to disk: {count:,} random sets, {count / seconds:,.0f}/s, "
+          f"peak memory {peak:.0f} MiB   required: below 1024 MiB")  # fmt: skip
+
+
+def report(name: str, ours: float, competitor: str, theirs: float | None, required: str) -> None:
+    """Print one comparison of rates."""
+    if theirs is None:
+        print(f"{name:34} {ours:9,.0f}/s   {competitor:38} not installed")
+        return
+    print(f"{name:34} {ours:9,.0f}/s   {competitor:38} {theirs:9,.0f}/s"
+          f"   ratio {ours / theirs:7.1f}   {required}")  # fmt: skip
+
+
+def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
+    """Print all comparisons."""
+    drops = {"height": heights(SETS)}
+
+    def run(threads: int = 1, bands: str | None = "octave") -> float:
+        return best(lambda: thud.solve_many(drops, threads=threads, bands=bands), 7)
+
+    bare, whole = run(bands=None), run()
+    marching, complete = SETS / bare, SETS / whole
+    report("ensemble, trajectories", marching, "heyoka, batch mode", heyoka_rate(), "required: above 1")
+    report("ensemble, trajectories", marching, "JAX, RK4, float64", jax_rate(), "")
+    report("ensemble, trajectories", marching, "SciPy DOP853", 1 / best(scipy_drop, 11), "")
+    report("ensemble, five levels and verdict", complete, "numba RK4, SciPy ZoomFFT levels",
+           numba_rate(), "required: 80 000/s and 10 times")  # fmt: skip
+    report("levels alone (by difference)", 2 * SETS / (whole - bare), "SciPy ZoomFFT, 64 lines per band",
+           zoom_rate(), "required: 5 times")  # fmt: skip
+    two = SETS / run(threads=2)
+    report("ensemble, two threads", two, "one thread", complete, "required: 1.9 times")
+    steps = float(np.sum(thud.solve_many(drops, bands=None).contact_time)) * RATE
+    flops, limit = FLOPS_PER_STEP * steps / bare, dgemm_rate()
+    print(f"trajectories: {FLOPS_PER_STEP:.0f} flops per step, {flops / 1e9:.1f} Gflop/s, "
+          f"{100 * flops / limit:.0f} % of DGEMM's {limit / 1e9:.1f} Gflop/s")  # fmt: skip
+    with tempfile.TemporaryDirectory() as directory:
+        command = [sys.executable, __file__, "stream", str(STREAMED), f"{directory}/sets"]
+        subprocess.run(command, check=True)
+
+
+if __name__ == "__main__" and sys.argv[1:2] == ["stream"]:
+    stream(int(sys.argv[2]), Path(sys.argv[3]))
