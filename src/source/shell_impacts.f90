@@ -244,7 +244,7 @@ contains
       !> The parts: [lane_count].
       real(wp), intent(out) :: length(lane_count)
       integer, parameter :: most_iterations = 200
-      real(wp), dimension(lane_count) :: left, right, left_value, right_value, value
+      real(wp), dimension(lane_count) :: left, right, left_value, right_value, value, rounding
       logical, dimension(lane_count) :: open, left_moved, right_moved
       integer :: iteration
 
@@ -254,6 +254,7 @@ contains
       length = right
       call try_step(impacts, length)
       right_value = merge(impacts%next%velocity, impacts%next%deflection, compressing)
+      rounding = epsilon(1.0_wp)*abs(right_value - left_value)
       left_moved = .false.
       right_moved = .false.
       do iteration = 1, most_iterations
@@ -272,6 +273,11 @@ contains
             right = length
             right_value = value
             left_value = merge(left_value/2, left_value, right_moved)
+         end where
+         ! A value that is rounding only cannot lead any nearer.
+         where (open .and. abs(value) <= rounding)
+            left = length
+            right = length
          end where
          left_moved = value > 0.0_wp
          right_moved = .not. left_moved
