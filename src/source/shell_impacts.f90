@@ -130,8 +130,9 @@ contains
       integer, intent(inout) :: last_step
       real(wp) :: latest
       integer :: n, first
-      logical :: done
+      logical :: done, undisturbed
 
+      undisturbed = .false.
       impacts%length = 1.0_wp
       latest = maxval(start, mask=start < never)
       last = merge(never, -1.0_wp, start < never)
@@ -145,10 +146,11 @@ contains
          end if
          if (mod(n, substeps) == 0) call record(impacts, real(n, wp), start, last, force(:, n/substeps + 1))
          call take_step(impacts%shell, impacts%state, impacts%length, impacts%pressure, impacts%anchor, impacts%next)
+         if (n == nint(latest)) undisturbed = all(start < never .and. last >= never)
          if (compressing) then
-            call settle(impacts, impacts%next%velocity, real(n, wp), start, last, done)
+            call settle(impacts, impacts%next%velocity, real(n, wp), start, last, undisturbed, done)
          else
-            call settle(impacts, impacts%next%deflection, real(n, wp), start, last, done)
+            call settle(impacts, impacts%next%deflection, real(n, wp), start, last, undisturbed, done)
          end if
          last_step = n
          if (done) exit
@@ -193,7 +195,7 @@ contains
    end subroutine record
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
-   pure subroutine settle(impacts, watched, n, start, last, done)
+   pure subroutine settle(impacts, watched, n, start, last, undisturbed, done)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
       !> What the end of the phase brings to zero: [lane_count].
@@ -204,11 +206,34 @@ contains
       real(wp), intent(in) :: start(lane_count)
       !> Step in which it ends: [lane_count].
       real(wp), intent(inout) :: last(lane_count)
+      !> All lanes are under way; false from the first that stops on.
+      logical, intent(inout) :: undisturbed
       !> All lanes have stopped.
       logical, intent(out) :: done
       real(wp) :: on, finite, stays, moving, lost
       integer :: i
 
+      done = .false.
+      if (undisturbed) then
+         ! Nothing but zeros while every lane stays inside.
+         lost = 0.0_wp
+         !$omp simd private(finite) reduction(+: lost)
+         do i = 1, lane_count
+            finite = merge(0.0_wp, 1.0_wp, abs(impacts%next%velocity(i)) <= huge(1.0_wp))
+            lost = lost + finite + merge(0.0_wp, 1.0_wp, watched(i) > 0.0_wp)
+         end do
+         if (.not. lost > 0.0_wp) then
+            !$omp simd
+            do i = 1, lane_count
+               impacts%state%deflection(i) = impacts%next%deflection(i)
+               impacts%state%velocity(i) = impacts%next%velocity(i)
+               impacts%state%impulse(i) = impacts%next%impulse(i)
+               impacts%state%loss(i) = impacts%next%loss(i)
+            end do
+            return
+         end if
+      end if
+      undisturbed = .false.
       moving = 0.0_wp
       lost = 0.0_wp
       ! Products of ones and zeros, because compilers do not vectorise conditions joined by `.and.`.

@@ -149,16 +149,16 @@ contains
       integer :: i
 
       missed = 0.0_wp
-      !$omp simd private(u, outside) reduction(max: missed)
+      !$omp simd private(u, outside) reduction(+: missed)
       do i = 1, lane_count
          u = get_ratio(y(i))*anchor%inverse(i) - 1
          ! Added, because a choice between the two would not be vectorised.
          outside = merge(0.0_wp, not_a_number, abs(u) <= near .and. y(i) < shell%closing(i))
          pressure(i) = outside + anchor%pressure(i)*(1 + u*(shell%series(i, 1) + u*(shell%series(i, 2) &
             + u*(shell%series(i, 3) + u*(shell%series(i, 4) + u*(shell%series(i, 5) + u*shell%series(i, 6)))))))
-         missed = max(missed, merge(0.0_wp, 1.0_wp, abs(u) <= near))
+         missed = missed + outside
       end do
-      if (missed > 0.0_wp) call set_anchors(shell, y, pressure, anchor)
+      if (.not. missed <= 0.0_wp) call set_anchors(shell, y, pressure, anchor)
    end subroutine get_pressures
 
    !> Forces of the present states.

@@ -67,7 +67,7 @@ def heyoka_rate(count: int = 2048) -> float | None:
 
     falling = hy.event_direction.negative
     integrator = hy.taylor_adaptive_batch(
-        system, np.zeros((2, lanes)), tol=1e-12, pars=np.zeros((1, lanes)),
+        system, np.zeros((2, lanes)), pars=np.zeros((1, lanes)),
         t_events=[hy.t_event_batch(v, callback=turn, direction=falling),
                   hy.t_event_batch(d, direction=falling)],
     )  # fmt: skip
