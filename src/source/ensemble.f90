@@ -12,13 +12,14 @@ module thud_ensemble
    use thud_force_history, only: most_residual
    use thud_hollow_sphere, only: compression_weights, get_shell_stiffness, is_wild, new_shell, restitution_weights, &
       shell_type
+   use thud_impact_lanes, only: impact_lanes_type
    use thud_kinds, only: wp
    use thud_lumped, only: at_deflection, at_velocity
    use thud_power, only: not_a_number
    use thud_rk4, only: longest_valid, rk4_step
    use thud_sampling, only: get_sample_count, least_contact_samples, sampling_type
    use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_flux, set_is_fine, set_outlasts, set_range
-   use thud_shell_impacts, only: impact_lanes_type, solve_impacts
+   use thud_shell_impacts, only: solve_impacts
    use thud_shell_lanes, only: lane_count, set_series
    implicit none (type, external)
    private
