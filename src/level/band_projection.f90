@@ -264,12 +264,12 @@ contains
    subroutine project(n_record, folded, sequences, spectra, spectrum)
       !> Number of records.
       integer, intent(in) :: n_record
-      !> Folded records: [n_record, n_half].
-      real(wp), intent(in) :: folded(n_record, size(sequences, 1))
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), intent(in) :: sequences(:, :)
       !> Weighted spectra of the sequences: [n_sequence, n_node].
       real(wp), intent(in) :: spectra(:, :)
+      !> Folded records: [n_record, n_half].
+      real(wp), intent(in) :: folded(n_record, size(sequences, 1))
       !> Weighted spectra of the records: [n_record, n_node].
       real(wp), intent(inout) :: spectrum(n_record, size(spectra, 2))
       real(wp) :: coefficient(n_record, size(sequences, 2))
