@@ -117,9 +117,10 @@ contains
       history%peak_floor_force = history%peak_force
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)
-         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'shortest_step', 'deepest_sink']
-         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 'm']
-         history%fact = [material%shear_modulus, material%bulk_modulus, run%shortest_interval, run%sink]
+         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'computed_time', 'shortest_step', &
+            'deepest_sink']
+         history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
+         history%fact = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%sink]
       end associate
       gain = ball%mass*(get_mean_velocity(run) + speed + run%gravity*run%time)
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
