@@ -220,11 +220,11 @@ contains
       !> Number of records.
       integer, intent(in) :: n_record
       !> The records, N: [n_record, n_sample].
-      real(wp), intent(in) :: record(n_record, *)
+      real(wp), intent(in) :: record(n_record, projection%n_sample)
       !> Room for as much: [n_record, n_sample].
-      real(wp), intent(inout) :: folded(n_record, *)
+      real(wp), intent(inout) :: folded(n_record, projection%n_sample)
       !> Energies, N^2 s: [n_record, n_band].
-      real(wp), intent(out) :: energy(n_record, *)
+      real(wp), intent(out) :: energy(n_record, size(projection%last_node))
       !> Sums of the squared samples, N^2: [n_record].
       real(wp), intent(out) :: square_sum(n_record)
       real(wp) :: spectrum(n_record, size(projection%cosine, 2))
@@ -239,7 +239,7 @@ contains
             square_sum = square_sum + front**2 + back**2
          end associate
       end do
-      energy(:, :size(projection%last_node)) = 0.0_wp
+      energy = 0.0_wp
       call project(n_record, folded, projection%even, projection%cosine, spectrum)
       call add_squares()
       call project(n_record, folded(1, half + 1), projection%odd, projection%sine, spectrum)
@@ -264,14 +264,14 @@ contains
    subroutine project(n_record, folded, sequences, spectra, spectrum)
       !> Number of records.
       integer, intent(in) :: n_record
-      !> Folded records: [n_record, n_half].
-      real(wp), intent(in) :: folded(n_record, *)
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), intent(in) :: sequences(:, :)
       !> Weighted spectra of the sequences: [n_sequence, n_node].
       real(wp), intent(in) :: spectra(:, :)
+      !> Folded records: [n_record, n_half].
+      real(wp), intent(in) :: folded(n_record, size(sequences, 1))
       !> Weighted spectra of the records: [n_record, n_node].
-      real(wp), intent(inout) :: spectrum(n_record, *)
+      real(wp), intent(inout) :: spectrum(n_record, size(spectra, 2))
       real(wp) :: coefficient(n_record, size(sequences, 2))
 
       associate (half => size(sequences, 1), rank => size(sequences, 2))
