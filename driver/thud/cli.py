@@ -142,6 +142,7 @@ def _parser() -> argparse.ArgumentParser:
 def _run(options: argparse.Namespace) -> int:
     """Run the cases of the command line; a bad one does not keep the others from running."""
     worst = 0
+    options.done = {}
     for path in tqdm(options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet):
         try:
             conforms = _run_case(path, options)
@@ -162,6 +163,13 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     output = options.output or ""
     if output and len(options.cases) > 1:
         output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
+    if case.name in options.done:
+        message = (
+            f"{path}: its name {case.name!r} is that of {options.done[case.name]}, whose results it "
+            "would replace; allowed: cases of different names, or one by one"
+        )
+        raise thud.InputError(message)
+    options.done[case.name] = path
     with _interruptible():
         directory, table, remark, conforming = call(
             door.run, os.fsencode(path), os.fsencode(output), not options.quiet

@@ -16,7 +16,7 @@ from tqdm import tqdm
 from thud import plot
 from thud.case import Case, read_case
 from thud.checks import replace_file, require_kind
-from thud.errors import InputError
+from thud.errors import InputError, ThudError
 from thud.impact import Impact, solve_case
 from thud.levels import get_bands, octave_limits
 from thud.recording import Recording
@@ -191,7 +191,11 @@ def compare(
         require_kind(name, given, Case | Impact | Recording)
         if isinstance(given, Case):
             start = time.perf_counter()
-            solved[name] = solve_case(given)
+            try:
+                solved[name] = solve_case(given)
+            except ThudError as error:
+                message = f"{name}: {error}"
+                raise type(error)(message) from error
             run_times[name] = time.perf_counter() - start
         else:
             solved[name] = given

@@ -144,7 +144,9 @@ def _draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) ->
         time = 1e3 * (impact.time - impact.touch_time)
         recorded = record_force(whole, impact.sample_rate)
         if np.abs(whole - recorded).max() > UNSEEN * whole.max():
-            axes.plot(time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1)
+            # One entry of the legend for all of them.
+            unfiltered = None if band else "unfiltered"
+            axes.plot(time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1, label=unfiltered)
             shown, band = recorded, " below 1.25 kHz"
         else:
             shown = whole

@@ -166,3 +166,14 @@ def test_interruption_is_not_a_traceback(
     monkeypatch.setattr(sys.modules["thud.cli"], "call", interrupt)
     assert cli.main(["run", str(case_file(MINIMAL))]) == 130
     assert "interrupted" in capsys.readouterr().err
+
+
+def test_cases_of_one_name_do_not_replace_each_other(
+    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "other").mkdir()
+    first = case_file(MINIMAL, "ball.nml")
+    second = case_file(MINIMAL.replace("&drop", "&drop height = 0.5"), "other/ball.nml")
+    assert cli.main(["run", "-q", "--no-figures", str(first), str(second), "-o", "out"]) == 1
+    assert f"{second}: its name 'ball' is that of {first}" in capsys.readouterr().err
+    assert thud.read_results("out/ball").case.drop.height == 1.0

@@ -153,3 +153,9 @@ def test_command_writes_the_page(
     assert "pipe.csv: cannot be read" in capsys.readouterr().err
     assert cli.main(["compare", "-q", "-o", "plate.csv", str(STEPS[0])]) == 1
     assert "plate.csv: File exists; allowed: " in capsys.readouterr().err
+
+
+def test_case_that_fails_is_named() -> None:
+    low = thud.Case(sampling=thud.Sampling(duration=0.01))
+    with pytest.raises(thud.InputError, match=r"^short: &sampling: duration"):
+        thud.compare({"short": low})
