@@ -165,8 +165,8 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
     if case.name in options.done:
         message = (
-            f"{path}: its name {case.name!r} is that of {options.done[case.name]}, whose results it "
-            "would replace; allowed: cases of different names, or one by one"
+            f"{path}: its name {case.name!r} is that of {options.done[case.name]}, "
+            "whose results it would replace; allowed: cases of different names, or one by one"
         )
         raise thud.InputError(message)
     options.done[case.name] = path
