@@ -156,10 +156,14 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
     """Open a Dask scheduler."""
     try:
         from distributed import Client  # noqa: PLC0415 - an optional package
+        from distributed.comm.addressing import parse_address  # noqa: PLC0415
+        from distributed.comm.registry import get_backend  # noqa: PLC0415
     except ModuleNotFoundError as error:
         message = f"{error.name} is not installed; allowed: pip install 'thud[studies,dask]'"
         raise InputError(message) from error
     try:
+        # A client of an unknown kind of address would fail again when it is thrown away.
+        get_backend(parse_address(address)[0])
         client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
     except (OSError, ValueError, TypeError) as error:
         message = (
