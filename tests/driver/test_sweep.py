@@ -20,10 +20,10 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 
 import thud
-from thud import cli
-from thud.studies import evaluation, run, sets, units
-from thud.studies.keys import known_keys
-from thud.studies.units import MULTIPLES, scaled
+from thud import cli, units
+from thud.keys import known_keys
+from thud.studies import evaluation, run, sets
+from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -2,32 +2,23 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass, fields, replace
-from functools import cache
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._library import door, text
 from thud.checks import require_kind
 from thud.errors import InputError
+from thud.keys import key_table, put
 from thud.models import LISTS, group_of
+from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from thud.case import Case
+    from thud.keys import Key
 
-# How many units of a kind make one of the library's, by the unit of the library.
-UNITS = {
-    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "kg": {"kg": 1.0, "g": 1e-3},
-    "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-    "Hz": {"Hz": 1.0, "kHz": 1e3},
-    "": {"1": 1.0, "%": 1e-2},
-}
 # The ones that tables and figures choose from, ascending.
 HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
 # A start that lies on a limit is moved away from it by this part of itself.
@@ -36,28 +27,6 @@ INSIDE = 0.01
 FAR = 10.0
 # Other starts lie within this factor of the first where no limits are given.
 SPREAD = 2.0
-
-_GROUP = re.compile(r"(?:! )?&(\w+)")
-_RANGE = re.compile(
-    r"allowed: (?P<lower>\S+) <=? (?P<name>\w+) <=? (?P<upper>[^\s,]+)(?: (?P<unit>\S+))?$"
-)
-
-
-@dataclass(frozen=True)
-class Key:
-    """A key of the input that takes real numbers.
-
-    Attributes
-    ----------
-    lower, upper : float
-        Ends of the allowed range.
-    unit : str
-        Unit, empty where there is none.
-    """
-
-    lower: float
-    upper: float
-    unit: str
 
 
 @dataclass(frozen=True)
@@ -102,20 +71,6 @@ class Range:
     spread: tuple[float, float]
 
 
-@cache
-def keys() -> dict[tuple[str, str], Key]:
-    """Return every key that takes real numbers, by group and name, as the library tells them."""
-    found = {}
-    group = ""
-    for line in text(door.keys()).splitlines():
-        if head := _GROUP.match(line):
-            group = head[1]
-        elif rule := _RANGE.search(line):
-            lower, upper = float(rule["lower"]), float(rule["upper"])
-            found[group, rule["name"]] = Key(lower, upper, rule["unit"] or "")
-    return found
-
-
 def known_parameters(case: Case) -> dict[str, tuple[str, Key, float]]:
     """Return attribute of the case, key and value of everything that can be fitted, by name.
 
@@ -130,10 +85,10 @@ def known_parameters(case: Case) -> dict[str, tuple[str, Key, float]]:
         *(("drop", "drop", option.name) for option in fields(case.drop)),
         *(("model", group_of(model.name, option), option.name) for option in fields(model)),
     ]
+    real = {(key.group, key.name): key for key in key_table() if key.kind in {"real", "list"}}
     found: dict[str, tuple[str, Key, float]] = {}
     for part, group, name in places:
-        # A range of whole numbers ends with that word and is no range of real ones.
-        key = keys().get((group, name))
+        key = real.get((group, name))
         value = getattr(getattr(case, part), name)
         if key is None:
             continue
@@ -146,23 +101,7 @@ def known_parameters(case: Case) -> dict[str, tuple[str, Key, float]]:
 
 def with_values(case: Case, values: Mapping[str, float]) -> Case:
     """Return a case with other values of some parameters."""
-    known = known_parameters(case)
-    changes: dict[str, dict[str, object]] = {"ball": {}, "drop": {}, "model": {}}
-    for name, value in values.items():
-        part = known[name][0]
-        base, _, place = name.partition("(")
-        if place:
-            entries = list(changes[part].get(base, getattr(getattr(case, part), base)))  # type: ignore[call-overload]
-            entries[int(place[:-1]) - 1] = float(value)
-            changes[part][base] = tuple(entries)
-        else:
-            changes[part][base] = float(value)
-    return replace(
-        case,
-        ball=replace(case.ball, **changes["ball"]),  # type: ignore[arg-type]
-        drop=replace(case.drop, **changes["drop"]),  # type: ignore[arg-type]
-        model=replace(case.model, **changes["model"]),  # type: ignore[type-var]
-    )
+    return put(case, {name: float(value) for name, value in values.items()})
 
 
 def require_known(case: Case, name: str, where: str) -> Key:
@@ -246,16 +185,16 @@ def unit_factor(name: str, key_unit: str, unit: object) -> float:
     """
     if unit == key_unit:
         return 1.0
-    known = UNITS.get(key_unit, {})
+    known = MULTIPLES.get(key_unit, {})
     if not isinstance(unit, str) or unit not in known:
         allowed = ", ".join(map(repr, known or [key_unit]))
         message = f"{name}: unit = {unit!r} is not allowed; allowed: {allowed}"
         raise InputError(message)
-    return known[unit]
+    return scaled(1.0, known[unit])
 
 
 def handy_unit(unit: str, value: float) -> tuple[str, float]:
     """Return a unit in which a value has a digit before its point, and how many SI units it is."""
-    known = {name: UNITS.get(unit, {}).get(name) for name in HANDY.get(unit, ())}
-    small = [(name, factor) for name, factor in known.items() if factor and factor <= abs(value)]
+    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
+    small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
     return small[-1] if small and value else (unit, 1.0)

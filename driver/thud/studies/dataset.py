@@ -14,7 +14,7 @@ from thud._library import compiler
 from thud.levels import get_bands
 from thud.studies import sets
 from thud.studies.evaluation import SCALARS, block_size
-from thud.studies.units import power_of
+from thud.units import power_of
 
 if TYPE_CHECKING:
     from thud.studies.parameters import Parameter

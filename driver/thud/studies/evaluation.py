@@ -12,9 +12,9 @@ import thud
 from thud.case import Ball, Case, Drop, Levels
 from thud.errors import InputError, ThudError
 from thud.impact import FORCES, solve_case
+from thud.keys import put
 from thud.levels import octave_limits
 from thud.models import HollowSphere
-from thud.studies.keys import put
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

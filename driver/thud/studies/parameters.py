@@ -10,8 +10,8 @@ import numpy as np
 from scipy.special import ndtri
 
 from thud.errors import InputError
-from thud.studies.keys import Key, Value, find_key
-from thud.studies.units import power_of, scaled
+from thud.keys import Key, Value, find_key
+from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.studies.keys import DENSITY, TEMPERATURE
+from thud.keys import DENSITY, TEMPERATURE
 from thud.studies.parameters import Uniform
 
 if TYPE_CHECKING:

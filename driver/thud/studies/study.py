@@ -14,11 +14,11 @@ import thud
 from thud.case import Case, read_case
 from thud.checks import require_kind
 from thud.errors import InputError
+from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
 from thud.models import FiniteElement, new_model
 from thud.studies.designs import read_design, require_words
-from thud.studies.keys import DENSITY, TEMPERATURE, Value, find_key, put
 from thud.studies.parameters import Parameter, checked, new_parameter
-from thud.studies.units import power_of
+from thud.units import power_of
 
 if TYPE_CHECKING:
     import os

@@ -11,7 +11,7 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
     "s": {"s": 0, "ms": -3, "us": -6},
     "Hz": {"Hz": 0, "kHz": 3},
-    "Pa": {"Pa": 0, "hPa": 2, "kPa": 3, "MPa": 6, "GPa": 9, "N/m2": 0, "N/mm2": 6, "bar": 5},
+    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm2": 6, "N/m2": 0, "hPa": 2, "bar": 5},
     "kg": {"kg": 0, "g": -3},
     "kg/m3": {"kg/m3": 0, "g/cm3": 3},
     "m/s2": {"m/s2": 0},

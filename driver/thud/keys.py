@@ -1,8 +1,9 @@
-"""Keys that a study may vary, read from the library's own table of them."""
+"""Keys that studies vary and fits search for, read from the library's own table of them."""
 
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from dataclasses import dataclass
 from functools import cache
@@ -31,7 +32,9 @@ _LINE = re.compile(
     r"|^!? +(?P<key>\w+) =",
     re.MULTILINE,
 )
-_RANGE = re.compile(r"\S+ <=? \w+ <=? \S+?(?: (?P<unit>[^\s,]+))?(?P<whole>, whole)?$")
+_RANGE = re.compile(
+    r"(?P<lower>\S+) <=? \w+ <=? (?P<upper>[^\s,]+)(?: (?P<unit>[^\s,]+))?(?P<whole>, whole)?$"
+)
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,8 @@ class Key:
         ``"real"``, ``"whole"``, ``"choice"``, ``"flag"`` or ``"list"`` (of numbers).
     choices : tuple of str
         What a choice may be.
+    lower, upper : float
+        Ends of the allowed range of numbers.
     """
 
     group: str
@@ -56,6 +61,8 @@ class Key:
     unit: str = ""
     kind: Kind = "real"
     choices: tuple[str, ...] = ()
+    lower: float = -math.inf
+    upper: float = math.inf
 
 
 # Keys of studies alone: they act on the mass and on the modulus of elasticity of the ball.
@@ -64,7 +71,7 @@ TEMPERATURE = Key("ball", "temperature", "temperature of the ball", "degC")
 
 
 @cache
-def _table() -> tuple[Key, ...]:
+def key_table() -> tuple[Key, ...]:
     """Return every key of the library."""
     found = []
     group = meaning = allowed = ""
@@ -91,7 +98,8 @@ def _key(group: str, name: str, meaning: str, allowed: str) -> Key:
         kind = "flag"
     elif limits and limits["whole"]:
         kind = "whole"
-    return Key(group, name, meaning, unit, kind, tuple(re.findall(r"'(\w+)'", allowed)))
+    ends = (float(limits["lower"]), float(limits["upper"])) if limits else ()
+    return Key(group, name, meaning, unit, kind, tuple(re.findall(r"'(\w+)'", allowed)), *ends)
 
 
 @cache
@@ -99,7 +107,7 @@ def known_keys(model: str) -> Mapping[str, Key]:
     """Return the keys that sets of a model may differ in, by their names."""
     groups = {*SHARED, *(group_of(model, option) for option in dataclasses.fields(MODELS[model]))}
     known = {
-        key.name: key for key in _table() if key.group in groups and key.name not in _NOT_VARIED
+        key.name: key for key in key_table() if key.group in groups and key.name not in _NOT_VARIED
     }
     return MappingProxyType(known | {key.name: key for key in (DENSITY, TEMPERATURE)})
 
