@@ -9,7 +9,7 @@ module thud_ensemble_run
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
       new_band_projection
    use thud_constants, only: reference_force, reference_time
-   use thud_ensemble, only: block_size, get_set_order, set_outcome_type, set_type, solve_block
+   use thud_ensemble, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_error, only: error_type
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
@@ -98,14 +98,14 @@ contains
       !> The sampling cannot be used or the source is not known.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
-      integer, allocatable :: order(:)
+      integer, allocatable :: order(:), first(:)
 
       levels = not_a_number
       forces = not_a_number
       call check_sampling(sampling, error)
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
       if (allocated(error)) return
-      call get_set_order(sets, outcomes%status, order)
+      call get_blocks(sets, outcomes%status, order, first)
       !$omp parallel num_threads(threads)
       call run_blocks()
       !$omp end parallel
@@ -119,8 +119,8 @@ contains
 
          call set_room(room, limits, get_class_window(size(projections%window)))
          !$omp do schedule(dynamic)
-         do block = 1, size(order), block_size
-            call run_block(room, order(block:min(block + block_size - 1, size(order))))
+         do block = 1, size(first) - 1
+            call run_block(room, order(first(block):first(block + 1) - 1))
          end do
          !$omp end do
       end subroutine run_blocks

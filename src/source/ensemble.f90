@@ -8,11 +8,12 @@ module thud_ensemble
    use thud_ball, only: ball_type, get_ball_fields
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
+   use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_history, only: most_residual
-   use thud_hollow_sphere, only: compression_weights, get_shell_stiffness, is_wild, new_shell, restitution_weights, &
-      shell_type
-   use thud_impact_lanes, only: impact_lanes_type
+   use thud_force_history, only: force_history_type, most_residual
+   use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, is_wild, &
+      restitution_weights, shell_type, solve_hollow_sphere
+   use thud_impact_lanes, only: get_single, impact_lanes_type
    use thud_kinds, only: wp
    use thud_lumped, only: at_deflection, at_velocity
    use thud_power, only: not_a_number
@@ -20,11 +21,11 @@ module thud_ensemble
    use thud_sampling, only: get_sample_count, least_contact_samples, sampling_type
    use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_flux, set_is_fine, set_outlasts, set_range
    use thud_shell_impacts, only: solve_impacts
-   use thud_shell_lanes, only: lane_count, set_series
+   use thud_shell_lanes, only: lane_count
    implicit none (type, external)
    private
 
-   public :: block_size, get_set_fields, get_set_order, outcome_count, parameter_count, set_outcome_type, set_type
+   public :: block_size, get_blocks, get_set_fields, outcome_count, parameter_count, set_outcome_type, set_type
    public :: solve_block
 
    !> Sets of one block.
@@ -61,6 +62,10 @@ module thud_ensemble
       real(wp) :: impulse = not_a_number
    end type set_outcome_type
 
+   !> Residual of the balances of impulse and energy from which on the single solver is asked: the sums that
+   !> are taken here err by up to some twenty times as much as the single solver's.
+   real(wp), parameter :: doubtful = 0.1_wp*most_residual
+
    !> Numbers of an outcome.
    integer, parameter :: outcome_count = 6
 
@@ -76,44 +81,47 @@ contains
       fields = [get_ball_fields(set%ball), get_drop_fields(set%drop)]
    end function get_set_fields
 
-   !> The sets that can be computed, similar contact times side by side: a block takes as long as its
-   !> longest contact.
-   subroutine get_set_order(sets, status, order)
+   !> Blocks of the sets that can be computed: of one choice of the flux term, so that lanes share their
+   !> equation, and with similar contact times, because a block takes as long as its longest contact.
+   subroutine get_blocks(sets, status, order, first)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> Complaint about the input of each set, or `set_is_fine`: [n_set].
       integer, intent(out) :: status(:)
       !> Numbers of the sets without complaint: [n_valid].
       integer, allocatable, intent(out) :: order(:)
+      !> Places in `order` where blocks begin, and the place after the last: [n_block + 1].
+      integer, allocatable, intent(out) :: first(:)
       !> Classes of contact times per doubling.
       integer, parameter :: classes = 64
-      !> Most doublings that are told apart.
+      !> Most classes that are told apart, for each choice of the flux term.
       integer, parameter :: most = 64*classes
-      integer :: first(0:most + 1)
+      integer :: next(0:size(compression_weights)*most)
       integer :: class(size(sets))
-      integer :: i
+      integer :: i, j
       type(set_type), target :: any_set
       type(field_type) :: fields(parameter_count)
 
       fields = get_set_fields(any_set)
-      first = 0
+      next = 0
       do i = 1, size(sets)
          status(i) = get_complaint(sets(i), fields)
          if (status(i) /= set_is_fine) cycle
          class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
-         class(i) = min(max(class(i), 0), most)
-         first(class(i) + 1) = first(class(i) + 1) + 1
+         class(i) = min(max(class(i), 0), most - 1) + (sets(i)%flux - 1)*most
+         next(class(i) + 1) = next(class(i) + 1) + 1
       end do
-      do i = 1, most + 1
-         first(i) = first(i) + first(i - 1)
+      do i = 1, ubound(next, 1)
+         next(i) = next(i) + next(i - 1)
       end do
-      allocate (order(first(most + 1)))
+      allocate (order(next(ubound(next, 1))))
+      first = [((j, j=next((i - 1)*most) + 1, next(i*most), block_size), i=1, size(compression_weights)), size(order) + 1]
       do i = 1, size(sets)
          if (status(i) /= set_is_fine) cycle
-         first(class(i)) = first(class(i)) + 1
-         order(first(class(i))) = i
+         next(class(i)) = next(class(i)) + 1
+         order(next(class(i))) = i
       end do
-   end subroutine get_set_order
+   end subroutine get_blocks
 
    !> What is wrong with the input of a set.
    function get_complaint(set, fields) result(status)
@@ -155,7 +163,7 @@ contains
       time = pi/sqrt(linear + 0.75_wp*cubic*2*speed**2/(linear + sqrt(linear**2 + 2*cubic*speed**2)))
    end function get_rough_contact_time
 
-   !> Outcomes and forces of up to `block_size` sets.
+   !> Outcomes and forces of up to `block_size` sets with the same choice of the flux term.
    subroutine solve_block(sets, sampling, force, last_sample, outcomes)
       !> The sets, their input checked: [n_set].
       type(set_type), intent(in) :: sets(:)
@@ -175,11 +183,12 @@ contains
       call c_f_pointer(c_loc(room(get_aligned_start(room))), impacts)
 
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
+      impacts%shell%weight = compression_weights(sets(1)%flux)
+      impacts%restitution_weight = restitution_weights(sets(1)%flux)
       do i = 1, block_size
          ! Lanes without a set repeat the last one.
          call set_lane(impacts, i, sets(min(i, size(sets))), step)
       end do
-      call set_series(impacts%shell)
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, last_sample)
       do i = 1, size(sets)
          outcomes(i)%status = get_lane_status(impacts, i, sets(i), sampling)
@@ -189,8 +198,8 @@ contains
             outcomes(i)%peak_force = impacts%peak_force(i)
             outcomes(i)%peak_floor_force = impacts%peak_floor_force(i)
             outcomes(i)%max_deflection = impacts%max_deflection(i)*diameter
-            outcomes(i)%restitution = -impacts%state%velocity(i)/impacts%impact_velocity(i)
-            outcomes(i)%impulse = impacts%state%impulse(i)*sets(i)%ball%mass*diameter/step
+            outcomes(i)%restitution = -impacts%states(impacts%now)%velocity(i)/impacts%impact_velocity(i)
+            outcomes(i)%impulse = sets(i)%ball%mass*(1 + outcomes(i)%restitution)*get_impact_velocity(sets(i)%drop)
          end associate
       end do
    end subroutine solve_block
@@ -214,10 +223,8 @@ contains
          shell%air_pressure(i) = pressure_unit*ball%ambient_pressure
          shell%exponent(i) = -ball%heat_capacity_ratio
          shell%closing(i) = (ball%outer_radius - ball%wall_thickness)/ball%outer_radius
-         impacts%compression_weight(i) = compression_weights(set%flux)
-         impacts%restitution_weight(i) = restitution_weights(set%flux)
          impacts%impact_velocity(i) = get_impact_velocity(set%drop)*step/(2*ball%outer_radius)
-         impacts%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
+         shell%force_unit(i) = 2*ball%outer_radius*ball%mass/step**2
       end associate
    end subroutine set_lane
 
@@ -235,44 +242,60 @@ contains
       integer :: status
       real(wp) :: change, energy
 
-      associate (z => impacts%state%velocity(i), z0 => impacts%impact_velocity(i))
+      associate (z => impacts%states(impacts%now)%velocity(i), z0 => impacts%impact_velocity(i))
          if (impacts%left(i)) then
-            status = get_reason(impacts, i, set, 1/(sampling%sample_rate*real(sampling%substeps, wp)))
+            status = get_reason(impacts, i, set)
          else if (.not. impacts%released(i)) then
             status = set_outlasts
          else if (impacts%contact(i) < least_contact_samples*sampling%substeps) then
             status = set_few_samples
          else
-            change = abs(impacts%state%impulse(i) - (z0 - z))/(z0 - z)
-            energy = abs(z**2 + 2*impacts%state%loss(i) - z0**2)/z0**2
-            ! Asked so that NaN fails too.
-            status = merge(set_is_fine, set_coarse, max(change, energy) <= most_residual)
+            change = abs(impacts%states(impacts%now)%impulse(i) - (z0 - z))/(z0 - z)
+            energy = abs(z**2 + 2*impacts%states(impacts%now)%loss(i) - z0**2)/z0**2
+            status = set_is_fine
+            ! Asked so that NaN is doubtful too.
+            if (.not. max(change, energy) <= doubtful) status = get_single_status(set, sampling)
          end if
       end associate
    end function get_lane_status
 
+   !> Whether the single solver finds the steps fine enough; its sums take in the stages of each step.
+   function get_single_status(set, sampling) result(status)
+      !> The set.
+      type(set_type), intent(in) :: set
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> `set_is_fine` or `set_coarse`.
+      integer :: status
+      type(force_history_type) :: history
+      type(error_type), allocatable :: error
+
+      call solve_hollow_sphere(set%ball, set%drop, hollow_sphere_type(flux_choices(set%flux)), sampling, history, error)
+      status = merge(set_coarse, set_is_fine, allocated(error))
+   end function get_single_status
+
    !> Why a lane has left the domain of the equation: the single solver's own question, asked of the
    !> last state inside.
-   function get_reason(impacts, i, set, step) result(status)
+   function get_reason(impacts, i, set) result(status)
       !> The impacts.
       type(impact_lanes_type), intent(in) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
       !> Its set.
       type(set_type), intent(in) :: set
-      !> The step, s.
-      real(wp), intent(in) :: step
       !> `set_closes` or `set_coarse`.
       integer :: status
       type(shell_type) :: shell
       real(wp) :: state(4), last(4)
       logical :: valid
 
-      shell = new_shell(set%ball, impacts%shell%weight(i), impacts%shell%weight(i))
+      shell = get_single(impacts%shell, i)
       state = 0.0_wp
-      state(at_deflection) = impacts%state%deflection(i)*2*set%ball%outer_radius
-      state(at_velocity) = impacts%state%velocity(i)*2*set%ball%outer_radius/step
-      call rk4_step(shell, 0.0_wp, state, longest_valid(shell, 0.0_wp, state, step), last, valid)
+      state(at_deflection) = impacts%states(impacts%now)%deflection(i)
+      state(at_velocity) = impacts%states(impacts%now)%velocity(i)
+      shell%compression_weight = compression_weights(set%flux)
+      shell%compressing = state(at_velocity) > 0.0_wp
+      call rk4_step(shell, 0.0_wp, state, longest_valid(shell, 0.0_wp, state, 1.0_wp), last, valid)
       status = merge(set_coarse, set_closes, is_wild(shell, last))
    end function get_reason
 

@@ -1,39 +1,31 @@
-!> Impacts of many balls side by side: their state, parts of a step, and where in a step a phase ends.
+!> Impacts of many balls side by side: their state, steps and parts of a step, and where in a step a phase ends.
 module thud_impact_lanes
+   use thud_constants, only: pi
+   use thud_hollow_sphere, only: shell_type
    use thud_kinds, only: wp
-   use thud_power, only: not_a_number
-   use thud_shell_lanes, only: anchor_lanes_type, lane_count, set_anchors, shell_lanes_type, state_lanes_type, take_step
+   use thud_lumped, only: at_deflection, at_velocity
+   use thud_rk4, only: rk4_step
+   use thud_shell_lanes, only: lane_count, shell_lanes_type, state_lanes_type
+   use thud_shell_series, only: get_flows, place_series, series_lanes_type, take_step
    implicit none (type, external)
    private
 
-   public :: finish_step, impact_lanes_type, locate
+   public :: add_end, advance, finish_step, get_single, get_watched, impact_lanes_type, is_finite, locate
 
    !> Impacts, in the units of `thud_shell_lanes` unless said otherwise. Fastest where it begins with a
    !> line of the cache, see `thud_aligned`.
    type :: impact_lanes_type
-      !> The equations.
-      type(shell_lanes_type) :: shell
-      !> Factor of the flux term in compression: [lane_count].
-      real(wp) :: compression_weight(lane_count)
-      !> Factor of the flux term in restitution: [lane_count].
-      real(wp) :: restitution_weight(lane_count)
+      !> Series of the equations.
+      type(series_lanes_type) :: series
       !> Velocity at first touch: [lane_count].
       real(wp) :: impact_velocity(lane_count)
-      !> Unit of the forces, 2 R M/h**2, N: [lane_count].
-      real(wp) :: force_unit(lane_count)
-      !> State at release; where a lane did not get there, at the beginning of its last step.
-      type(state_lanes_type) :: state
-      !> State at the end of the step under way.
-      type(state_lanes_type) :: next
-      !> Where pressures are known.
-      type(anchor_lanes_type) :: anchor
-      !> A x**(-gamma) at the beginning of the step: [lane_count].
-      real(wp) :: pressure(lane_count)
-      !> Length of the step, 1 for a whole one: [lane_count].
-      real(wp) :: length(lane_count)
-      !> Elastic force of the sample under way, N: [lane_count].
+      !> The present state and, in the other place, that at the end of the step under way.
+      type(state_lanes_type) :: states(2)
+      !> Ones, the length of whole steps: [lane_count].
+      real(wp) :: whole_step(lane_count)
+      !> Elastic force at the beginning of a step, N, where nobody else takes it: [lane_count].
       real(wp) :: elastic_force(lane_count)
-      !> Force on the floor of the sample under way, N: [lane_count].
+      !> Force on the floor, likewise, N: [lane_count].
       real(wp) :: floor_force(lane_count)
       !> Largest deflection: [lane_count].
       real(wp) :: max_deflection(lane_count)
@@ -43,13 +35,99 @@ module thud_impact_lanes
       real(wp) :: peak_floor_force(lane_count)
       !> Steps from first touch to release: [lane_count].
       real(wp) :: contact(lane_count)
+      !> The equations.
+      type(shell_lanes_type) :: shell
+      !> Factor s of the flux term in restitution.
+      real(wp) :: restitution_weight
+      !> Place of the present state: that at release or, where a lane did not get there, at the beginning of
+      !> its last step.
+      integer :: now
       !> The ball was released: [lane_count].
       logical :: released(lane_count)
       !> A stage has left the domain of the equation: [lane_count].
       logical :: left(lane_count)
+      !> The last step led beyond the reach of the series: [lane_count].
+      logical :: strayed(lane_count)
    end type impact_lanes_type
 
 contains
+
+   !> Takes a step, or part of one, from the present state to the other place. Lanes that go beyond the
+   !> reach of their series take it one by one as the single solver does, powers and all.
+   pure subroutine advance(impacts, goes, length, elastic_force, floor_force, missed)
+      !> The impacts; the new velocity is NaN where a stage has left the domain of the equation.
+      type(impact_lanes_type), intent(inout) :: impacts
+      !> The result for the lane matters: [lane_count].
+      logical, intent(in) :: goes(lane_count)
+      !> Length of the step: [lane_count].
+      real(wp), intent(in) :: length(lane_count)
+      !> Elastic force at the beginning, N: [lane_count].
+      real(wp), intent(out) :: elastic_force(lane_count)
+      !> Force on the floor, likewise, N: [lane_count].
+      real(wp), intent(out) :: floor_force(lane_count)
+      !> There are such lanes.
+      logical, intent(out) :: missed
+      integer :: i, then
+
+      then = 3 - impacts%now
+      call take_step(impacts%shell, impacts%series, impacts%states(impacts%now), length, impacts%states(then), &
+         elastic_force, floor_force, missed)
+      if (.not. missed) return
+      do i = 1, lane_count
+         impacts%strayed(i) = goes(i) .and. .not. is_finite(impacts%states(then)%velocity(i))
+         if (impacts%strayed(i)) call take_single_step(impacts, i, length(i))
+      end do
+   end subroutine advance
+
+   !> The step of one lane by the single solver.
+   pure subroutine take_single_step(impacts, i, length)
+      !> The impacts; the new velocity stays NaN where a stage leaves the domain of the equation.
+      type(impact_lanes_type), intent(inout) :: impacts
+      !> Number of the lane.
+      integer, intent(in) :: i
+      !> Length of the step.
+      real(wp), intent(in) :: length
+      real(wp), dimension(4) :: state, new
+      logical :: valid
+
+      state = 0.0_wp
+      state(at_deflection) = impacts%states(impacts%now)%deflection(i)
+      state(at_velocity) = impacts%states(impacts%now)%velocity(i)
+      call rk4_step(get_single(impacts%shell, i), 0.0_wp, state, length, new, valid)
+      if (.not. valid) return
+      impacts%states(3 - impacts%now)%deflection(i) = new(at_deflection)
+      impacts%states(3 - impacts%now)%velocity(i) = new(at_velocity)
+   end subroutine take_single_step
+
+   !> The equation of one lane as the single solver has it, in the units of the lanes.
+   pure function get_single(shell, i) result(single)
+      !> The equations.
+      type(shell_lanes_type), intent(in) :: shell
+      !> Number of the lane.
+      integer, intent(in) :: i
+      !> A ball of unit diameter and mass in the present phase.
+      type(shell_type) :: single
+
+      single%radius = 0.5_wp
+      single%mass = 1.0_wp
+      single%closing_deflection = shell%closing(i)
+      single%stiffness = shell%stiffness(i)
+      single%initial_pressure = shell%gas_pressure(i)/pi
+      single%ambient_pressure = shell%air_pressure(i)/pi
+      single%heat_capacity_ratio = -shell%exponent(i)
+      single%compression_weight = shell%weight
+      single%restitution_weight = shell%weight
+   end function get_single
+
+   !> Whether a value is a number.
+   elemental function is_finite(value) result(finite)
+      !> The value.
+      real(wp), intent(in) :: value
+      !> It is.
+      logical :: finite
+
+      finite = abs(value) <= huge(value)
+   end function is_finite
 
    !> Parts of the step at whose end the phase ends, to rounding: `locate_zero` of `thud_rk4` for all
    !> lanes at once. Lanes without such an end get the whole step.
@@ -67,12 +145,11 @@ contains
       logical, dimension(lane_count) :: open, left_moved, right_moved
       integer :: iteration
 
+      call place_series(impacts%shell, impacts%states(impacts%now), ends, impacts%series)
       left = 0.0_wp
-      left_value = merge(impacts%state%velocity, impacts%state%deflection, compressing)
+      left_value = get_watched(impacts%states(impacts%now), compressing)
       right = 1.0_wp
-      length = right
-      call try_step(impacts, length)
-      right_value = merge(impacts%next%velocity, impacts%next%deflection, compressing)
+      call try_length(right, right_value)
       rounding = epsilon(1.0_wp)*abs(right_value - left_value)
       left_moved = .false.
       right_moved = .false.
@@ -81,8 +158,7 @@ contains
          if (.not. any(open)) exit
          length = right - right_value*(right - left)/(right_value - left_value)
          where (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
-         call try_step(impacts, length)
-         value = merge(impacts%next%velocity, impacts%next%deflection, compressing)
+         call try_length(length, value)
          ! An end that stays twice has its value halved, or regula falsi would creep.
          where (open .and. value > 0.0_wp)
             left = length
@@ -102,36 +178,80 @@ contains
          right_moved = .not. left_moved
       end do
       length = right
+
+   contains
+
+      !> Where a part of the step would lead.
+      subroutine try_length(part, part_value)
+         !> The part: [lane_count].
+         real(wp), intent(in) :: part(lane_count)
+         !> What the end of the phase brings to zero: [lane_count].
+         real(wp), intent(out) :: part_value(lane_count)
+         logical :: missed
+
+         call advance(impacts, ends, part, impacts%elastic_force, impacts%floor_force, missed)
+         part_value = get_watched(impacts%states(3 - impacts%now), compressing)
+      end subroutine try_length
+
    end subroutine locate
+
+   !> What the end of the phase brings to zero: velocity or deflection.
+   pure function get_watched(state, compressing) result(watched)
+      !> The states.
+      type(state_lanes_type), intent(in) :: state
+      !> The phase ends with the velocity.
+      logical, intent(in) :: compressing
+      !> Velocity or deflection: [lane_count].
+      real(wp) :: watched(lane_count)
+
+      watched = state%deflection
+      if (compressing) watched = state%velocity
+   end function get_watched
 
    !> Takes a part of a step in some of the lanes.
    subroutine finish_step(impacts, goes, length)
-      !> The impacts.
+      !> The impacts; their series are placed at the end.
       type(impact_lanes_type), intent(inout) :: impacts
       !> The lane takes the step: [lane_count].
       logical, intent(in) :: goes(lane_count)
       !> Its length: [lane_count].
       real(wp), intent(in) :: length(lane_count)
+      logical :: missed
 
-      call try_step(impacts, length)
-      where (goes)
-         impacts%state%deflection = impacts%next%deflection
-         impacts%state%velocity = impacts%next%velocity
-         impacts%state%impulse = impacts%next%impulse
-         impacts%state%loss = impacts%next%loss
-      end where
+      associate (state => impacts%states(impacts%now), new => impacts%states(3 - impacts%now))
+         call place_series(impacts%shell, state, goes, impacts%series)
+         call add_end(impacts, goes, length/2, length**2/12)
+         call advance(impacts, goes, length, impacts%elastic_force, impacts%floor_force, missed)
+         where (goes)
+            state%deflection = new%deflection
+            state%velocity = new%velocity
+         end where
+         call place_series(impacts%shell, state, goes, impacts%series)
+         call add_end(impacts, goes, length/2, -length**2/12)
+      end associate
    end subroutine finish_step
 
-   !> Where a part of a step would lead.
-   subroutine try_step(impacts, length)
-      !> The impacts.
+   !> Adds one end of an interval to the sums of impulse and loss. With the sums of the values at the
+   !> beginnings of all steps these are the integrals by the trapezoidal rule with its first correction
+   !> (Euler and Maclaurin), of fourth order as the steps are.
+   pure subroutine add_end(impacts, goes, value_factor, rate_factor)
+      !> The impacts, in reach of their series.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> Its length: [lane_count].
-      real(wp), intent(in) :: length(lane_count)
+      !> The lane takes part: [lane_count].
+      logical, intent(in) :: goes(lane_count)
+      !> Factor of the values at the end: [lane_count].
+      real(wp), intent(in) :: value_factor(lane_count)
+      !> Factor of their rates of change: [lane_count].
+      real(wp), intent(in) :: rate_factor(lane_count)
+      real(wp), dimension(lane_count) :: force, force_rate, power, power_rate
 
-      impacts%pressure = not_a_number
-      call set_anchors(impacts%shell, impacts%state%deflection, impacts%pressure, impacts%anchor)
-      call take_step(impacts%shell, impacts%state, length, impacts%pressure, impacts%anchor, impacts%next)
-   end subroutine try_step
+      associate (state => impacts%states(impacts%now))
+         call get_flows(impacts%shell, impacts%series, state, force, force_rate, power, power_rate)
+         where (goes)
+            state%impulse = state%impulse + value_factor*force + rate_factor*force_rate
+            state%loss = state%loss + value_factor*power + rate_factor*power_rate
+         end where
+      end associate
+   end subroutine add_end
 
 end module thud_impact_lanes

@@ -5,18 +5,14 @@
 !> turning point waits until all others have, or closed; then the turning points are located
 !> together, and each lane goes on at its own time.
 module thud_shell_impacts
-   use thud_impact_lanes, only: finish_step, impact_lanes_type, locate
+   use thud_impact_lanes, only: add_end, advance, finish_step, get_watched, impact_lanes_type, is_finite, locate
    use thud_kinds, only: wp
-   use thud_power, only: not_a_number
-   use thud_shell_lanes, only: get_forces, get_pressures, lane_count, set_anchors, take_step
+   use thud_shell_lanes, only: lane_count, state_lanes_type
+   use thud_shell_series, only: place_series, series_steps, will_last
    implicit none (type, external)
    private
 
    public :: solve_impacts
-
-   !> Steps after which anchors are moved in any case. At the default step a ball from 1 m changes its
-   !> volume by 2e-3 in as many, so that the series mostly holds between; see `thud_shell_lanes`.
-   integer, parameter :: anchor_interval = 8
 
    !> A step that never comes.
    real(wp), parameter :: never = huge(1.0_wp)
@@ -36,33 +32,31 @@ contains
       !> Number of the last sample that was written.
       integer, intent(out) :: last_sample
       real(wp), dimension(lane_count) :: start, last, length
+      logical :: turns(lane_count)
       integer :: n_step, last_step
 
       n_step = (n_sample - 1)*substeps
       last_step = 0
-      impacts%state%deflection = 0.0_wp
-      impacts%state%velocity = impacts%impact_velocity
-      impacts%state%impulse = 0.0_wp
-      impacts%state%loss = 0.0_wp
-      impacts%peak_force = 0.0_wp
-      impacts%peak_floor_force = 0.0_wp
+      impacts%now = 1
+      impacts%states(1)%deflection = 0.0_wp
+      impacts%states(1)%velocity = impacts%impact_velocity
+      impacts%states(1)%impulse = 0.0_wp
+      impacts%states(1)%loss = 0.0_wp
       impacts%left = .false.
-      impacts%anchor%inverse = 1.0_wp
-      impacts%anchor%pressure = impacts%shell%gas_pressure
-      impacts%shell%weight = impacts%compression_weight
+      impacts%whole_step = 1.0_wp
 
       start = 0.0_wp
       call march(impacts, .true., start, last, n_step, substeps, n_sample, force, last_step)
-      call locate(impacts, .true., last < never .and. .not. impacts%left, length)
-      start = merge(last + 1, never, last < never .and. .not. impacts%left)
-      call turn(impacts, start < never, length)
+      turns = last < never .and. .not. impacts%left
+      call turn(impacts, turns)
+      start = merge(last + 1, never, turns)
       call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
       impacts%released = last < never .and. .not. impacts%left
       call locate(impacts, .false., impacts%released, length)
       call finish_step(impacts, impacts%released, length)
       impacts%contact = last + length
       last_sample = last_step/substeps + 1
-      impacts%peak_floor_force = max(impacts%peak_force, impacts%peak_floor_force)
+      call get_peaks(force(:, :last_sample), impacts%peak_force, impacts%peak_floor_force)
       ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
@@ -88,32 +82,46 @@ contains
       !> Last step of any lane; unchanged where none began.
       integer, intent(inout) :: last_step
       real(wp) :: latest
-      integer :: n, first
-      logical :: done, undisturbed
+      integer :: n, first, sample
+      logical :: done, undisturbed, strayed
+      logical, dimension(lane_count) :: wanted, goes
 
       undisturbed = .false.
-      impacts%length = 1.0_wp
+      strayed = .false.
+      impacts%strayed = .false.
       latest = maxval(start, mask=start < never)
       last = merge(never, -1.0_wp, start < never)
       first = int(min(minval(start), real(n_step, wp)))
+      call place_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
+      call add_end(impacts, start < never, -0.5_wp*impacts%whole_step, impacts%whole_step/12)
       do n = first, n_step - 1
-         call get_pressures(impacts%shell, impacts%state%deflection, impacts%anchor, impacts%pressure)
-         ! A lane has new anchors where it begins and at fixed times: nothing that depends on others.
-         if (n <= latest .or. mod(n, anchor_interval) == 0) then
-            where (abs(start - n) < 0.5_wp .or. mod(n, anchor_interval) == 0) impacts%pressure = not_a_number
-            call set_anchors(impacts%shell, impacts%state%deflection, impacts%pressure, impacts%anchor)
+         ! A lane has a new series where it begins, where it strayed and, asked at fixed times, where the old
+         ! one will not last: nothing that depends on others.
+         if (n <= latest .or. mod(n, series_steps) == 0 .or. strayed) then
+            wanted = abs(start - n) < 0.5_wp .or. impacts%strayed
+            associate (state => impacts%states(impacts%now), series => impacts%series)
+               if (mod(n, series_steps) == 0) wanted = wanted &
+                  .or. .not. will_last(series%place, series%reach, state%deflection, state%velocity)
+               if (any(wanted)) call place_series(impacts%shell, state, wanted, series)
+            end associate
+            impacts%strayed = .false.
          end if
-         if (mod(n, substeps) == 0) call record(impacts, real(n, wp), start, last, force(:, n/substeps + 1))
-         call take_step(impacts%shell, impacts%state, impacts%length, impacts%pressure, impacts%anchor, impacts%next)
-         if (n == nint(latest)) undisturbed = all(start < never .and. last >= never)
-         if (compressing) then
-            call settle(impacts, impacts%next%velocity, real(n, wp), start, last, undisturbed, done)
+         if (.not. undisturbed) goes = start <= n .and. last > n
+         sample = n/substeps + 1
+         if (undisturbed .and. mod(n, substeps) == 0) then
+            call advance(impacts, goes, impacts%whole_step, force(:lane_count, sample), force(lane_count + 1:, sample), &
+               strayed)
          else
-            call settle(impacts, impacts%next%deflection, real(n, wp), start, last, undisturbed, done)
+            call advance(impacts, goes, impacts%whole_step, impacts%elastic_force, impacts%floor_force, strayed)
+            if (mod(n, substeps) == 0) call record(impacts, real(n, wp), start, last, force(:, sample))
          end if
+         if (n == nint(latest)) undisturbed = all(start < never .and. last >= never)
+         call settle(impacts, compressing, real(n, wp), start, last, undisturbed, done)
          last_step = n
          if (done) exit
       end do
+      call place_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
+      call add_end(impacts, start < never, 0.5_wp*impacts%whole_step, -impacts%whole_step/12)
       where (.not. start < never) last = never
    end subroutine march
 
@@ -132,8 +140,6 @@ contains
       real(wp), intent(inout) :: force(2*lane_count)
       integer :: i
 
-      call get_forces(impacts%shell, impacts%state, impacts%pressure, impacts%force_unit, impacts%elastic_force, &
-         impacts%floor_force)
       !$omp simd
       do i = 1, lane_count
          associate (elastic => impacts%elastic_force, whole => impacts%floor_force)
@@ -147,18 +153,16 @@ contains
             end if
             force(i) = elastic(i)
             force(lane_count + i) = whole(i)
-            impacts%peak_force(i) = max(impacts%peak_force(i), elastic(i))
-            impacts%peak_floor_force(i) = max(impacts%peak_floor_force(i), whole(i))
          end associate
       end do
    end subroutine record
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
-   pure subroutine settle(impacts, watched, n, start, last, undisturbed, done)
+   pure subroutine settle(impacts, compressing, n, start, last, undisturbed, done)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
-      !> What the end of the phase brings to zero: [lane_count].
-      real(wp), intent(in) :: watched(lane_count)
+      !> The phase ends with the velocity, not with the deflection.
+      logical, intent(in) :: compressing
       !> Number of the step.
       real(wp), intent(in) :: n
       !> Step with which each lane begins: [lane_count].
@@ -169,74 +173,91 @@ contains
       logical, intent(inout) :: undisturbed
       !> All lanes have stopped.
       logical, intent(out) :: done
-      real(wp) :: on, finite, stays, moving, lost
-      integer :: i
+      logical, dimension(lane_count) :: on, stays
 
-      done = .false.
-      if (undisturbed) then
-         ! Nothing but zeros while every lane stays inside.
-         lost = 0.0_wp
-         !$omp simd private(finite) reduction(+: lost)
-         do i = 1, lane_count
-            finite = merge(0.0_wp, 1.0_wp, abs(impacts%next%velocity(i)) <= huge(1.0_wp))
-            lost = lost + finite + merge(0.0_wp, 1.0_wp, watched(i) > 0.0_wp)
-         end do
-         if (.not. lost > 0.0_wp) then
-            !$omp simd
-            do i = 1, lane_count
-               impacts%state%deflection(i) = impacts%next%deflection(i)
-               impacts%state%velocity(i) = impacts%next%velocity(i)
-               impacts%state%impulse(i) = impacts%next%impulse(i)
-               impacts%state%loss(i) = impacts%next%loss(i)
-            end do
-            return
+      associate (state => impacts%states(impacts%now), next => impacts%states(3 - impacts%now))
+         done = .false.
+         if (undisturbed) undisturbed = all_stay(next, compressing)
+         if (.not. undisturbed) then
+            on = n >= start .and. n < last
+            stays = on .and. is_finite(next%velocity) .and. get_watched(next, compressing) > 0.0_wp
+            impacts%left = impacts%left .or. (on .and. .not. is_finite(next%velocity))
+            where (on .and. .not. stays) last = n
+            where (.not. stays)
+               next%deflection = state%deflection
+               next%velocity = state%velocity
+               next%impulse = state%impulse
+               next%loss = state%loss
+            end where
+            done = .not. any(last > n)
          end if
-      end if
-      undisturbed = .false.
-      moving = 0.0_wp
-      lost = 0.0_wp
-      ! Products of ones and zeros, because compilers do not vectorise conditions joined by `.and.`.
-      !$omp simd private(on, finite, stays) reduction(max: moving, lost)
-      do i = 1, lane_count
-         on = merge(1.0_wp, 0.0_wp, n >= start(i))*merge(1.0_wp, 0.0_wp, n < last(i))
-         finite = merge(1.0_wp, 0.0_wp, abs(impacts%next%velocity(i)) <= huge(1.0_wp))
-         stays = on*finite*merge(1.0_wp, 0.0_wp, watched(i) > 0.0_wp)
-         if (stays > 0.0_wp) then
-            impacts%state%deflection(i) = impacts%next%deflection(i)
-            impacts%state%velocity(i) = impacts%next%velocity(i)
-            impacts%state%impulse(i) = impacts%next%impulse(i)
-            impacts%state%loss(i) = impacts%next%loss(i)
-         end if
-         if (on > stays) last(i) = n
-         moving = max(moving, merge(1.0_wp, 0.0_wp, last(i) > n))
-         lost = max(lost, on*(1 - finite))
-      end do
-      done = .not. moving > 0.0_wp
-      if (lost > 0.0_wp) impacts%left = impacts%left &
-         .or. (abs(last - n) < 0.5_wp .and. .not. abs(impacts%next%velocity) <= huge(1.0_wp))
+      end associate
+      impacts%now = 3 - impacts%now
    end subroutine settle
 
-   !> From the turning point to the end of its step, with the flux term of restitution.
-   subroutine turn(impacts, turns, length)
+   !> Whether all lanes stay inside the phase.
+   pure function all_stay(state, compressing) result(all_do)
+      !> The states.
+      type(state_lanes_type), intent(in) :: state
+      !> The phase ends with the velocity, not with the deflection.
+      logical, intent(in) :: compressing
+      !> They do.
+      logical :: all_do
+      real(wp) :: lost
+      integer :: i
+
+      ! Sums of zeros, which compilers vectorise; velocities are NaN where a stage has left the domain.
+      lost = 0.0_wp
+      if (compressing) then
+         !$omp simd reduction(+: lost)
+         do i = 1, lane_count
+            lost = lost + merge(0.0_wp, 1.0_wp, state%velocity(i) > 0.0_wp)
+         end do
+      else
+         !$omp simd reduction(+: lost)
+         do i = 1, lane_count
+            lost = lost + merge(0.0_wp, 1.0_wp, state%deflection(i) > 0.0_wp) + 0*state%velocity(i)
+         end do
+      end if
+      all_do = lost <= 0.0_wp
+   end function all_stay
+
+   !> To the turning point and on to the end of its step, with the flux term of restitution.
+   subroutine turn(impacts, turns)
       !> The impacts.
       type(impact_lanes_type), intent(inout) :: impacts
       !> The lane has a turning point: [lane_count].
       logical, intent(in) :: turns(lane_count)
-      !> Part of the step before the turning point: [lane_count].
-      real(wp), intent(in) :: length(lane_count)
+      real(wp) :: length(lane_count)
 
+      call locate(impacts, .true., turns, length)
       call finish_step(impacts, turns, length)
-      where (turns) impacts%state%velocity = 0.0_wp
-      impacts%max_deflection = impacts%state%deflection
-      impacts%pressure = not_a_number
-      call set_anchors(impacts%shell, impacts%state%deflection, impacts%pressure, impacts%anchor)
-      call get_forces(impacts%shell, impacts%state, impacts%pressure, impacts%force_unit, impacts%elastic_force, &
-         impacts%floor_force)
-      where (turns)
-         impacts%peak_force = max(impacts%peak_force, impacts%elastic_force)
-         impacts%shell%weight = impacts%restitution_weight
-      end where
+      where (turns) impacts%states(impacts%now)%velocity = 0.0_wp
+      impacts%shell%weight = impacts%restitution_weight
+      impacts%max_deflection = impacts%states(impacts%now)%deflection
       call finish_step(impacts, turns, 1 - length)
+      ! Taken at the beginning of that part of the step.
+      impacts%peak_force = impacts%elastic_force
+      impacts%peak_floor_force = impacts%floor_force
    end subroutine turn
+
+   !> Raises the forces at the turning point to the largest of all samples.
+   pure subroutine get_peaks(force, peak_force, peak_floor_force)
+      !> Elastic forces, then floor forces, N: [2 lane_count, n_sample].
+      real(wp), intent(in) :: force(:, :)
+      !> Largest elastic force, N: [lane_count].
+      real(wp), intent(inout) :: peak_force(lane_count)
+      !> Largest force on the floor, N: [lane_count].
+      real(wp), intent(inout) :: peak_floor_force(lane_count)
+      integer :: i, n
+
+      do n = 1, size(force, 2)
+         !$omp simd
+         do i = 1, lane_count
+            peak_force(i) = max(peak_force(i), force(i, n))
+            peak_floor_force(i) = max(peak_floor_force(i), force(lane_count + i, n))
+         end do
+      end do
+   end subroutine get_peaks
 
 end module thud_shell_impacts
