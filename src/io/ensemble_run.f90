@@ -10,13 +10,14 @@ module thud_ensemble_run
       new_band_projection
    use thud_constants, only: reference_force, reference_time
    use thud_ensemble, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
-   use thud_error, only: error_type
+   use thud_error, only: error_type, input_error, numerical_error
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
    use thud_set_status, only: set_is_fine
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
@@ -51,6 +52,8 @@ module thud_ensemble_run
       integer :: last_sample = 0
       !> Criteria of the standards, one set's values at a time.
       type(criterion_type) :: criteria(criterion_count)
+      !> What keeps the thread from going on.
+      type(error_type), allocatable :: error
    end type room_type
 
 contains
@@ -95,7 +98,7 @@ contains
       type(verdict_type), intent(out) :: verdicts(:)
       !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
-      !> The sampling cannot be used or the source is not known.
+      !> The sampling cannot be used, its records have no room in memory, or the source is not known.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
@@ -117,12 +120,15 @@ contains
          type(room_type) :: room
          integer :: block
 
-         call set_room(room, limits, get_class_window(size(projections%window)))
+         call set_room(room, sampling, limits, get_class_window(size(projections%window)))
          !$omp do schedule(dynamic)
          do block = 1, size(first) - 1
-            call run_block(room, order(first(block):first(block + 1) - 1))
+            if (.not. allocated(room%error)) call run_block(room, order(first(block):first(block + 1) - 1))
          end do
          !$omp end do
+         !$omp critical (thud_ensemble_error)
+         if (allocated(room%error)) error = room%error
+         !$omp end critical (thud_ensemble_error)
       end subroutine run_blocks
 
       !> One block, from its sets to its verdicts.
@@ -147,18 +153,24 @@ contains
 
    end subroutine solve_ensemble
 
-   !> Arrays of a thread.
-   subroutine set_room(room, limits, n_row)
-      !> The arrays.
+   !> Arrays of a thread. Memory that no contact comes to is never touched.
+   subroutine set_room(room, sampling, limits, n_row)
+      !> The arrays, or an error where there is no memory for them.
       type(room_type), intent(out) :: room
+      !> The sampling, for the error.
+      type(sampling_type), intent(in) :: sampling
       !> Limits of the source.
       type(source_limits_type), intent(in) :: limits
       !> Samples of the longest window.
       integer, intent(in) :: n_row
       real(wp) :: nothing(octave_count)
+      integer :: status
 
-      allocate (room%force(force_count*block_size*n_row + line_length), source=0.0_wp)
-      allocate (room%folded(force_count*block_size*n_row), source=0.0_wp)
+      allocate (room%force(force_count*block_size*n_row + line_length), room%folded(force_count*block_size*n_row), &
+         stat=status)
+      if (status /= 0) room%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
+         //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz needs more memory than there is for the forces of ' &
+         //to_text(block_size)//' sets; allowed: shorter records, or fewer threads')
       nothing = 0.0_wp
       room%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_room
@@ -201,7 +213,8 @@ contains
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
-         call require_window(projections, window)
+         call require_window(projections, window, room%error)
+         if (allocated(room%error)) return
          call get_band_energies(projections%window(window), force_count*block_size, force, room%folded, energy, square_sum)
          do i = 1, size(sets)
             if (class(i) /= window) cycle
@@ -230,16 +243,22 @@ contains
    end function get_force
 
    !> Makes the matrices of a window unless they are there.
-   subroutine require_window(projections, window)
+   subroutine require_window(projections, window, error)
       !> The matrices.
       type(projections_type), intent(inout) :: projections
       !> Number of the window.
       integer, intent(in) :: window
+      !> They cannot be made.
+      type(error_type), allocatable, intent(inout) :: error
+      logical :: failed
 
       !$omp critical (thud_projections)
+      failed = .false.
       if (projections%window(window)%n_sample == 0) call new_band_projection(get_class_window(window), &
-         projections%sample_rate, projections%bands, projections%window(window))
+         projections%sample_rate, projections%bands, projections%window(window), failed)
       !$omp end critical (thud_projections)
+      if (failed) error = numerical_error('&sampling: sample_rate: the matrices of the levels for ' &
+         //to_text(get_class_window(window))//' samples cannot be made; allowed: other rates')
    end subroutine require_window
 
    !> Whether a set meets all criteria. Peaks are counted last: that takes longer than all the rest.

@@ -80,21 +80,25 @@ contains
    end function get_class_window
 
    !> Matrices of a length, a rate and bands.
-   subroutine new_band_projection(n_sample, sample_rate, bands, projection)
+   subroutine new_band_projection(n_sample, sample_rate, bands, projection, failed)
       !> Samples of the records, even.
       integer, intent(in) :: n_sample
       !> Samples per second, Hz; at least twice the highest edge.
       real(wp), intent(in) :: sample_rate
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> The matrices.
+      !> The matrices; without samples where they cannot be made.
       type(band_projection_type), intent(out) :: projection
+      !> LAPACK does not find the sequences.
+      logical, intent(out) :: failed
       real(wp), allocatable :: node(:), root_weight(:), angle(:, :)
       integer :: i
 
       call use_one_blas_thread()
       projection%n_sample = n_sample
-      call set_sequences(projection, maxval(bands%upper)/sample_rate)
+      call set_sequences(projection, maxval(bands%upper)/sample_rate, failed)
+      if (failed) projection%n_sample = 0
+      if (failed) return
       call get_nodes(bands, real(n_sample, wp)/sample_rate, node, root_weight, projection%last_node)
       ! Angles from the middle of the record; each half of a sequence stands for both.
       allocate (angle(n_sample/2, size(node)))
@@ -109,11 +113,13 @@ contains
    end subroutine new_band_projection
 
    !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
-   subroutine set_sequences(projection, half_width)
+   subroutine set_sequences(projection, half_width, failed)
       !> The projection.
       type(band_projection_type), intent(inout) :: projection
       !> W over the sampling rate.
       real(wp), intent(in) :: half_width
+      !> LAPACK does not find them.
+      logical, intent(out) :: failed
       real(wp), dimension(projection%n_sample) :: diagonal, beside, values
       real(wp) :: work(20*projection%n_sample)
       real(wp), allocatable :: vectors(:, :)
@@ -123,10 +129,12 @@ contains
       n = projection%n_sample
       rank = min(n, int(2*n*half_width) + margin)
       diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
-      beside = [(i*(n - i)/2.0_wp, i=1, n)]
+      beside = [(real(i, wp)*(n - i)/2, i=1, n)]
       allocate (vectors(n, rank))
       call dstevr('V', 'I', n, diagonal, beside, 0.0_wp, 0.0_wp, n - rank + 1, n, 0.0_wp, found, values, vectors, n, &
          support, work, size(work), whole_work, size(whole_work), status)
+      failed = status /= 0 .or. found /= rank
+      if (failed) return
       ! The largest value belongs to the first, symmetric sequence; then they take turns.
       vectors = vectors(:, rank:1:-1)
       projection%even = (vectors(:n/2, 1::2) + vectors(n:n/2 + 1:-1, 1::2))/2
