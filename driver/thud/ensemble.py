@@ -129,8 +129,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
     Raises
     ------
     InputError
-        Where a key is not known, arrays do not broadcast or hold no numbers, or the sampling, the
-        bands or the number of threads cannot be used.
+        Where a key is not known, arrays do not broadcast or hold no numbers, the sampling, the
+        bands or the number of threads cannot be used, or the results have no room in memory.
     """
     columns, flux = _columns(parameters)
     octaves = len(get_bands().nominal)
@@ -143,20 +143,25 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
     n_set = len(flux)
     numbers = np.zeros((max(n_set, 1), len(_KEYS)))
     numbers[:n_set] = np.stack([columns[key] for key in _KEYS], axis=1)
-    with _ONE_AT_A_TIME:
-        status, scalars, levels, met, force = call(
-            ensemble_door.solve_sets,
-            numbers.T,
-            np.resize(flux + 1, len(numbers)),
-            *sampling,
-            steps,
-            str(source).encode("ascii", "replace"),
-            _threads(threads),
-            int(bands is not None),
-            more,
-            len(numbers) if forces else 0,
-            n_sample if forces else 0,
-        )
+    try:
+        with _ONE_AT_A_TIME:
+            status, scalars, levels, met, force = call(
+                ensemble_door.solve_sets,
+                numbers.T,
+                np.resize(flux + 1, len(numbers)),
+                *sampling,
+                steps,
+                str(source).encode("ascii", "replace"),
+                _threads(threads),
+                int(bands is not None),
+                more,
+                len(numbers) if forces else 0,
+                n_sample if forces else 0,
+            )
+    except MemoryError as error:
+        size = f"{n_set} sets of {n_sample} samples" if forces else f"{n_set} sets"
+        message = f"forces = {forces} for {size} needs more memory than there is; allowed: fewer sets"
+        raise InputError(message) from error
     levels = np.moveaxis(levels, 2, 0)[:n_set]
     wanted = levels[:, octaves:] if more else levels[:, :count]
     contact_time, peak_force, peak_floor_force, max_deflection, restitution, impulse = scalars

@@ -92,16 +92,24 @@ def test_fails_where_the_single_solver_fails() -> None:
 
 
 def test_a_conforming_source_conforms() -> None:
-    # Limits that the shell model can meet are those of the tyre's lowest octave only; so the
-    # criteria are counted one by one against the verdict of the single solver.
+    # By the force on the floor some small, heavy balls conform; the elastic force never does.
     random = np.random.default_rng(5)
     count = 40
-    parameters = {"youngs_modulus": random.uniform(1.2e6, 2.2e6, count),
-                  "outer_radius": random.uniform(0.07, 0.11, count)}  # fmt: skip
-    ensemble = thud.solve_many(parameters, source="tyre")
+    parameters = {"youngs_modulus": random.uniform(1.9e6, 2.2e6, count),
+                  "outer_radius": np.full(count, 0.06105), "wall_thickness": np.full(count, 0.0244),
+                  "mass": np.full(count, 2.59), "gauge_pressure": np.full(count, 17.8e3)}  # fmt: skip
+    ensemble = thud.solve_many(parameters)
+    assert 5 < np.count_nonzero(ensemble.floor_conforms) < count - 5
     for i in range(count):
         ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
-        assert ensemble.conforms[i] == bool(thud.solve(ball).conformity("tyre"))
+        impact = thud.solve(ball)
+        assert ensemble.conforms[i] == bool(impact.conformity(force="elastic"))
+        assert ensemble.floor_conforms[i] == bool(impact.conformity(force="floor"))
+
+
+def test_forces_beyond_the_memory_are_refused() -> None:
+    with pytest.raises(thud.InputError, match="forces = True for 10000000 sets of 441000 samples"):
+        thud.solve_many({"height": np.ones(10_000_000)}, duration=10.0, forces=True)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])
