@@ -160,7 +160,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
             )
     except MemoryError as error:
         size = f"{n_set} sets of {n_sample} samples" if forces else f"{n_set} sets"
-        message = f"forces = {forces} for {size} needs more memory than there is; allowed: fewer sets"
+        message = f"forces = {forces} for {size} has no room in memory; allowed: fewer sets"
         raise InputError(message) from error
     levels = np.moveaxis(levels, 2, 0)[:n_set]
     wanted = levels[:, octaves:] if more else levels[:, :count]

@@ -8,13 +8,15 @@ module thud_progress
 
    abstract interface
       !> Shows how far the work is.
-      subroutine handler(done, whole)
+      subroutine handler(done, whole, unit)
          import :: wp
          implicit none (type, external)
-         !> Time that has been computed, s.
+         !> How much has been computed.
          real(wp), intent(in) :: done
-         !> Time that there is to compute at most, s.
+         !> How much there is to compute at most; 0 where nobody knows.
          real(wp), intent(in) :: whole
+         !> What is counted.
+         character(len=*), intent(in) :: unit
       end subroutine handler
    end interface
 
@@ -33,17 +35,19 @@ contains
    end subroutine set_progress_handler
 
    !> Tells how far the work is.
-   subroutine report_progress(done, whole)
-      !> Time that has been computed, s.
+   subroutine report_progress(done, whole, unit)
+      !> How much has been computed.
       real(wp), intent(in) :: done
-      !> Time that there is to compute at most, s.
+      !> How much there is to compute at most; 0 where nobody knows.
       real(wp), intent(in) :: whole
+      !> What is counted.
+      character(len=*), intent(in) :: unit
 
       procedure(handler), pointer :: current
 
       ! Another thread may change it meanwhile.
       current => show
-      if (associated(current)) call current(done, whole)
+      if (associated(current)) call current(done, whole, unit)
    end subroutine report_progress
 
 end module thud_progress

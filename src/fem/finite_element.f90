@@ -114,7 +114,7 @@ contains
       if (size(motion%time) > 0) stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
-         if (mod(i - 1, look) == 0) call report_progress(time, sampling%duration)
+         if (mod(i - 1, look) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
          if (mod(i - 1, look) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
          if (n_step > most_steps .or. real(n_step, wp)*n_sample*size(run%position)/2 > most_work) then
             error = numerical_error(trim(place(time))//' stability asks for steps below ' &

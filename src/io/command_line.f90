@@ -6,6 +6,7 @@ module thud_command_line
    use thud_posix, only: ignore_signals, print_text, standard_error, standard_output
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
+   use thud_sets_run, only: run_sets
    use thud_text, only: newline, quoted
    implicit none (type, external)
    private
@@ -15,12 +16,20 @@ module thud_command_line
    !> Exit code where the source does not conform and `--check` asks for it.
    integer, parameter :: not_conforming = 3
 
+   !> Most threads, and how that is said.
+   integer, parameter :: most_threads = 1024
+   character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
+
    !> What the command line asks for.
    type :: request_type
       !> Path of the case file.
       character(len=:), allocatable :: case_file
       !> Output directory, empty where not given.
       character(len=:), allocatable :: output
+      !> Path of a table of sets, empty where not given.
+      character(len=:), allocatable :: sets
+      !> Threads for them.
+      integer :: threads = 1
       !> Exit with 3 where the source does not conform.
       logical :: check = .false.
       !> Nothing on the screen but errors.
@@ -49,7 +58,11 @@ contains
          call say(standard_output, request%information, exit_code)
       else
          if (.not. request%quiet) call begin_progress()
-         call run_case(request%case_file, request%output, outcome, error)
+         if (request%sets == '') then
+            call run_case(request%case_file, request%output, outcome, error)
+         else
+            call run_sets(request%case_file, request%sets, request%threads, request%output, outcome, error)
+         end if
          call end_progress()
          if (allocated(error)) then
             call say(standard_error, 'thud: '//error%message, exit_code)
@@ -82,10 +95,11 @@ contains
       type(request_type), intent(out) :: request
       !> An argument is unknown, missing or given twice.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: argument
+      character(len=:), allocatable :: argument, number
       integer :: i
 
       request%output = ''
+      request%sets = ''
       i = 1
       do while (i <= command_argument_count())
          argument = get_argument(i)
@@ -104,27 +118,65 @@ contains
          case ('--quiet', '-q')
             request%quiet = .true.
          case ('--output', '-o')
-            i = i + 1
-            if (i <= command_argument_count()) request%output = get_argument(i)
-            if (request%output == '') then
-               error = input_error('--output has no value; allowed: a directory')
-               return
-            end if
+            call take_value(i, '--output', 'a directory', request%output, error)
+         case ('--sets')
+            call take_value(i, '--sets', 'a table of sets', request%sets, error)
+         case ('--threads')
+            call take_value(i, '--threads', threads_allowed, number, error)
+            if (.not. allocated(error)) call take_threads(number, request%threads, error)
          case default
             if (index(argument, '-') == 1) then
-               error = input_error(quoted(argument)//' is not a known option; allowed: --output DIR, --check, --quiet, ' &
-                  //'--keys, --help, --version')
+               error = input_error(quoted(argument)//' is not a known option; allowed: --output DIR, --sets TABLE, ' &
+                  //'--threads N, --check, --quiet, --keys, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
                request%case_file = argument
             end if
-            if (allocated(error)) return
          end select
+         if (allocated(error)) return
          i = i + 1
       end do
-      if (.not. allocated(request%case_file)) error = input_error('no case is given')
+      if (.not. allocated(request%case_file)) then
+         error = input_error('no case is given')
+      else if (request%sets == '' .and. allocated(number)) then
+         error = input_error('--threads does nothing without --sets; allowed: both')
+      end if
    end subroutine parse_arguments
+
+   !> The value behind an option.
+   subroutine take_value(i, option, allowed, value, error)
+      !> Number of the argument, of the option before and of its value after.
+      integer, intent(inout) :: i
+      !> The option.
+      character(len=*), intent(in) :: option
+      !> What it takes.
+      character(len=*), intent(in) :: allowed
+      !> The value.
+      character(len=:), allocatable, intent(inout) :: value
+      !> There is none.
+      type(error_type), allocatable, intent(out) :: error
+
+      i = i + 1
+      value = ''
+      if (i <= command_argument_count()) value = get_argument(i)
+      if (value == '') error = input_error(option//' has no value; allowed: '//allowed)
+   end subroutine take_value
+
+   !> A number of threads.
+   subroutine take_threads(text, threads, error)
+      !> The number as text.
+      character(len=*), intent(in) :: text
+      !> The number.
+      integer, intent(out) :: threads
+      !> It is none.
+      type(error_type), allocatable, intent(out) :: error
+
+      threads = 0
+      if (verify(text, '0123456789') == 0 .and. len(text) <= 4) read (text, *) threads
+      if (threads < 1 .or. threads > most_threads) error = input_error('--threads = '//quoted(text) &
+         //' is not allowed; allowed: '//threads_allowed)
+   end subroutine take_threads
 
    !> One argument of the command line.
    function get_argument(i) result(argument)
@@ -144,7 +196,8 @@ contains
       !> The line.
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--output DIR] [--check] [--quiet] | --keys | --help | --version'
+      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--check] [--quiet] | --keys | --help | ' &
+         //'--version'
    end function usage
 
    !> The help text.
@@ -155,7 +208,10 @@ contains
       text = 'Force of a heavy/soft impact source on the floor, its levels and a verdict.'//newline &
          //newline//'Usage: '//usage()//newline//newline &
          //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
-         //'  -o, --output DIR   directory for the results (default: outputs/<case name>)'//newline &
+         //'  -o, --output DIR   directory for the results (default: outputs/<case>, of sets <case>_sets)'//newline &
+         //'  --sets TABLE.csv   many drops of hollow_sphere: keys of &ball, &drop and &hollow_sphere in the'//newline &
+         //'                     first line, one set in each other; the rest is as in CASE.nml'//newline &
+         //'  --threads N        threads for them (default: 1)'//newline &
          //'  --check            exit with 3 where the source does not conform to the limits'//newline &
          //'  -q, --quiet        show nothing but errors and remarks'//newline &
          //'  --keys             show every key with default, range and meaning'//newline &

@@ -163,14 +163,15 @@ contains
       type(source_limits_type), intent(in) :: limits
       !> Samples of the longest window.
       integer, intent(in) :: n_row
+      character(len=128) :: message
       real(wp) :: nothing(octave_count)
       integer :: status
 
-      allocate (room%force(force_count*block_size*n_row + line_length), room%folded(force_count*block_size*n_row), &
-         stat=status)
+      allocate (room%force(force_count*block_size*n_row + line_length), stat=status, errmsg=message)
+      if (status == 0) allocate (room%folded(force_count*block_size*n_row), stat=status, errmsg=message)
       if (status /= 0) room%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
-         //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz needs more memory than there is for the forces of ' &
-         //to_text(block_size)//' sets; allowed: shorter records, or fewer threads')
+         //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
+         //' sets no room in memory ('//trim(message)//'); allowed: shorter records, or fewer threads')
       nothing = 0.0_wp
       room%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_room

@@ -9,7 +9,8 @@ module thud_file
    implicit none (type, external)
    private
 
-   public :: check_owner, get_file_stem, read_text_file, remove_parts, text_file_type, write_files
+   public :: check_owner, close_part, finish_part, get_file_stem, open_part, read_text_file, remove_parts, text_file_type
+   public :: write_files, write_part
 
    !> Size of the largest input file that is read, bytes.
    integer(int64), parameter :: largest_input = 65536_int64
@@ -142,7 +143,7 @@ contains
             error = input_error('--output '//directory//': '//trim(files(i)%name) &
                //' is a directory; allowed: a file of this name')
          else
-            call write_text_file(directory//'/.'//trim(files(i)%name)//'.part', files(i)%content, error)
+            call write_text_file(get_part(directory, files(i)%name), files(i)%content, error)
          end if
          if (allocated(error)) exit
       end do
@@ -150,9 +151,8 @@ contains
       if (.not. allocated(error)) then
          call ignore_interrupts(.true., interrupt)
          do i = 1, size(files)
-            call rename_file(directory//'/.'//trim(files(i)%name)//'.part', directory//'/'//trim(files(i)%name), done)
-            if (.not. done) error = input_error('--output '//directory//': '//trim(files(i)%name)//' cannot be replaced; ' &
-               //'allowed: a directory that you may write to')
+            call rename_file(get_part(directory, files(i)%name), directory//'/'//trim(files(i)%name), done)
+            if (.not. done) error = replacing_error(directory, files(i)%name)
          end do
          call ignore_interrupts(.false., interrupt)
       end if
@@ -170,9 +170,123 @@ contains
       integer :: i
 
       do i = 1, size(names)
-         call remove_file(directory//'/.'//trim(names(i))//'.part')
+         call remove_file(get_part(directory, names(i)))
       end do
    end subroutine remove_parts
+
+   !> Begins a file that is too large to be held as one text; it has its name when it is finished.
+   subroutine open_part(directory, name, unit, error)
+      !> The directory, which is made where it is missing.
+      character(len=*), intent(in) :: directory
+      !> Name of the file.
+      character(len=*), intent(in) :: name
+      !> The unit.
+      integer, intent(out) :: unit
+      !> The file cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=256) :: message
+      logical :: done
+      integer :: status
+
+      message = 'the directory cannot be made'
+      status = 1
+      call make_directory(directory, done)
+      if (done) open (newunit=unit, file=get_part(directory, name), status='replace', action='write', access='stream', &
+         form='unformatted', iostat=status, iomsg=message)
+      if (status /= 0) error = writing_error(get_part(directory, name), message)
+   end subroutine open_part
+
+   !> Adds to such a file.
+   subroutine write_part(directory, name, unit, text, error)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Name of the file.
+      character(len=*), intent(in) :: name
+      !> Its unit.
+      integer, intent(in) :: unit
+      !> The text.
+      character(len=*), intent(in) :: text
+      !> It could not be written completely.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=256) :: message
+      integer :: status
+
+      write (unit, iostat=status, iomsg=message) text
+      if (status == 0) flush (unit, iostat=status, iomsg=message)
+      if (status /= 0) error = writing_error(get_part(directory, name), message)
+   end subroutine write_part
+
+   !> Closes such a file; after an error it is removed, and a directory without files with it.
+   subroutine close_part(directory, name, unit, error)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Name of the file.
+      character(len=*), intent(in) :: name
+      !> Its unit.
+      integer, intent(in) :: unit
+      !> What went wrong before, or now.
+      type(error_type), allocatable, intent(inout) :: error
+      character(len=256) :: message
+      integer :: status
+
+      close (unit, iostat=status, iomsg=message)
+      if (status /= 0 .and. .not. allocated(error)) error = writing_error(get_part(directory, name), message)
+      if (.not. allocated(error)) return
+      call remove_file(get_part(directory, name))
+      if (is_empty_directory(directory)) call remove_file(directory)
+   end subroutine close_part
+
+   !> Gives such a file its name.
+   subroutine finish_part(directory, name, error)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Name of the file.
+      character(len=*), intent(in) :: name
+      !> There is something else of that name.
+      type(error_type), allocatable, intent(out) :: error
+      logical :: done
+
+      call rename_file(get_part(directory, name), directory//'/'//name, done)
+      if (.not. done) error = replacing_error(directory, name)
+   end subroutine finish_part
+
+   !> Path of a file while it is written.
+   pure function get_part(directory, name) result(path)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Name of the file.
+      character(len=*), intent(in) :: name
+      !> The path.
+      character(len=len(directory) + len_trim(name) + 7) :: path
+
+      path = directory//'/.'//trim(name)//'.part'
+   end function get_part
+
+   !> Error of a file that cannot be written.
+   pure function writing_error(path, message) result(error)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> What the run-time library says.
+      character(len=*), intent(in) :: message
+      !> The error.
+      type(error_type) :: error
+
+      error = input_error('--output: '//path//' cannot be written ('//trim(message) &
+         //'); allowed: a directory that you may write to, with room on its disk')
+   end function writing_error
+
+   !> Error of a file that cannot have its name.
+   pure function replacing_error(directory, name) result(error)
+      !> The directory.
+      character(len=*), intent(in) :: directory
+      !> Name of the file.
+      character(len=*), intent(in) :: name
+      !> The error.
+      type(error_type) :: error
+
+      error = input_error('--output '//directory//': '//trim(name)//' cannot be replaced; allowed: a directory that you ' &
+         //'may write to')
+   end function replacing_error
 
    !> Writes one file.
    subroutine write_text_file(path, content, error)
@@ -197,8 +311,7 @@ contains
             message = close_message
          end if
       end if
-      if (status /= 0) error = input_error('--output: '//path//' cannot be written ('//trim(message) &
-         //'); allowed: a directory that you may write to, with room on its disk')
+      if (status /= 0) error = writing_error(path, message)
    end subroutine write_text_file
 
 end module thud_file

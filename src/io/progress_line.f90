@@ -39,18 +39,24 @@ contains
    end subroutine end_progress
 
    !> Prints the line.
-   subroutine print_line(done, whole)
-      !> Time that has been computed, s.
+   subroutine print_line(done, whole, unit)
+      !> How much has been computed.
       real(wp), intent(in) :: done
-      !> Time that there is to compute at most, s.
+      !> How much there is to compute at most; 0 where nobody knows.
       real(wp), intent(in) :: whole
+      !> What is counted.
+      character(len=*), intent(in) :: unit
       integer(int64) :: now
 
       call system_clock(now)
       if (real(now - latest, wp) < patience*real(rate, wp)) return
       latest = now
-      call print_text(standard_error, achar(13)//'thud: '//fixed(1.0e3_wp*done, 1)//' of at most ' &
-         //fixed(1.0e3_wp*whole, 1)//' ms computed', shown)
+      if (whole > 0.0_wp) then
+         call print_text(standard_error, achar(13)//'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit &
+            //' computed', shown)
+      else
+         call print_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', shown)
+      end if
    end subroutine print_line
 
 end module thud_progress_line

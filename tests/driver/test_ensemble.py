@@ -96,8 +96,9 @@ def test_a_conforming_source_conforms() -> None:
     random = np.random.default_rng(5)
     count = 40
     parameters = {"youngs_modulus": random.uniform(1.9e6, 2.2e6, count),
-                  "outer_radius": np.full(count, 0.06105), "wall_thickness": np.full(count, 0.0244),
-                  "mass": np.full(count, 2.59), "gauge_pressure": np.full(count, 17.8e3)}  # fmt: skip
+                  "outer_radius": np.full(count, 0.06105),
+                  "wall_thickness": np.full(count, 0.0244), "mass": np.full(count, 2.59),
+                  "gauge_pressure": np.full(count, 17.8e3)}  # fmt: skip
     ensemble = thud.solve_many(parameters)
     assert 5 < np.count_nonzero(ensemble.floor_conforms) < count - 5
     for i in range(count):

@@ -1,0 +1,328 @@
+!> A run of many sets of the shell model from end to end: case and table in, one row of results per set out, a
+!> chunk at a time, so that the memory does not grow with the table.
+module thud_sets_run
+   use thud_band, only: band_type, get_octaves, get_thirds, octave_count
+   use thud_case, only: case_type, get_case_text
+   use thud_constants, only: version
+   use thud_ensemble, only: get_set_fields, parameter_count, set_outcome_type, set_type
+   use thud_ensemble_run, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type
+   use thud_file, only: check_owner, close_part, finish_part, open_part, text_file_type, write_files, write_part
+   use thud_hollow_sphere, only: flux_choices
+   use thud_kinds, only: wp
+   use thud_progress, only: report_progress
+   use thud_run, only: load_case, outcome_type
+   use thud_sampling, only: get_sample_count
+   use thud_set_status, only: get_status_text, set_is_fine, set_range
+   use thud_set_table, only: close_set_table, open_set_table, read_sets, set_table_type
+   use thud_text, only: fixed, newline, quoted, to_text
+   implicit none (type, external)
+   private
+
+   public :: run_sets
+
+   !> Sets that are read, computed and written at a time.
+   integer, parameter :: chunk_size = 16384
+
+   !> Files of the results.
+   character(len=*), parameter :: result_file = 'sets.csv', input_file = 'effective.nml'
+
+   !> Columns behind the parameters.
+   character(len=*), parameter :: outcome_names = 'contact_time_s,peak_force_N,peak_floor_force_N,max_deflection_m,' &
+      //'restitution,impulse_N_s'
+
+   !> Names of the forces.
+   character(len=7), parameter :: force_names(force_count) = [character(len=7) :: 'elastic', 'floor']
+
+   !> What many sets came to.
+   type :: tally_type
+      !> Sets, those that were computed, and those that conform by the force of the case.
+      integer :: sets = 0, computed = 0, conforming = 0
+      !> Smallest and largest contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
+      real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
+   end type tally_type
+
+contains
+
+   !> Computes all sets of a table and writes their results.
+   subroutine run_sets(path, table_path, threads, output, outcome, error)
+      !> Path of the namelist file, which gives what the table does not.
+      character(len=*), intent(in) :: path
+      !> Path of the table.
+      character(len=*), intent(in) :: table_path
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Directory for the results; empty for `outputs/<name of the case>_sets`.
+      character(len=*), intent(in) :: output
+      !> Table, verdict and place of the results.
+      type(outcome_type), intent(out) :: outcome
+      !> The run failed; nothing was written.
+      type(error_type), allocatable, intent(out) :: error
+      type(case_type) :: case
+      type(set_table_type) :: table
+      type(text_file_type) :: input(1)
+      type(tally_type) :: tally
+      logical :: differs
+
+      call load_case(path, case, error)
+      if (allocated(error)) return
+      call check_case(case, error)
+      if (allocated(error)) then
+         error%message = path//': '//error%message
+         return
+      end if
+      call open_set_table(table_path, table, error)
+      if (allocated(error)) return
+      outcome%directory = output
+      if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
+      outcome%remark = ''
+      input(1)%name = input_file
+      input(1)%content = get_case_text(case)
+      call check_owner(outcome%directory, [character(len=13) :: result_file, input_file], input_file, input(1)%content, &
+         differs, error)
+      if (.not. allocated(error)) call write_sets(case, table, threads, outcome%directory, tally, error)
+      call close_set_table(table)
+      if (.not. allocated(error)) call write_files(outcome%directory, input, error)
+      if (.not. allocated(error)) call finish_part(outcome%directory, result_file, error)
+      if (allocated(error)) return
+      if (differs) outcome%remark = path//': replaces the results of another input of the same name in '//outcome%directory
+      outcome%conforms = tally%conforming == tally%sets
+      call describe(case, tally, outcome%table)
+   end subroutine run_sets
+
+   !> Complains about cases whose sets cannot be computed together.
+   subroutine check_case(case, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Names the key.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (.not. case%has_impact .or. case%model /= 'hollow_sphere') then
+         error = input_error('&model: name = '//quoted(case%model)//" has no sets; allowed: 'hollow_sphere'")
+      else if (case%level_method /= 'exact') then
+         error = input_error('&levels: method = '//quoted(case%level_method)//" is not for sets; allowed: 'exact'")
+      end if
+   end subroutine check_case
+
+   !> Computes and writes chunk after chunk.
+   subroutine write_sets(case, table, threads, directory, tally, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> The table, open.
+      type(set_table_type), intent(inout) :: table
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Directory of the results, which is made where it is missing.
+      character(len=*), intent(in) :: directory
+      !> What the sets came to.
+      type(tally_type), intent(inout) :: tally
+      !> A value is none, the sampling cannot be used, or the file cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+      type(set_type) :: base
+      type(set_type), allocatable :: sets(:)
+      type(set_outcome_type), allocatable :: outcomes(:)
+      type(verdict_type), allocatable :: verdicts(:)
+      real(wp), allocatable :: levels(:, :, :), no_forces(:, :, :)
+      type(projections_type) :: projections
+      type(band_type), allocatable :: more(:)
+      type(text_file_type) :: parts(threads)
+      character(len=:), allocatable :: text
+      integer :: unit, n, first_band, first, last, i
+
+      base = set_type(case%ball, case%drop, &
+         findloc(flux_choices == case%options%hollow_sphere%momentum_flux, .true., dim=1))
+      allocate (more(0))
+      if (case%bands /= 'octave') more = get_thirds()
+      ! The octaves come first and serve the verdict also where only thirds are asked for.
+      first_band = merge(octave_count, 0, case%bands == 'third') + 1
+      projections = new_projections(case%sampling%sample_rate, more, get_sample_count(case%sampling))
+      allocate (sets(chunk_size), outcomes(chunk_size), verdicts(chunk_size), no_forces(0, 0, 0))
+      allocate (levels(octave_count + size(more), force_count, chunk_size))
+      call open_part(directory, result_file, unit, error)
+      if (allocated(error)) return
+      call get_header(table, projections%bands(first_band:), text)
+      call write_part(directory, result_file, unit, text, error)
+      do while (.not. allocated(error))
+         call read_sets(table, base, sets, n, error)
+         if (allocated(error) .or. n == 0) exit
+         call solve_ensemble(sets(:n), case%sampling, trim(case%source), threads, .true., projections, outcomes(:n), &
+            levels(:, :, :n), verdicts(:n), no_forces, error)
+         if (allocated(error)) exit
+         call add(tally, outcomes(:n), levels(:, :, :n), verdicts(:n), merge(1, 2, case%level_force == 'elastic'))
+         ! To write numbers takes longer than to compute them.
+         !$omp parallel do num_threads(threads) private(first, last)
+         do i = 1, threads
+            first = (i - 1)*n/threads + 1
+            last = i*n/threads
+            call get_rows(table, tally%sets - n + first - 1, sets(first:last), outcomes(first:last), &
+               levels(first_band:, :, first:last), verdicts(first:last), parts(i)%content)
+         end do
+         !$omp end parallel do
+         do i = 1, threads
+            if (.not. allocated(error)) call write_part(directory, result_file, unit, parts(i)%content, error)
+         end do
+         call report_progress(real(tally%sets, wp), 0.0_wp, 'sets')
+      end do
+      if (.not. allocated(error) .and. tally%sets == 0) error = input_error(trim(table%path) &
+         //': the table has no sets; allowed: one in each line below the keys')
+      call close_part(directory, result_file, unit, error)
+   end subroutine write_sets
+
+   !> First line of the results.
+   subroutine get_header(table, bands, text)
+      !> The table.
+      type(set_table_type), intent(in) :: table
+      !> Bands of the levels: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> The line.
+      character(len=:), allocatable, intent(out) :: text
+      integer :: i, j
+
+      text = 'set'
+      do i = 1, size(table%columns)
+         text = text//','//trim(table%keys(table%columns(i)))
+      end do
+      text = text//','//outcome_names
+      do j = 1, force_count
+         do i = 1, size(bands)
+            text = text//','//trim(force_names(j)) &
+               //trim(merge('_octave_', '_third_ ', bands(i)%upper > 1.5_wp*bands(i)%lower)) &
+               //get_band_name(bands(i))//'_Hz_dB'
+         end do
+      end do
+      do j = 1, force_count
+         text = text//','//trim(force_names(j))//'_conforms'
+      end do
+      text = text//',status'//newline
+   end subroutine get_header
+
+   !> Lines of the results, 17 digits; what could not be computed is left out.
+   subroutine get_rows(table, before, sets, outcomes, levels, verdicts, text)
+      !> The table.
+      type(set_table_type), intent(in) :: table
+      !> Number of sets before these.
+      integer, intent(in) :: before
+      !> The sets: [n_set].
+      type(set_type), intent(in), target :: sets(:)
+      !> Their outcomes: [n_set].
+      type(set_outcome_type), intent(in) :: outcomes(:)
+      !> Their levels, dB: [n_band, force_count, n_set].
+      real(wp), intent(in) :: levels(:, :, :)
+      !> Their verdicts: [n_set].
+      type(verdict_type), intent(in) :: verdicts(:)
+      !> The lines.
+      character(len=:), allocatable, intent(out) :: text
+      !> Room for a number with its comma, and for all that is none.
+      integer, parameter :: number_width = 26, rest_width = 192
+      character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
+      character(len=number_width*(size(table%columns) + 6 + size(levels, 1)*force_count) + rest_width) :: row
+      type(set_type), target :: set
+      type(field_type) :: fields(parameter_count)
+      integer :: i, j, at, end_of_text
+
+      fields = get_set_fields(set)
+      allocate (character(len=len(row)*size(sets)) :: text)
+      end_of_text = 0
+      do i = 1, size(sets)
+         set = sets(i)
+         row = to_text(before + i)
+         do j = 1, size(table%columns)
+            at = len_trim(row) + 1
+            if (table%columns(j) <= parameter_count) then
+               write (row(at:), numbers_form) fields(table%columns(j))%real_value
+            else
+               row(at:) = ','//flux_choices(set%flux)
+            end if
+         end do
+         at = len_trim(row) + 1
+         if (outcomes(i)%status == set_is_fine) then
+            associate (found => outcomes(i))
+               write (row(at:), numbers_form) found%contact_time, found%peak_force, found%peak_floor_force, &
+                  found%max_deflection, found%restitution, found%impulse, levels(:, :, i)
+            end associate
+            row(len_trim(row) + 1:) = ','//get_word(verdicts(i)%conforms(1))//','//get_word(verdicts(i)%conforms(2))
+         else
+            row(at:) = repeat(',', 6 + size(levels, 1)*force_count + force_count)
+         end if
+         associate (key => fields(max(1, min(parameter_count, outcomes(i)%status - set_range)))%key)
+            row(len_trim(row) + 1:) = ','//trim(get_status_text(outcomes(i)%status, key))//newline
+         end associate
+         at = index(row, newline)
+         text(end_of_text + 1:end_of_text + at) = row(:at)
+         end_of_text = end_of_text + at
+      end do
+      text = text(:end_of_text)
+   end subroutine get_rows
+
+   !> Nominal frequency of a band: 31.5, 63.
+   pure function get_band_name(band) result(name)
+      !> The band.
+      type(band_type), intent(in) :: band
+      !> Its name.
+      character(len=len(fixed(band%nominal, merge(1, 0, band%nominal < 32)))) :: name
+
+      name = fixed(band%nominal, merge(1, 0, band%nominal < 32))
+   end function get_band_name
+
+   !> A verdict in a table.
+   pure function get_word(conforms) result(word)
+      !> The verdict.
+      logical, intent(in) :: conforms
+      !> Yes or no.
+      character(len=merge(3, 2, conforms)) :: word
+
+      word = merge('yes', 'no ', conforms)
+   end function get_word
+
+   !> Adds sets to a tally.
+   pure subroutine add(tally, outcomes, levels, verdicts, force)
+      !> The tally.
+      type(tally_type), intent(inout) :: tally
+      !> Outcomes of the sets: [n_set].
+      type(set_outcome_type), intent(in) :: outcomes(:)
+      !> Levels, dB, octaves first: [n_band, force_count, n_set].
+      real(wp), intent(in) :: levels(:, :, :)
+      !> The verdicts: [n_set].
+      type(verdict_type), intent(in) :: verdicts(:)
+      !> Number of the force that the verdict is on.
+      integer, intent(in) :: force
+      real(wp) :: values(octave_count + 1)
+      integer :: i
+
+      tally%sets = tally%sets + size(outcomes)
+      do i = 1, size(outcomes)
+         if (outcomes(i)%status /= set_is_fine) cycle
+         tally%computed = tally%computed + 1
+         if (verdicts(i)%conforms(force)) tally%conforming = tally%conforming + 1
+         values = [outcomes(i)%contact_time, levels(:octave_count, force, i)]
+         tally%span(:, 1) = min(tally%span(:, 1), values)
+         tally%span(:, 2) = max(tally%span(:, 2), values)
+      end do
+   end subroutine add
+
+   !> What the screen shows.
+   subroutine describe(case, tally, text)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> What the sets came to.
+      type(tally_type), intent(in) :: tally
+      !> The table.
+      character(len=:), allocatable, intent(out) :: text
+      type(band_type) :: octaves(octave_count)
+      integer :: i
+
+      text = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline &
+         //'  '//to_text(tally%sets)//' sets, '//to_text(tally%computed)//' computed, '//to_text(tally%conforming) &
+         //' conform to the limits of the '//trim(case%source)//' by the '//trim(case%level_force)//' force.'//newline
+      if (tally%computed == 0) return
+      octaves = get_octaves()
+      text = text//'  contact time  '//fixed(1.0e3_wp*tally%span(1, 1), 3)//' to '//fixed(1.0e3_wp*tally%span(1, 2), 3) &
+         //' ms'//newline
+      do i = 1, octave_count
+         text = text//'  '//get_band_name(octaves(i))//' Hz  '//fixed(tally%span(i + 1, 1), 2)//' to ' &
+            //fixed(tally%span(i + 1, 2), 2)//' dB'//newline
+      end do
+   end subroutine describe
+
+end module thud_sets_run

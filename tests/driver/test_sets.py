@@ -1,0 +1,177 @@
+"""Tables of sets through the executable."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import thud
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+
+CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
+&model name = 'hollow_sphere' /
+"""
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """Return a case file."""
+    path = tmp_path / "ball.nml"
+    path.write_text(CASE)
+    return path
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table of results."""
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> None:
+    random = np.random.default_rng(1)
+    heights = random.uniform(0.5, 1.5, 40)
+    flux = np.resize(["momentum_balance", "retarding", "conservative", "none"], 40)
+    table = tmp_path / "table.csv"
+    lines = [
+        f"{height!r} , {choice}" for height, choice in zip(heights.tolist(), flux, strict=True)
+    ]
+    table.write_text("\n".join(["# drops", "height,momentum_flux", *lines[:20], "", *lines[20:]]))
+    case.write_text(CASE + "&levels bands = 'both' /\n")
+    result = run(case, "--sets", table)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "40 sets, 40 computed, 0 conform" in result.stdout
+    rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
+    parameters = {"mass": 2.45, "height": heights, "momentum_flux": flux}
+    expected = thud.solve_many(parameters)
+    thirds = thud.solve_many(parameters, bands="third")
+    assert [row["set"] for row in rows] == [str(i + 1) for i in range(40)]
+    np.testing.assert_array_equal([float(row["height"]) for row in rows], heights)
+    assert [row["momentum_flux"] for row in rows] == list(flux)
+    for name, values in {
+        "contact_time_s": expected.contact_time,
+        "peak_force_N": expected.peak_force,
+        "impulse_N_s": expected.impulse,
+        "elastic_octave_31.5_Hz_dB": expected.elastic_levels[:, 0],
+        "floor_octave_500_Hz_dB": expected.floor_levels[:, 4],
+    }.items():
+        np.testing.assert_allclose([float(row[name]) for row in rows], values, rtol=1e-15)
+    for name, index in {"elastic_third_31.5_Hz_dB": 1, "elastic_third_630_Hz_dB": -1}.items():
+        found = [float(row[name]) for row in rows]
+        np.testing.assert_allclose(found, thirds.elastic_levels[:, index], rtol=1e-15)
+    assert {row["status"] for row in rows} == {"computed"}
+
+
+def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("height,mass\r\n1,2.5\r\n500,2.5\r\n1,-2.5\r\n")
+    result = run(case, "--sets", "table.csv", "--check")
+    assert result.returncode == 3
+    assert "3 sets, 1 computed" in result.stdout
+    rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
+    assert [row["status"] for row in rows] == [
+        "computed", "the drop closes the shell", "mass lies outside its range",
+    ]  # fmt: skip
+    assert float(rows[0]["restitution"]) == pytest.approx(0.889, abs=1e-3)
+    assert rows[1]["contact_time_s"] == rows[2]["floor_conforms"] == ""
+    assert "nan" not in (tmp_path / "outputs/ball_sets/sets.csv").read_text().lower()
+
+
+def test_conforming_sets_are_counted(run: Run, case: Path, tmp_path: Path) -> None:
+    case.write_text(CASE.replace("2.45", "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3")
+                    + "&levels force = 'floor' /\n")  # fmt: skip
+    (tmp_path / "table.csv").write_text("wall_thickness,youngs_modulus\n0.0244,2.03e6\n")
+    result = run(case, "--sets", "table.csv", "--check", "-o", "here")
+    assert result.returncode == 0
+    assert "1 conform to the limits of the rubber_ball by the floor force" in result.stdout
+    assert rows_of(tmp_path / "here/sets.csv")[0]["floor_conforms"] == "yes"
+
+
+def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
+    heights = np.linspace(0.5, 1.5, 20_000)
+    (tmp_path / "table.csv").write_text("height\n" + "\n".join(map(str, heights)))
+    for threads in ("1", "3"):
+        result = run(case, "--sets", "table.csv", "--threads", threads, "-o", threads, "-q")
+        assert result.returncode == 0
+    assert (tmp_path / "1/sets.csv").read_bytes() == (tmp_path / "3/sets.csv").read_bytes()
+    assert len(rows_of(tmp_path / "1/sets.csv")) == 20_000
+
+
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        ("", "table.csv: the table is empty"),
+        ("# nothing\n\n", "table.csv: the table is empty"),
+        ("height\n", "table.csv: the table has no sets"),
+        ("hieght\n1\n", "line 1: 'hieght' is not a known key; allowed: 'outer_radius'"),
+        ("height,\n1,2\n", "line 1: '' is not a known key"),
+        ("height,mass,height\n1,2,1\n", "line 1: 'height' is given twice"),
+        ("height,mass\n1,2\n1\n", "line 3: the number of values is another than that of the keys"),
+        ("height,mass\n1,2,3\n", "line 2: the number of values is another than that of the keys"),
+        ("height\n1\none\n", "line 3: height = 'one' is not a number"),
+        ("height\n1 2\n", "line 2: height = '1 2' is not a number"),
+        ("height\n2*1\n", "line 2: height = '2*1' is not a number"),
+        ("height\n1+3\n", "line 2: height = '1+3' is not a number"),
+        ("height,mass\n1,\n", "line 2: mass = '' is not a number"),
+        ("height,mass\nnan,2\n", "line 2: height = 'nan' is not a number"),
+        ("height,momentum_flux\n1,all\n", "line 2: momentum_flux = 'all' is not allowed"),
+        ("height\n" + "1" * 5000 + "\n", "line 2: it is too long"),
+    ],
+)
+def test_bad_tables_are_refused(
+    run: Run, case: Path, tmp_path: Path, table: str, sentence: str
+) -> None:
+    (tmp_path / "table.csv").write_text(table)
+    result = run(case, "--sets", "table.csv")
+    assert result.returncode == 1
+    assert sentence in result.stderr
+    assert "; allowed: " in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "outputs/ball_sets").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--sets"], "--sets has no value; allowed: a table of sets"),
+        (["--sets", "none.csv"], "none.csv: the file cannot be read"),
+        (["--sets", "."], ".: this is a directory"),
+        (["--threads", "2"], "--threads does nothing without --sets"),
+        (["--sets", "table.csv", "--threads", "0"], "'0' is not allowed; allowed: 1 to 1024"),
+        (["--sets", "table.csv", "--threads", "2x"], "--threads = '2x' is not allowed"),
+        (["--sets", "table.csv", "-o", "."], "--output . holds files of something else"),
+        (["--sets", "table.csv", "-o", "table.csv"], "table.csv/.sets.csv.part cannot be written"),
+    ],
+)  # fmt: skip
+def test_bad_arguments_are_refused(
+    run: Run, case: Path, tmp_path: Path, arguments: list[str], sentence: str
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    result = run(case, *arguments)
+    assert result.returncode == 1
+    assert sentence in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("&levels method = 'fft' /", "&levels: method = 'fft' is not for sets; allowed: 'exact'"),
+        ("&model name = 'modal_ball' /", "&model: name = 'modal_ball' has no sets"),
+    ],
+)
+def test_cases_without_sets_are_refused(
+    run: Run, case: Path, tmp_path: Path, more: str, sentence: str
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    case.write_text(CASE.replace("&model name = 'hollow_sphere' /", "") + more
+                    + ("" if "&model" in more else "&model name = 'hollow_sphere' /"))  # fmt: skip
+    result = run(case, "--sets", "table.csv")
+    assert result.returncode == 1
+    assert sentence in result.stderr
