@@ -58,7 +58,7 @@ module thud_ensemble
       real(wp) :: max_deflection = not_a_number
       !> Velocity at release over velocity at first touch.
       real(wp) :: restitution = not_a_number
-      !> Time integral of the force on the floor, N s.
+      !> Impulse given to the floor, N s: the change of momentum, which the sum of the forces has confirmed.
       real(wp) :: impulse = not_a_number
    end type set_outcome_type
 
