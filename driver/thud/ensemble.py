@@ -47,7 +47,7 @@ class Ensemble:
     restitution : ndarray, shape (n_set,)
         Velocity at release over velocity at first touch.
     impulse : ndarray, shape (n_set,)
-        Time integral of the force on the floor, N s.
+        Impulse given to the floor, N s.
     elastic_levels, floor_levels : ndarray, shape (n_set, n_band)
         Force exposure levels of the elastic force and of the force on the floor, dB.
     elastic_octaves, floor_octaves : ndarray, shape (n_set, 5)
