@@ -4,17 +4,17 @@ module thud_sets_run
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count
    use thud_case, only: case_type, get_case_text
    use thud_constants, only: version
-   use thud_ensemble, only: get_set_fields, parameter_count, set_outcome_type, set_type
+   use thud_ensemble, only: set_outcome_type, set_type
    use thud_ensemble_run, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type
    use thud_file, only: check_owner, close_part, finish_part, open_part, text_file_type, write_files, write_part
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type
    use thud_sampling, only: get_sample_count
-   use thud_set_status, only: get_status_text, set_is_fine, set_range
+   use thud_set_report, only: get_band_name, get_set_header, get_set_rows
+   use thud_set_status, only: set_is_fine
    use thud_set_table, only: close_set_table, open_set_table, read_sets, set_table_type
    use thud_text, only: fixed, newline, quoted, to_text
    implicit none (type, external)
@@ -27,13 +27,6 @@ module thud_sets_run
 
    !> Files of the results.
    character(len=*), parameter :: result_file = 'sets.csv', input_file = 'effective.nml'
-
-   !> Columns behind the parameters.
-   character(len=*), parameter :: outcome_names = 'contact_time_s,peak_force_N,peak_floor_force_N,max_deflection_m,' &
-      //'restitution,impulse_N_s'
-
-   !> Names of the forces.
-   character(len=7), parameter :: force_names(force_count) = [character(len=7) :: 'elastic', 'floor']
 
    !> What many sets came to.
    type :: tally_type
@@ -141,7 +134,7 @@ contains
       allocate (levels(octave_count + size(more), force_count, chunk_size))
       call open_part(directory, result_file, unit, error)
       if (allocated(error)) return
-      call get_header(table, projections%bands(first_band:), text)
+      call get_set_header(table, projections%bands(first_band:), text)
       call write_part(directory, result_file, unit, text, error)
       do while (.not. allocated(error))
          call read_sets(table, base, sets, n, error)
@@ -155,7 +148,7 @@ contains
          do i = 1, threads
             first = (i - 1)*n/threads + 1
             last = i*n/threads
-            call get_rows(table, tally%sets - n + first - 1, sets(first:last), outcomes(first:last), &
+            call get_set_rows(table, tally%sets - n + first - 1, sets(first:last), outcomes(first:last), &
                levels(first_band:, :, first:last), verdicts(first:last), parts(i)%content)
          end do
          !$omp end parallel do
@@ -168,112 +161,6 @@ contains
          //': the table has no sets; allowed: one in each line below the keys')
       call close_part(directory, result_file, unit, error)
    end subroutine write_sets
-
-   !> First line of the results.
-   subroutine get_header(table, bands, text)
-      !> The table.
-      type(set_table_type), intent(in) :: table
-      !> Bands of the levels: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> The line.
-      character(len=:), allocatable, intent(out) :: text
-      integer :: i, j
-
-      text = 'set'
-      do i = 1, size(table%columns)
-         text = text//','//trim(table%keys(table%columns(i)))
-      end do
-      text = text//','//outcome_names
-      do j = 1, force_count
-         do i = 1, size(bands)
-            text = text//','//trim(force_names(j)) &
-               //trim(merge('_octave_', '_third_ ', bands(i)%upper > 1.5_wp*bands(i)%lower)) &
-               //get_band_name(bands(i))//'_Hz_dB'
-         end do
-      end do
-      do j = 1, force_count
-         text = text//','//trim(force_names(j))//'_conforms'
-      end do
-      text = text//',status'//newline
-   end subroutine get_header
-
-   !> Lines of the results, 17 digits; what could not be computed is left out.
-   subroutine get_rows(table, before, sets, outcomes, levels, verdicts, text)
-      !> The table.
-      type(set_table_type), intent(in) :: table
-      !> Number of sets before these.
-      integer, intent(in) :: before
-      !> The sets: [n_set].
-      type(set_type), intent(in), target :: sets(:)
-      !> Their outcomes: [n_set].
-      type(set_outcome_type), intent(in) :: outcomes(:)
-      !> Their levels, dB: [n_band, force_count, n_set].
-      real(wp), intent(in) :: levels(:, :, :)
-      !> Their verdicts: [n_set].
-      type(verdict_type), intent(in) :: verdicts(:)
-      !> The lines.
-      character(len=:), allocatable, intent(out) :: text
-      !> Room for a number with its comma, and for all that is none.
-      integer, parameter :: number_width = 26, rest_width = 192
-      character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
-      character(len=number_width*(size(table%columns) + 6 + size(levels, 1)*force_count) + rest_width) :: row
-      type(set_type), target :: set
-      type(field_type) :: fields(parameter_count)
-      integer :: i, j, at, end_of_text
-
-      fields = get_set_fields(set)
-      allocate (character(len=len(row)*size(sets)) :: text)
-      end_of_text = 0
-      do i = 1, size(sets)
-         set = sets(i)
-         row = to_text(before + i)
-         do j = 1, size(table%columns)
-            at = len_trim(row) + 1
-            if (table%columns(j) <= parameter_count) then
-               write (row(at:), numbers_form) fields(table%columns(j))%real_value
-            else
-               row(at:) = ','//flux_choices(set%flux)
-            end if
-         end do
-         at = len_trim(row) + 1
-         if (outcomes(i)%status == set_is_fine) then
-            associate (found => outcomes(i))
-               write (row(at:), numbers_form) found%contact_time, found%peak_force, found%peak_floor_force, &
-                  found%max_deflection, found%restitution, found%impulse, levels(:, :, i)
-            end associate
-            row(len_trim(row) + 1:) = ','//get_word(verdicts(i)%conforms(1))//','//get_word(verdicts(i)%conforms(2))
-         else
-            row(at:) = repeat(',', 6 + size(levels, 1)*force_count + force_count)
-         end if
-         associate (key => fields(max(1, min(parameter_count, outcomes(i)%status - set_range)))%key)
-            row(len_trim(row) + 1:) = ','//trim(get_status_text(outcomes(i)%status, key))//newline
-         end associate
-         at = index(row, newline)
-         text(end_of_text + 1:end_of_text + at) = row(:at)
-         end_of_text = end_of_text + at
-      end do
-      text = text(:end_of_text)
-   end subroutine get_rows
-
-   !> Nominal frequency of a band: 31.5, 63.
-   pure function get_band_name(band) result(name)
-      !> The band.
-      type(band_type), intent(in) :: band
-      !> Its name.
-      character(len=len(fixed(band%nominal, merge(1, 0, band%nominal < 32)))) :: name
-
-      name = fixed(band%nominal, merge(1, 0, band%nominal < 32))
-   end function get_band_name
-
-   !> A verdict in a table.
-   pure function get_word(conforms) result(word)
-      !> The verdict.
-      logical, intent(in) :: conforms
-      !> Yes or no.
-      character(len=merge(3, 2, conforms)) :: word
-
-      word = merge('yes', 'no ', conforms)
-   end function get_word
 
    !> Adds sets to a tally.
    pure subroutine add(tally, outcomes, levels, verdicts, force)
