@@ -105,7 +105,7 @@ class ForceTarget:
             )
             raise InputError(message) from error
         recording = Recording.from_arrays(table, "target")
-        return recording.time - recording.time[0] + table[0, 0], table[:, 1], recording.sample_rate
+        return recording.time + recording.origin, recording.record, recording.sample_rate
 
 
 def _cut(
