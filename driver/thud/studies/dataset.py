@@ -14,6 +14,7 @@ from thud._library import compiler
 from thud.levels import get_bands
 from thud.studies import sets
 from thud.studies.evaluation import SCALARS, block_size
+from thud.studies.parameters import Uniform
 from thud.units import power_of
 
 if TYPE_CHECKING:
@@ -83,14 +84,15 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
 
 
 def _attributes(parameter: Parameter) -> dict[str, Any]:
-    """Return the attributes of a parameter; figures show it in the unit of the study."""
-    power = power_of(parameter.unit, parameter.key.unit, parameter.name)
+    """Return the attributes of a parameter; figures show it in unit and scale of the study."""
+    key, spread = parameter.key, parameter.spread
     return {
-        "units": parameter.key.unit or "1",
-        "long_name": parameter.key.meaning,
-        "group": parameter.key.group,
+        "units": key.unit or "1",
+        "long_name": key.meaning,
+        "group": key.group,
         "shown_unit": parameter.unit,
-        "shown_power": -power,
+        "shown_power": -power_of(parameter.unit, key.unit, parameter.name),
+        "scale": "log" if isinstance(spread, Uniform) and spread.logarithmic else "linear",
     }
 
 
