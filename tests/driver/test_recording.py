@@ -122,3 +122,11 @@ def test_rounded_times_do_not_move_the_fit() -> None:
     fit = thud.fit(((impact.time + 0.2).round(6), impact.floor_force), ["youngs_modulus"])
     # Of 1323 times rounded to 1 us the mean is off by 1 us / sqrt(12 * 1323); four of that.
     assert fit.time_shift == pytest.approx(0.2, abs=4e-6 / np.sqrt(12 * 1323))
+
+
+@pytest.mark.parametrize("digits", [5, 6, 7, 9, 16])
+def test_rounded_times_do_not_move_the_band(digits: int) -> None:
+    # 1.25 kHz are the 75th harmonic of 60 ms, and belong to the band.
+    force = np.append(thud.solve(duration=0.03).floor_force, np.zeros(1323))
+    time = (np.arange(2646) / RATE).round(digits)
+    assert thud.ForceTarget((time, force)).misfit().size == 2 * 75 + 1

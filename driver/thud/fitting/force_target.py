@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # What a force plate records ends here, Hz (paper, section 3).
 BELOW = 1250.0
+# Part of that frequency that rounded times leave open.
+SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its largest value.
 OPEN_END = 0.1
 END = 1e-3
@@ -145,7 +147,7 @@ class ForceMisfit:
         self.unit_deviation = noise or 1.0
         self.below = below
         self.period = len(time) / sample_rate
-        self.frequency = np.arange(int(below * self.period * (1 + 1e-12)) + 1) / self.period
+        self.frequency = np.arange(int(below * self.period * (1 + SAME)) + 1) / self.period
         # Orthonormal: white noise of a deviation in time is white noise of that deviation here.
         self.spectrum = np.fft.rfft(force, norm="ortho")[: len(self.frequency)]
         self.size = 2 * len(self.frequency) - 1
