@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.signal import ZoomFFT
 
 from thud.errors import InputError
-from thud.fitting.misfit import require_positive
+from thud.fitting.misfit import require_choice, require_positive
 from thud.impact import FORCES, Impact
 from thud.recording import LEAST_ROWS, Recording
 
@@ -66,9 +66,7 @@ class ForceTarget:
 
     def misfit(self) -> ForceMisfit:
         """Return what the fit needs of the target."""
-        if self.force not in FORCES:
-            message = f"target: force = {self.force!r} is not known; allowed: 'elastic', 'floor'"
-            raise InputError(message)
+        require_choice("force", self.force, FORCES)
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
@@ -130,6 +128,8 @@ def _cut(
 
 class ForceMisfit:
     """How far the force of an impact is from a record, by frequency; see `Misfit`."""
+
+    deviation_unit = "N"
 
     def __init__(  # noqa: PLR0913, PLR0917 - what `ForceTarget.misfit` has checked
         self,
