@@ -1,8 +1,8 @@
-"""Axes of parameters: names, units, scales, and the place of the legend."""
+"""Axes of parameters: names, units, scales."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
@@ -14,13 +14,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
-    from matplotlib.legend import Legend
     from numpy.typing import NDArray
 
-# Legends of many entries.
-COMPACT: dict[str, Any] = {"handlelength": 1.8, "handletextpad": 0.4, "columnspacing": 0.8}
 Which = Literal["x", "y"]
-Place = Literal["lower left", "lower right"]
 # Numbers outside of these, of a parameter that has its key's unit, are shown in a handier one.
 _PLAIN = (1e-2, 1e4)
 # Largest value over least, from which ticks of a logarithmic axis are 1, 2, 5, and powers of ten.
@@ -84,11 +80,3 @@ def words(parameter: xr.DataArray) -> str:
 def plain_words(name: str) -> str:
     """Return the name of a parameter in words."""
     return name.replace("youngs", "Young's").replace("_", " ")
-
-
-def legend_above(axes: Axes, columns: int, place: Place = "lower left") -> Legend:
-    """Put the legend over the axes, where no curve is; `place` is its corner that stays there."""
-    return axes.legend(
-        fontsize=SIZE - 1, frameon=False, ncols=columns, loc=place,
-        bbox_to_anchor=(float(place == "lower right"), 1), **COMPACT,
-    )  # fmt: skip

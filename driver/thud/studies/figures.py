@@ -9,8 +9,8 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import MaxNLocator
 
 from thud.levels import octave_limits
-from thud.plot import COLOURS, SIZE, empty_axes, octave_axis
-from thud.studies.axes import legend_above, plain_words, show_parameter
+from thud.plot import COLOURS, SIZE, empty_axes, legend_above, octave_axis
+from thud.studies.axes import plain_words, show_parameter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

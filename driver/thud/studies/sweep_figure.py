@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from thud.impact import FORCES
 from thud.levels import get_bands, octave_limits
-from thud.plot import COLOURS, LINES, MARKERS, SIZE, WIDTH, dress
-from thud.studies.axes import COMPACT, plain_words, show_parameter, words
+from thud.plot import COLOURS, COMPACT, LINES, MARKERS, SIZE, WIDTH, dress
+from thud.studies.axes import plain_words, show_parameter, words
 
 if TYPE_CHECKING:
     import xarray as xr
