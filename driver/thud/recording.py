@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 NOISE = 0.01
 # Samples that a recording needs.
 LEAST_ROWS = 8
+# Sampling intervals, s.
+STEPS = (1e-9, 1e3)
 # Parts of the sampling interval by which times may miss an even grid: any, and rounded ones.
 JITTER = 1e-3
 ROUNDED = 0.25
@@ -129,9 +131,14 @@ def _even_grid(time: NDArray[np.float64], name: str) -> tuple[float, float]:
     twentieth of a step.
     """
     place = np.arange(len(time)) - (len(time) - 1) / 2
-    step = float(place @ time / (place @ place))
-    if not step > 0:
-        message = f"{name}: the times do not rise; allowed: one sampling rate"
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = float(place @ time / (place @ place))
+    least, most = STEPS
+    if not least <= step <= most:
+        message = (
+            f"{name}: the times rise by {step:.4g} s from row to row; "
+            f"allowed: {least:g} to {most:g} s"
+        )
         raise InputError(message)
     miss = np.abs(time - time.mean() - place * step) / step
     allowed = max(JITTER, min(ROUNDED, _last_digit(time) / step))

@@ -105,6 +105,14 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     assert len(axes.texts) > 0
 
 
+@pytest.mark.filterwarnings("error")
+def test_map_of_nearly_one_margin_is_drawn() -> None:
+    heights = {"low": 0.1, "high": 0.1001, "count": 2}
+    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
+    axes, _ = figures.draw_design_map(thud.design_map(study)).axes
+    assert not axes.texts
+
+
 def test_star_on_the_edge_is_whole() -> None:
     axes, _ = figures.draw_design_map(thud.design_map(MODAL)).axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]

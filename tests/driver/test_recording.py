@@ -91,8 +91,8 @@ def test_columns_are_read_whatever_is_between(line: str, head: str, tmp_path: Pa
         ("".join(f"{i},1,2\n" for i in range(9)), "9 rows of 3 numbers"),
         ("".join(f"{i},nan\n" for i in range(9)), "not finite"),
         ("".join(f"{i**2},1\n" for i in range(9)), "not evenly spaced"),
-        ("".join(f"{-i},1\n" for i in range(9)), "times do not rise"),
-        ("".join("0,1\n" for _ in range(9)), "times do not rise"),
+        ("".join(f"{-i},1\n" for i in range(9)), "times rise by -1 s"),
+        ("".join("0,1\n" for _ in range(9)), "times rise by 0 s"),
         ("".join(f"{i},0\n" for i in range(9)), "nowhere positive"),
     ],
 )

@@ -120,10 +120,10 @@ def _draw_margin(
     norm = TwoSlopeNorm(0, min(least, -most / 4, -_TINY), max(most, -least / 4, _TINY))
     steps = np.asarray(MaxNLocator(7).tick_values(least, max(most, least + _TINY)))
     filled = axes.contourf(*place, margin, levels=_fine(steps), cmap="PuOr", norm=norm)
-    lines = axes.contour(
-        *place, margin, steps[steps != 0], colors="0.25", linewidths=0.4, linestyles="-"
-    )
-    axes.clabel(lines, fontsize=SIZE - 2, fmt="%g")
+    inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
+    if inside.size:
+        lines = axes.contour(*place, margin, inside, colors="0.25", linewidths=0.4, linestyles="-")
+        axes.clabel(lines, fontsize=SIZE - 2, fmt="%g")
     if margin.min() < 0 < margin.max():
         axes.contour(*place, margin, levels=[0.0], colors="black", linewidths=1.2)
         axes.plot([], [], color="black", linewidth=1.2, label="octave limits")
