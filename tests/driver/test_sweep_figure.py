@@ -56,6 +56,14 @@ def test_first_numeric_parameter_is_the_axis_and_texts_have_panels() -> None:
     assert "median" not in words(figure)
 
 
+def test_lowest_panels_have_the_numbers_of_the_axis() -> None:
+    fluxes = {"values": ["none", "retarding", "conservative"]}
+    figure = draw(parameters={"momentum_flux": fluxes, "height": HEIGHTS})
+    shown = [axes.xaxis.get_tick_params()["labelbottom"] for axes in figure.axes]
+    assert shown == [False, True, True]
+    assert [axes.xaxis.label.get_visible() for axes in figure.axes] == shown
+
+
 def test_texts_alone_are_the_axis() -> None:
     (axes,) = draw(parameters={"momentum_flux": {"values": ["none", "retarding"]}}).axes
     assert [text.get_text() for text in axes.get_xticklabels()] == ["none", "retarding"]

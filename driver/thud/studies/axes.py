@@ -48,17 +48,12 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
     axes.set(**{f"{which}label": label})
     axis: Axis = getattr(axes, f"{which}axis")
     axis.label.set_fontsize(SIZE)
-    if is_logarithmic(parameter):
+    if parameter.attrs.get("scale") == "log":
         axes.set(**{f"{which}scale": "log"})
         _mark_decades(axis, values * factor)
     else:
         axes.ticklabel_format(axis=which, useOffset=False)
     return factor
-
-
-def is_logarithmic(parameter: xr.DataArray) -> bool:
-    """Return whether a parameter is spread evenly in its logarithm."""
-    return bool(parameter.attrs.get("scale") == "log")
 
 
 def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:

@@ -67,13 +67,15 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     figure = Figure(figsize=(WIDTH, 1.1 + (1.9 if across == 1 else 1.6) * down), dpi=300)
     figure.set_layout_engine("constrained")
     panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
-    for axes, (title, panel) in zip(panels, parts.items(), strict=False):
+    for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
         _draw_tolerance(dress(axes), judged.tolerance)
         levels = np.where(panel[:, np.newaxis], judged.excess, np.nan)
         most = _MOST_MARKS // across
         _draw_octaves(axes, dataset[name], columns[name], levels, most)
         axes.set_title(title.replace("_", " "), fontsize=SIZE - 1)
-        axes.label_outer()
+        lowest = i + across >= len(parts)
+        axes.tick_params(axis="x", labelbottom=lowest)
+        axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(parts) :]:
         axes.remove()
     figure.supylabel("Level - nominal, dB", fontsize=SIZE)
