@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = int(options.command(options))
         sys.stdout.flush()
     except KeyboardInterrupt:
-        print("thud-driver: interrupted; what was finished is kept", file=sys.stderr)
+        print(f"thud-driver: interrupted; {options.kept}", file=sys.stderr)
         return INTERRUPTED
     except (thud.ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
@@ -70,6 +70,7 @@ def _parser() -> argparse.ArgumentParser:
         "3 not conforming (run --check), 130 interrupted.",
     )
     parser.add_argument("--version", action="version", version=f"thud {thud.__version__}")
+    parser.set_defaults(kept="what was finished is kept")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     run = commands.add_parser("run", help="run cases, write their results and figures")
@@ -92,7 +93,7 @@ def _parser() -> argparse.ArgumentParser:
     )
 
     compare = commands.add_parser("compare", help="models and recordings of one drop on one page")
-    compare.set_defaults(command=_compare)
+    compare.set_defaults(command=_compare, kept="a page is kept only when it is done")
     compare.add_argument(
         "cases",
         nargs="+",
@@ -113,7 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     add_study_commands(commands)
 
     fit = commands.add_parser("fit", help="parameters of a model from a force or from levels")
-    fit.set_defaults(command=_fit)
+    fit.set_defaults(command=_fit, kept="a fit is kept only when it is done")
     fit.add_argument("study", metavar="STUDY.toml", help="target, parameters and base case")
     fit.add_argument(
         "-o", "--output", metavar="DIR", help="directory for the results (default: outputs/<study>)"

@@ -8,7 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
+    from matplotlib.legend import Legend
     from numpy.typing import NDArray
 
 Curve = TypeVar("Curve", bound=Impact | Recording)
@@ -38,6 +39,8 @@ WIDTH = 3.5
 SIZE = 8
 # Part of the largest force above which what a force plate does not record is drawn too.
 UNSEEN = 0.02
+# Legends of many entries.
+COMPACT: dict[str, Any] = {"handlelength": 1.8, "handletextpad": 0.4, "columnspacing": 0.8}
 FORMATS = ("pdf", "png", "svg")
 
 
@@ -55,6 +58,16 @@ def dress(axes: Axes) -> Axes:
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     return axes
+
+
+def legend_above(
+    axes: Axes, columns: int, place: Literal["lower left", "lower right"] = "lower left"
+) -> Legend:
+    """Put the legend over the axes, where no curve is; `place` is its corner that stays there."""
+    return axes.legend(
+        fontsize=SIZE - 1, frameon=False, ncols=columns, loc=place,
+        bbox_to_anchor=(float(place == "lower right"), 1), **COMPACT,
+    )  # fmt: skip
 
 
 def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") -> Figure:
@@ -213,7 +226,7 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
         axes.plot(np.arange(5), change, label=name, **_style(i), **_marker(i))
     octave_axis(axes)
     axes.set_ylabel("Change of the level, dB", fontsize=SIZE)
-    axes.legend(fontsize=SIZE - 1, frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    legend_above(axes, 3)
     return figure
 
 

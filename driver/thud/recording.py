@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import errno
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.columns import read_table
 from thud.errors import InputError
 from thud.levels import force_exposure_levels
 
@@ -21,8 +20,13 @@ if TYPE_CHECKING:
 NOISE = 0.01
 # Samples that a recording needs.
 LEAST_ROWS = 8
-# Part of the sampling interval by which the times of a recording may miss.
+# Sampling intervals, s.
+STEPS = (1e-9, 1e3)
+# Parts of the sampling interval by which times may miss an even grid: any, and rounded ones.
 JITTER = 1e-3
+ROUNDED = 0.25
+# Part of the largest time that is an error of arithmetic.
+EXACT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,20 +41,24 @@ class Recording:
         Force, N.
     sample_rate : float
         Samples per second, Hz.
+    origin : float
+        When the force first passes 1 % of its largest value, in the times of the file, s.
     """
 
     time: NDArray[np.float64]
     record: NDArray[np.float64]
     sample_rate: float
+    origin: float = 0.0
 
     @classmethod
     def from_csv(cls, path: str | os.PathLike[str]) -> Recording:
-        """Read a file of two columns, time in s and force in N, with or without a header.
+        """Read a file of two columns, time in s and force in N; see `thud.columns.read_table`.
 
         Raises
         ------
         InputError
-            Where the file is missing or does not hold at least eight evenly spaced samples.
+            Where the file is missing or does not hold at least eight evenly spaced samples of a
+            force that is positive.
         """
         return cls.from_arrays(read_table(path), str(path))
 
@@ -68,15 +76,19 @@ class Recording:
             message = f"{name}: a value is not finite; allowed: real numbers"
             raise InputError(message)
         time, force = table.T
-        step = (time[-1] - time[0]) / (rows - 1)
-        if not step > 0 or np.abs(np.diff(time) - step).max() > JITTER * step:
-            message = f"{name}: the times are not evenly spaced; allowed: one sampling rate"
-            raise InputError(message)
-        first = np.flatnonzero(force > NOISE * force.max())
-        if force.max() <= 0:
+        begin, step = _even_grid(time, name)
+        if force.max() <= 0 and not force.min() < 0:
             message = f"{name}: the force is nowhere positive; allowed: the force on the floor, N"
             raise InputError(message)
-        return cls((np.arange(rows) - first[0]) * step, force.copy(), 1 / step)
+        if -force.min() > force.max():
+            message = (
+                f"{name}: the force is mostly negative, {force.min():.4g} to {force.max():.4g} N; "
+                "allowed: the force on the floor, positive when it presses (change its sign)"
+            )
+            raise InputError(message)
+        first = np.flatnonzero(force > NOISE * force.max())[0]
+        time = (np.arange(rows) - first) * step
+        return cls(time, force.copy(), 1 / step, begin + first * step)
 
     @property
     def touch_time(self) -> float:
@@ -112,35 +124,44 @@ class Recording:
         )
 
 
-def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
-    """Return the numbers of a file of columns with commas between, with or without a header.
+def _even_grid(time: NDArray[np.float64], name: str) -> tuple[float, float]:
+    """Return begin and step, s, of the even grid that fits times best.
 
-    Raises
-    ------
-    InputError
-        Where the file is missing or holds something else.
+    Times may miss it by their rounding to the last written digit: at 44.1 kHz, six decimals are a
+    twentieth of a step.
     """
-    try:
-        if not Path(path).is_file():  # to open a pipe could take for ever
-            raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
-        text = Path(path).read_text(encoding="utf-8-sig")
-        lines = [line for line in text.splitlines() if line.strip() and line[0] != "#"]
-        if not any(map(_is_number, lines[0].split(","))):
-            del lines[0]
-        if not lines:
-            message = "no numbers"
-            raise ValueError(message)  # noqa: TRY301 - one sentence for all that is unreadable
-        table = np.loadtxt(lines, delimiter=",", ndmin=2)
-    except (IndexError, OSError, ValueError) as error:
-        message = f"{path}: cannot be read ({error}); allowed: columns of time, s, and force, N"
-        raise InputError(message) from error
-    return table
+    place = np.arange(len(time)) - (len(time) - 1) / 2
+    with np.errstate(over="ignore", invalid="ignore"):
+        step = float(place @ time / (place @ place))
+    least, most = STEPS
+    if not least <= step <= most:
+        message = (
+            f"{name}: the times rise by {step:.4g} s from row to row; "
+            f"allowed: {least:g} to {most:g} s"
+        )
+        raise InputError(message)
+    miss = np.abs(time - time.mean() - place * step) / step
+    allowed = max(JITTER, min(ROUNDED, _last_digit(time) / step))
+    worst = int(np.argmax(miss))
+    if miss[worst] > allowed:
+        message = (
+            f"{name}: the times are not evenly spaced: row {worst + 1}, {time[worst]:.9g} s, is "
+            f"{miss[worst]:.2g} steps of {step:.4g} s off an even grid; allowed: one sampling "
+            f"rate, to {allowed:.2g} steps"
+        )
+        raise InputError(message)
+    return float(time.mean() + place[0] * step), step
 
 
-def _is_number(word: str) -> bool:
-    """Return whether a word is a number."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+def _last_digit(time: NDArray[np.float64]) -> float:
+    """Return what the last digit of times is worth, s, by decimals or by significant digits."""
+    size = np.abs(time)
+    scale = 10.0 ** np.floor(np.log10(np.maximum(size, EXACT * size.max())))
+    worth = 0.0
+    for unit in (np.full_like(scale, scale.max()), scale):
+        for power in range(-round(np.log10(EXACT))):
+            digit = unit * 10.0**-power
+            if (np.abs(time - digit * np.rint(time / digit)) <= EXACT * size.max()).all():
+                worth = max(worth, float(digit.max()))
+                break
+    return worth

@@ -54,6 +54,7 @@ def _run(options: argparse.Namespace) -> int:
     """Run a study, draw its figure, print what it tells."""
     from thud.studies import figures  # noqa: PLC0415 - takes its time
     from thud.studies.run import describe  # noqa: PLC0415
+    from thud.studies.sweep_figure import draw_sweep  # noqa: PLC0415
 
     if options.output is not None and not options.output.strip():
         message = "--output has no value; allowed: a directory"
@@ -61,7 +62,7 @@ def _run(options: argparse.Namespace) -> int:
     study = thud.read_study(options.study, options.kind)
     folder = Path(options.output or Path("outputs") / study.name)
     studies: dict[str, tuple[Callable[..., Any], Callable[..., Figure]]] = {
-        "sweep": (thud.sweep, figures.draw_sweep),
+        "sweep": (thud.sweep, draw_sweep),
         "sensitivity": (thud.sensitivity, figures.draw_sensitivity),
         "design": (thud.design_map, figures.draw_design_map),
         "uncertainty": (thud.uncertainty, figures.draw_uncertainty),

@@ -95,6 +95,32 @@ def test_any_damage_to_a_file(start: int, length: int, insertion: str) -> None:
 
 
 @given(
+    head=st.text(max_size=20),
+    rows=st.lists(st.tuples(st.floats(), st.floats()), max_size=20),
+    separator=st.sampled_from([",", ";", "\t", " ", "|"]),
+    even=st.booleans(),
+)
+@settings(max_examples=300, deadline=None)
+def test_any_recording(
+    head: str, rows: list[tuple[float, float]], separator: str, *, even: bool
+) -> None:
+    times = [i / 44100 if even else time for i, (time, _) in enumerate(rows)]
+    lines = [f"{time}{separator}{force}" for time, (_, force) in zip(times, rows, strict=True)]
+    with tempfile.TemporaryDirectory() as directory:
+        path = Path(directory) / "plate.csv"
+        path.write_text("\n".join([head, *lines]), encoding="utf-8")
+        try:
+            recording = thud.Recording.from_csv(path)
+        except thud.InputError as error:
+            check_sentence(error)
+            assert str(error).startswith(f"{path}: ")
+        else:
+            assert np.isfinite(recording.time).all()
+            assert 0 < recording.sample_rate < np.inf
+            assert recording.peak_force > 0
+
+
+@given(
     force=st.lists(st.floats(), max_size=50),
     sample_rate=st.floats(),
     bands=st.sampled_from(["octave", "third"]),

@@ -177,3 +177,16 @@ def test_cases_of_one_name_do_not_replace_each_other(
     assert cli.main(["run", "-q", "--no-figures", str(first), str(second), "-o", "out"]) == 1
     assert f"{second}: its name 'ball' is that of {first}" in capsys.readouterr().err
     assert thud.read_results("out/ball").case.drop.height == 1.0
+
+
+def test_interrupted_fit_does_not_say_that_it_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(_: object) -> int:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(thud.fitting, "run", interrupt)
+    assert cli.main(["fit", "study.toml"]) == cli.INTERRUPTED
+    sentence = "thud-driver: interrupted; a fit is kept only when it is done\n"
+    assert capsys.readouterr().err == sentence
+    assert not list(tmp_path.iterdir())

@@ -96,27 +96,6 @@ def test_recording_stands_beside_its_model(tmp_path: Path) -> None:
     assert rows[1][6] == ""
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "cannot be read"),
-        ("time,force\n", "no numbers"),
-        ("a,b\nc,d\n", "cannot be read"),
-        ("0.0,abc\n" + "".join(f"{i},1\n" for i in range(9)), "cannot be read"),
-        ("0,1\n1,2\n", "2 rows of 2 numbers"),
-        ("".join(f"{i},1,2\n" for i in range(9)), "9 rows of 3 numbers"),
-        ("".join(f"{i},nan\n" for i in range(9)), "not finite"),
-        ("".join(f"{i**2},1\n" for i in range(9)), "not evenly spaced"),
-        ("".join(f"{-i},1\n" for i in range(9)), "not evenly spaced"),
-        ("".join(f"{i},0\n" for i in range(9)), "nowhere positive"),
-    ],
-)
-def test_useless_recordings_are_told(tmp_path: Path, text: str, words: str) -> None:
-    (tmp_path / "plate.csv").write_text(text)
-    with pytest.raises(thud.InputError, match=rf"plate\.csv: .*({words}).*; allowed: "):
-        thud.Recording.from_csv(tmp_path / "plate.csv")
-
-
 def test_nothing_and_different_drops_are_told(
     case_file: Callable[..., Path], tmp_path: Path
 ) -> None:

@@ -74,6 +74,51 @@ def test_ball_of_the_paper_is_marked() -> None:
     assert labels == ["octave limits", "all criteria met", "paper's ball"]
 
 
+def test_scale_of_the_study_is_that_of_the_axes() -> None:
+    modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
+    height = {"low": 1, "high": 2, "count": 2, "scale": "log"}
+    result = thud.design_map({"parameters": {"youngs_modulus": modulus, "height": height}})
+    figure = figures.draw_design_map(result)
+    axes, _ = figure.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    # 1e8 Pa would need a power of ten beside the axis, over the legend.
+    assert axes.get_xlabel() == "Young's modulus, MPa"
+    assert axes.get_xlim() == pytest.approx((0.1, 100))
+    figure.draw_without_rendering()
+    shown = [text.get_text() for text in axes.get_xticklabels()]
+    assert {"0.1", "1", "10", "100"} <= set(shown)
+    shown = [text.get_text() for text in axes.get_yticklabels()]
+    assert {"1", "1.2", "1.4"} <= set(shown)
+    assert figures.draw_design_map(thud.design_map(MODAL)).axes[0].get_xscale() == "linear"
+
+
+def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
+    heights = {"low": 0.1, "high": 0.5, "count": 4}
+    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
+    axes, bar = figures.draw_design_map(thud.design_map(study)).axes
+    low, high = bar.get_ylim()
+    margin = thud.design_map(study).dataset["margin"].values
+    assert low <= margin.min()
+    assert margin.max() < 0 == high
+    # The zero is white, and round margins have lines with their numbers.
+    assert axes.collections[0].norm(0) == 0.5
+    assert len(axes.texts) > 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_map_of_nearly_one_margin_is_drawn() -> None:
+    heights = {"low": 0.1, "high": 0.1001, "count": 2}
+    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
+    axes, _ = figures.draw_design_map(thud.design_map(study)).axes
+    assert not axes.texts
+
+
+def test_star_on_the_edge_is_whole() -> None:
+    axes, _ = figures.draw_design_map(thud.design_map(MODAL)).axes
+    (star,) = [line for line in axes.lines if line.get_marker() == "*"]
+    assert not star.get_clip_on()
+
+
 def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
     study = {
         "fixed": {"model": "modal_ball"},

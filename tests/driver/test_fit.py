@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
 
@@ -243,8 +244,33 @@ def test_model_that_cannot_follow_is_told() -> None:
 def test_limits_hold_and_are_told() -> None:
     limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.7e6)}
     fit = quiet_fit(thud.solve(TRUTH), limited)
-    assert fit.warnings[0].startswith("youngs_modulus ended at its limit, 1.7e+06 Pa")
+    assert fit.warnings[0].startswith("youngs_modulus ended at its limit, 1.7 MPa: ")
     assert fit.values["youngs_modulus"] <= 1.7e6
+
+
+def test_intervals_end_at_the_limits() -> None:
+    record = noisy_record(thud.solve(TRUTH), 5.0, 3)
+    limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.8e6)}
+    fit = quiet_fit(record, limited)
+    lower, upper = fit.intervals(0.999999)["youngs_modulus"]
+    assert lower < fit.values["youngs_modulus"] <= upper == pytest.approx(1.8e6, rel=1e-12)
+    assert fit.summary()["parameters"]["youngs_modulus"]["interval"][1] <= 1.8e6 * (1 + 1e-12)
+    free = quiet_fit(record, ["youngs_modulus"])
+    assert free.intervals(0.999999)["youngs_modulus"][1] > 1.8e6
+    assert np.isinf(free.limits[free.names.index("time_shift")]).all()
+
+
+def test_table_says_what_the_standard_deviations_are() -> None:
+    record = noisy_record(thud.solve(TRUTH), 5.0, 3)
+    found = str(quiet_fit(record, ["youngs_modulus"]))
+    assert re.search(r"; standard deviation [45]\.\d+ N, told from the residuals\n", found)
+    found = str(quiet_fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"]))
+    assert "; standard deviation 5 N, given\n" in found
+    levels = thud.solve(TRUTH).levels(force="floor")
+    found = str(quiet_fit(thud.LevelTarget(levels, [1, 1, 2, 2, 3]), ["youngs_modulus"]))
+    assert "; standard deviations given\n" in found
+    found = str(quiet_fit(thud.LevelTarget(levels + 0.1 * np.eye(5)[0]), ["youngs_modulus"]))
+    assert re.search(r"; standard deviation 0\.0\d+ dB, told from the residuals\n", found)
 
 
 def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:

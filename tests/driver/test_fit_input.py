@@ -42,7 +42,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         ),
         (thud.ForceTarget(RECORD, force="gas"), ["mass"], {}, r"force = 'gas' is not known"),
         (thud.LevelTarget([39.0] * 4), ["mass"], {}, r"levels = .* allowed: 5 real numbers"),
-        (thud.LevelTarget([39.0] * 5, -1), ["mass"], {}, r"uncertainty = .* above 0"),
+        (thud.LevelTarget([39.0] * 5, -1), ["mass"], {}, r"uncertainty = -1\.0 is .* above 0"),
         (thud.LevelTarget([39.0], 1, frequencies=[40]), ["mass"], {}, r"frequencies = \[40\]"),
         (thud.LevelTarget([39.0], frequencies=[63]), ["mass"], {}, r"1 data for 1 parameters are"),
         (
@@ -51,7 +51,18 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             {},
             r"target: 1 data for 2 parameters are too few; allowed: 2 or more",
         ),
-        (thud.LevelTarget([39.0] * 5, bands="half"), ["mass"], {}, r"bands = 'half'"),
+        (
+            thud.LevelTarget([39.0] * 5, bands="half"),
+            ["mass"],
+            {},
+            r"target: bands = 'half' is not known; allowed: 'octave', 'third'$",
+        ),
+        (
+            thud.LevelTarget([39.0] * 5, force="gas"),
+            ["mass"],
+            {},
+            r"target: force = 'gas' is not known; allowed: 'elastic', 'floor'$",
+        ),
         (
             thud.LevelTarget([39.0] * 5, restitution=(0.8, 0.1)),
             ["mass"],

@@ -84,12 +84,32 @@ def test_samples_without_results_are_left_out() -> None:
 
 
 def test_figure_shows_every_index(lumped: Sensitivity) -> None:
-    (axes,) = figures.draw_sensitivity(lumped).axes
-    widths = [bar.get_width() for bars in axes.containers[1::2] for bar in bars]
+    figure = figures.draw_sensitivity(lumped)
+    (axes,) = figure.axes
+    widths = [bar.get_width() for bars in axes.containers[::3] for bar in bars]
     expected = lumped.indices["total"].transpose("parameter", "output").values.ravel()
     np.testing.assert_array_equal(widths, expected)
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["first order", "mass", "height", "outer radius"]
+    assert labels == ["mass", "height", "outer radius", "total index", "first order"]
+    for place, name in ((1, "total"), (2, "first_order")):
+        for container, parameter in zip(
+            axes.containers[place::3], LUMPED["parameters"], strict=True
+        ):
+            row = lumped.indices.sel(parameter=parameter)
+            ((bars,),) = [container.lines[2]]
+            halves = [np.ptp(segment[:, 0]) / 2 for segment in bars.get_segments() if len(segment)]
+            known = row[f"{name}_interval"].values
+            np.testing.assert_allclose(halves, known[np.isfinite(known)], atol=1e-12)
+
+
+def test_figure_of_five_parameters_fits_on_half_a_page() -> None:
+    parameters = {
+        **LUMPED["parameters"],
+        "gravity": {"low": 9.7, "high": 9.9},
+        "wall_thickness": {"low": 0.03, "high": 0.034},
+    }
+    study = {**LUMPED, "design": {"size": 8}, "parameters": parameters}
+    assert figures.draw_sensitivity(thud.sensitivity(study)).get_figheight() < 4.4
 
 
 def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -175,6 +175,7 @@ def test_list_pairs_values_and_entries_of_lists() -> None:
     impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **options)
     assert float(found["peak_force"][0]) == impact.peak_force
     assert found["frequency_2"].values.tolist() == [80.0, 0.09]
+    assert found["frequency_2"].attrs["key"] == "frequency(2)"
 
 
 def test_key_named_as_a_result_keeps_both() -> None:
@@ -198,6 +199,18 @@ def test_density_and_temperature_act_on_mass_and_modulus() -> None:
     for place, modulus in enumerate((1.6e6, 1.44e6)):
         impact = thud.solve(thud.Ball(youngs_modulus=modulus))
         assert float(found["contact_time"][place]) == pytest.approx(impact.contact_time, rel=1e-12)
+
+
+def test_modulus_is_that_of_the_reference_temperature() -> None:
+    study: dict[str, Any] = {
+        "temperature": {"reference": 20, "coefficient": -0.01},
+        "parameters": {"temperature": {"values": [30]}, "youngs_modulus": {"values": [1.6e6]}},
+    }
+    modulus = thud.sweep(study)["youngs_modulus"]
+    assert modulus.values.tolist() == [1.6e6]
+    assert "at 20 degC" in modulus.attrs["long_name"]
+    del study["temperature"], study["parameters"]["temperature"]
+    assert "degC" not in thud.sweep(study)["youngs_modulus"].attrs["long_name"]
 
 
 def test_failing_sets_say_why_and_disturb_no_other() -> None:

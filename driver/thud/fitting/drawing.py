@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from scipy import stats
 
 from thud.fitting.force_target import ForceMisfit
-from thud.plot import COLOURS, SIZE, UNSEEN, WIDTH, dress
+from thud.plot import COLOURS, SIZE, WIDTH, dress, legend_above
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,9 +23,13 @@ if TYPE_CHECKING:
 # More parameters than that are drawn as a table of correlations.
 MOST_PANELS = 5
 BAND = "0.85"
+# Letters of a label along all panels.
+LINE = 44
 # Names that are too long for the axis or the key.
 BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
 PERSONS = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio"}
+# Where half of the samples are this part of the largest force off, they show beside the lines.
+VISIBLE = 0.003
 # Time that is drawn before and after the contact, as part of it.
 BEFORE, AFTER = 0.15, 0.4
 
@@ -62,16 +66,18 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     column = misfit.history_columns(fit.impact, fit.time_shift)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
-    limit = f"Record below {misfit.below / 1e3:.3g} kHz"
-    if np.abs(record - target).max() > UNSEEN / 2 * target.max():
-        above.plot(time, record / 1e3, color="0.8", linewidth=0.4, label="Record")
-    above.plot(time, target / 1e3, color=COLOURS[0], linewidth=2.2, alpha=0.6, label=limit)
+    limit = f"below {misfit.below / 1e3:.3g} kHz"
+    if np.median(np.abs(record - target)) > VISIBLE * target.max():
+        above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
+    above.plot(
+        time, target / 1e3, color=COLOURS[0], linewidth=2.2, alpha=0.6, label=f"Record {limit}"
+    )
     above.plot(
         time, column["model_N"] / 1e3, color=COLOURS[1], linestyle="--", linewidth=1.1, label="Fit"
     )
     share = np.sqrt(misfit.size / len(time))
     width = 2 * share * fit.noise
-    below.axhspan(-width, width, color=BAND, linewidth=0, label="Noise, 2 standard deviations")
+    below.axhspan(-width, width, color=BAND, linewidth=0)
     below.plot(time, column["residual_N"], color=COLOURS[6], linewidth=0.7)
     contact = fit.impact.contact_time
     begin, end = fit.time_shift - BEFORE * contact, fit.time_shift + (1 + AFTER) * contact
@@ -80,9 +86,10 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     above.set_ylabel(f"{misfit.kind.capitalize()} force, kN", fontsize=SIZE)
     below.set_ylabel("Fit - target, N", fontsize=SIZE)
     most = max(np.abs(column["residual_N"]).max(), width)
-    below.set_ylim(-1.9 * most, 1.1 * most)
-    above.legend(fontsize=SIZE - 1, frameon=False)
-    below.legend(fontsize=SIZE - 2, frameon=False, loc="lower right")
+    below.set_ylim(-1.1 * most, 1.1 * most)
+    # Below, it would cover the curve.
+    above.fill_between([], [], color=BAND, linewidth=0, label=rf"Noise {limit}, $\pm2\sigma$")
+    legend_above(above, 2, "lower right")
 
 
 def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
@@ -163,10 +170,11 @@ def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
                 continue
             dress(axes)
             _draw_pair(fit, axes, (column, row), units)
+    room = LINE / (count - 1)
     for row in range(1, count):
-        panels[row - 1, 0].set_ylabel(_label(fit.names[row], units), fontsize=SIZE)
+        panels[row - 1, 0].set_ylabel(_label(fit.names[row], units, room), fontsize=SIZE)
     for column in range(count - 1):
-        panels[-1, column].set_xlabel(_label(fit.names[column], units), fontsize=SIZE)
+        panels[-1, column].set_xlabel(_label(fit.names[column], units, room), fontsize=SIZE)
     figure.align_labels()
     return figure
 
@@ -244,8 +252,11 @@ def _draw_correlation(fit: Fit) -> Figure:
     return figure
 
 
-def _label(name: str, units: Mapping[str, tuple[str, float]]) -> str:
-    """Return a parameter with its unit, on two lines."""
+def _label(name: str, units: Mapping[str, tuple[str, float]], room: float) -> str:
+    """Return a parameter with its unit, on two lines where one has no room for its letters."""
     unit = units[name][0]
-    text = PERSONS.get(name, name.replace("_", " "))
-    return f"{text},\n{unit}" if unit else text
+    text = PERSONS.get(name, name.replace("_", " ").capitalize())
+    if not unit:
+        return text
+    line = f"{text}, {unit}"
+    return line if len(line) <= room else f"{text},\n{unit}"

@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.signal import ZoomFFT
 
 from thud.errors import InputError
-from thud.fitting.misfit import require_positive
+from thud.fitting.misfit import require_choice, require_positive
 from thud.impact import FORCES, Impact
 from thud.recording import LEAST_ROWS, Recording
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 # What a force plate records ends here, Hz (paper, section 3).
 BELOW = 1250.0
+# Part of that frequency that rounded times leave open.
+SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its largest value.
 OPEN_END = 0.1
 END = 1e-3
@@ -64,9 +66,7 @@ class ForceTarget:
 
     def misfit(self) -> ForceMisfit:
         """Return what the fit needs of the target."""
-        if self.force not in FORCES:
-            message = f"target: force = {self.force!r} is not known; allowed: 'elastic', 'floor'"
-            raise InputError(message)
+        require_choice("force", self.force, FORCES)
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
@@ -105,7 +105,7 @@ class ForceTarget:
             )
             raise InputError(message) from error
         recording = Recording.from_arrays(table, "target")
-        return recording.time - recording.time[0] + table[0, 0], table[:, 1], recording.sample_rate
+        return recording.time + recording.origin, recording.record, recording.sample_rate
 
 
 def _cut(
@@ -129,6 +129,8 @@ def _cut(
 class ForceMisfit:
     """How far the force of an impact is from a record, by frequency; see `Misfit`."""
 
+    deviation_unit = "N"
+
     def __init__(  # noqa: PLR0913, PLR0917 - what `ForceTarget.misfit` has checked
         self,
         time: NDArray[np.float64],
@@ -145,7 +147,7 @@ class ForceMisfit:
         self.unit_deviation = noise or 1.0
         self.below = below
         self.period = len(time) / sample_rate
-        self.frequency = np.arange(int(below * self.period * (1 + 1e-12)) + 1) / self.period
+        self.frequency = np.arange(int(below * self.period * (1 + SAME)) + 1) / self.period
         # Orthonormal: white noise of a deviation in time is white noise of that deviation here.
         self.spectrum = np.fft.rfft(force, norm="ortho")[: len(self.frequency)]
         self.size = 2 * len(self.frequency) - 1

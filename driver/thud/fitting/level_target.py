@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.errors import InputError
-from thud.fitting.misfit import numbers, require_positive
+from thud.fitting.misfit import numbers, require_choice, require_positive
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
 from thud.models import FiniteElement, ModalBall
@@ -52,12 +52,8 @@ class LevelTarget:
 
     def misfit(self) -> LevelMisfit:
         """Return what the fit needs of the target."""
-        if self.bands not in BANDWIDTHS or self.force not in FORCES:
-            message = (
-                f"target: bands = {self.bands!r} or force = {self.force!r} is not known; "
-                "allowed: 'octave', 'third'; 'elastic', 'floor'"
-            )
-            raise InputError(message)
+        require_choice("bands", self.bands, tuple(BANDWIDTHS))
+        require_choice("force", self.force, FORCES)
         nominal = get_bands(self.bands).nominal.tolist()
         asked = nominal
         if self.frequencies is not None:
@@ -84,7 +80,7 @@ class LevelTarget:
             raise InputError(message)
         target = np.concatenate([levels, [pair[0] for pair in known.values()]])
         deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
-        for value in deviation:
+        for value in deviation.tolist():
             require_positive("uncertainty", value, "dB, s or 1")
         return LevelMisfit(self, [nominal.index(f) for f in asked], target, deviation, list(known))
 
@@ -94,6 +90,7 @@ class LevelMisfit:
 
     free_shift = False
     unit_deviation = 1.0
+    deviation_unit = "dB"
 
     def __init__(
         self,

@@ -33,6 +33,10 @@ class Misfit(Protocol):
     def unit_deviation(self) -> float:
         """What residuals are measured in: the noise of forces, N; 1 for levels."""
 
+    @property
+    def deviation_unit(self) -> str:
+        """Unit of a standard deviation that the residuals tell."""
+
     def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:
         """Return model minus target over standard deviation, shape (size,)."""
 
@@ -62,6 +66,14 @@ def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
         message = f"target: {name} = {values!r} is not allowed; allowed: {count} real numbers"
         raise InputError(message)
     return array
+
+
+def require_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
+    """Complain about a word that is not one of those that are allowed."""
+    if value not in allowed:
+        listed = ", ".join(map(repr, allowed))
+        message = f"target: {name} = {value!r} is not known; allowed: {listed}"
+        raise InputError(message)
 
 
 def require_positive(name: str, value: object, unit: str) -> None:

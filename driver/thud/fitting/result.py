@@ -43,6 +43,8 @@ class Fit:
         Their values.
     covariance : ndarray, shape (n, n)
         Their covariance; infinite variances where the data do not tell them apart.
+    limits : ndarray, shape (n, 2)
+        Lower and upper limit of the search for each; infinite where there is none.
     singular_values : ndarray, shape (n,)
         Singular values of the Jacobian with columns of unit length, the largest first.
     level : float
@@ -72,6 +74,7 @@ class Fit:
     units: tuple[str, ...]
     estimate: NDArray[np.float64]
     covariance: NDArray[np.float64]
+    limits: NDArray[np.float64]
     singular_values: NDArray[np.float64]
     level: float
     noise: float
@@ -123,6 +126,8 @@ class Fit:
     def intervals(self, level: float | None = None) -> dict[str, tuple[float, float]]:
         """Return confidence intervals by name, Student's t where the residuals tell the noise.
 
+        They end at the limits of the search: values beyond were ruled out beforehand.
+
         Parameters
         ----------
         level
@@ -130,9 +135,12 @@ class Fit:
         """
         factor = self._coverage_factor(level)
         return {
-            name: (value - factor * error, value + factor * error)
-            for (name, value), error in zip(
-                self.values.items(), self.standard_errors.values(), strict=True
+            name: (max(value - factor * error, lower), min(value + factor * error, upper))
+            for (name, value), error, (lower, upper) in zip(
+                self.values.items(),
+                self.standard_errors.values(),
+                self.limits.tolist(),
+                strict=True,
             )
         }
 
@@ -179,13 +187,17 @@ class Fit:
     def _remarks(self) -> list[str]:
         """Return the quality of the fit, one sentence per line."""
         kind = "given" if self.known_noise else "told from the residuals"
+        unit = self.misfit.deviation_unit
+        # Those that are given with levels may differ from one to the next.
+        several = self.known_noise and unit == "dB"
+        size = "deviations" if several else f"deviation {self.noise:.3g} {unit},"
         freedom = self.degrees_of_freedom
         quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
         failures = f", {self.failures} of them impossible" if self.failures else ""
         return [
             (
                 f"{len(self.residuals)} data, {freedom} degrees of freedom{quality}; "
-                f"standard deviation {self.noise:.3g}, {kind}"
+                f"standard {size} {kind}"
             ),
             f"{self.evaluations} impacts computed{failures}",
         ]

@@ -26,7 +26,7 @@ from thud.fitting.inference import (
 )
 from thud.fitting.level_target import LevelTarget
 from thud.fitting.objective import SHIFT_SCALE, STEP, Objective
-from thud.fitting.parameters import get_ranges
+from thud.fitting.parameters import get_ranges, handy_unit
 from thud.fitting.result import SHIFT, Fit
 
 if TYPE_CHECKING:
@@ -204,6 +204,7 @@ def _conclude(
         units=(*(entry.unit for entry in objective.ranges), *["s"] * objective.misfit.free_shift),
         estimate=place * objective.scale,
         covariance=known.covariance * np.outer(size, size),
+        limits=np.column_stack([objective.lower, objective.upper]) * objective.scale[:, np.newaxis],
         singular_values=known.singular_values,
         level=float(level),
         noise=deviation * objective.misfit.unit_deviation,
@@ -245,9 +246,10 @@ def _doubts(
     ):
         if min(value - lower, upper - value) < AT_LIMIT:
             limit = (lower if value - lower < upper - value else upper) * entry.scale
+            unit, factor = handy_unit(entry.unit, limit)
             found.append(
-                f"{entry.name} ended at its limit, {limit:g} {entry.unit}".rstrip()
-                + ": the intervals hold for values inside the limits only"
+                f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
+                + ": its interval is cut there, and all intervals hold inside the limits only"
             )
     square = float(answer.residuals @ answer.residuals)
     if answer.known_noise and freedom and stats.chi2.sf(square, freedom) < UNLIKELY:

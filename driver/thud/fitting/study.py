@@ -12,12 +12,13 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 from thud.case import Case, read_case
+from thud.columns import read_table
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget
 from thud.fitting.parameters import Parameter, require_known, unit_factor
 from thud.fitting.search import fit
-from thud.recording import Recording, read_table
+from thud.recording import Recording
 
 if TYPE_CHECKING:
     import argparse

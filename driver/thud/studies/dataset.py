@@ -14,6 +14,7 @@ from thud._library import compiler
 from thud.levels import get_bands
 from thud.studies import sets
 from thud.studies.evaluation import SCALARS, block_size
+from thud.studies.parameters import Uniform
 from thud.units import power_of
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
         values = columns[parameter.name]
         if not parameter.numeric and values.dtype.kind == "U":
             values = values.astype(object)
-        coordinates[coordinate(parameter)] = ("set", values, _attributes(parameter))
+        coordinates[coordinate(parameter)] = ("set", values, _attributes(study, parameter))
     variables = {}
     for name, values in found.items():
         unit, meaning = MEANINGS[name]
@@ -82,15 +83,20 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
     return xr.Dataset(variables, coordinates, provenance(study))
 
 
-def _attributes(parameter: Parameter) -> dict[str, Any]:
-    """Return the attributes of a parameter; figures show it in the unit of the study."""
-    power = power_of(parameter.unit, parameter.key.unit, parameter.name)
+def _attributes(study: Study, parameter: Parameter) -> dict[str, Any]:
+    """Return the attributes of a parameter; figures show it in unit and scale of the study."""
+    key, spread, law = parameter.key, parameter.spread, study.temperature
+    meaning = key.meaning
+    if law and parameter.name == "youngs_modulus":
+        meaning += f" at {law.reference:g} degC; its temperature acts on it besides"
     return {
-        "units": parameter.key.unit or "1",
-        "long_name": parameter.key.meaning,
-        "group": parameter.key.group,
+        "units": key.unit or "1",
+        "long_name": meaning,
+        "group": key.group,
+        "key": parameter.name,
         "shown_unit": parameter.unit,
-        "shown_power": -power,
+        "shown_power": -power_of(parameter.unit, key.unit, parameter.name),
+        "scale": "log" if isinstance(spread, Uniform) and spread.logarithmic else "linear",
     }
 
 

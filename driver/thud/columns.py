@@ -1,0 +1,82 @@
+"""Files of numbers in columns, as instruments and spreadsheets write them."""
+
+from __future__ import annotations
+
+import errno
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    import os
+
+    from numpy.typing import NDArray
+
+# The first of them that a line holds stands between its columns; else blanks do.
+SEPARATORS = ("\t", ";", ",")
+ALLOWED = (
+    "allowed: columns of time, s, and force, N, with commas, semicolons, tabs or blanks between "
+    "(decimal commas beside semicolons and tabs)"
+)
+
+
+def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """Return the numbers of a file of columns, shape (n_row, n_column).
+
+    Commas, semicolons, tabs or blanks stand between the columns; decimal commas are read beside
+    semicolons and tabs. Empty lines, what follows a ``#`` and lines above the first number are
+    left out.
+
+    Raises
+    ------
+    InputError
+        Names the file, and the line that holds something else.
+    """
+    try:
+        if not Path(path).is_file():  # to open a pipe could take for ever
+            raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
+        # What a header holds in another code than UTF-8 does not matter.
+        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
+    except (OSError, ValueError) as error:
+        message = f"{path}: cannot be read ({error}); {ALLOWED}"
+        raise InputError(message) from error
+    rows: list[list[float]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        cells = _cells(line)
+        found = [_number(cell) for cell in cells]
+        if not cells or (not rows and found.count(None) == len(found)):
+            continue
+        if None in found:
+            cell = cells[found.index(None)]
+            message = f"{path}: line {number}: {cell[:40]!r} is not a number; {ALLOWED}"
+            raise InputError(message)
+        if rows and len(found) != len(rows[0]):
+            message = (
+                f"{path}: line {number}: {len(found)} columns, {len(rows[0])} above it; {ALLOWED}"
+            )
+            raise InputError(message)
+        rows.append([value for value in found if value is not None])
+    if not rows:
+        message = f"{path}: cannot be read (no numbers); {ALLOWED}"
+        raise InputError(message)
+    return np.array(rows)
+
+
+def _cells(line: str) -> list[str]:
+    """Return the texts of the columns of a line."""
+    rest = line.partition("#")[0].strip().rstrip(";")
+    separator = next((one for one in SEPARATORS if one in rest), None)
+    if separator == ",":
+        return [cell.strip() for cell in rest.split(separator)]
+    return [cell.strip().replace(",", ".") for cell in rest.split(separator)]
+
+
+def _number(cell: str) -> float | None:
+    """Return the number that a text is; None where it is none."""
+    try:
+        return float(cell)
+    except ValueError:
+        return None

@@ -1,0 +1,77 @@
+"""Axes of parameters: names, units, scales."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from thud.fitting.parameters import handy_unit
+from thud.plot import SIZE
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+    from numpy.typing import NDArray
+
+Which = Literal["x", "y"]
+# Numbers outside of these, of a parameter that has its key's unit, are shown in a handier one.
+_PLAIN = (1e-2, 1e4)
+# Largest value over least, from which ticks of a logarithmic axis are 1, 2, 5, and powers of ten.
+_HALF_DECADE, _DECADES = 5.0, 200.0
+
+
+def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
+    """Give an axis the name, unit and scale of a numeric parameter.
+
+    Parameters
+    ----------
+    axes, which
+        The axes, and which of them: ``"x"`` or ``"y"``.
+    parameter
+        Values of the parameter, with the attributes of the dataset.
+
+    Returns
+    -------
+    float
+        What the values have to be multiplied by for the axis.
+    """
+    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_power"])
+    values = parameter.values
+    most = float(np.abs(values).max())
+    if unit == parameter.attrs["units"] and not _PLAIN[0] <= most < _PLAIN[1]:
+        unit, size = handy_unit(unit, most)
+        factor = 1 / size
+    label = words(parameter) if unit == "1" else f"{words(parameter)}, {unit}"
+    axes.set(**{f"{which}label": label})
+    axis: Axis = getattr(axes, f"{which}axis")
+    axis.label.set_fontsize(SIZE)
+    if parameter.attrs.get("scale") == "log":
+        axes.set(**{f"{which}scale": "log"})
+        _mark_decades(axis, values * factor)
+    else:
+        axes.ticklabel_format(axis=which, useOffset=False)
+    return factor
+
+
+def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
+    """Give a logarithmic axis ticks with plain numbers."""
+    ratio = values.max() / values.min()
+    if ratio < _HALF_DECADE:
+        axis.set_major_locator(MaxNLocator(5))
+    else:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,)))
+    axis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def words(parameter: xr.DataArray) -> str:
+    """Return the name of a parameter in words, as a label begins."""
+    return plain_words(str(parameter.name)).capitalize()
+
+
+def plain_words(name: str) -> str:
+    """Return the name of a parameter in words."""
+    return name.replace("youngs", "Young's").replace("_", " ")

@@ -1,0 +1,182 @@
+"""The figure of a sweep: levels against one parameter, in panels for the values of another."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from thud.impact import FORCES
+from thud.levels import get_bands, octave_limits
+from thud.plot import COLOURS, COMPACT, LINES, MARKERS, SIZE, WIDTH, dress
+from thud.studies.axes import plain_words, show_parameter, words
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.axes import Axes
+    from numpy.typing import NDArray
+
+    Columns = dict[str, NDArray[Any]]
+
+# More values of a parameter than this are put into as many classes.
+_MOST_VALUES = 32
+_CLASSES = 16
+# More points of a line than this have no markers, half as many in half the width.
+_MOST_MARKS = 16
+# Texts of a parameter up to this many have a panel each.
+_MOST_PANELS = 6
+_TINY = 0.05
+
+
+class _Judged(NamedTuple):
+    """Levels of each set less the nominal ones, and the least and largest tolerance of all, dB."""
+
+    excess: NDArray[np.float64]
+    tolerance: tuple[float, float]
+
+
+def draw_sweep(dataset: xr.Dataset) -> Figure:
+    """Draw octave levels against the first numeric parameter that has several values.
+
+    Each value of the first parameter of texts, up to six of them, has its panel. Lines are medians
+    over the other parameters, shades reach from the least to the largest.
+
+    Parameters
+    ----------
+    dataset
+        What `sweep` gives.
+
+    Returns
+    -------
+    Figure
+        Level of the judged force over nominal level, dB.
+    """
+    columns = _columns(dataset)
+    varied = [name for name, values in columns.items() if len(np.unique(values)) > 1]
+    numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
+    name = (numeric or varied or list(columns))[0]
+    texts = [n for n in varied if n not in numeric and n != name]
+    split = next((n for n in texts if len(np.unique(columns[n])) <= _MOST_PANELS), None)
+    judged = _judge(dataset, columns)
+    parts = {"": np.ones(len(columns[name]), dtype=bool)}
+    if split:
+        parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
+    across = 1 if len(parts) == 1 else 2
+    down = -(-len(parts) // across)
+    figure = Figure(figsize=(WIDTH, 1.1 + (1.9 if across == 1 else 1.6) * down), dpi=300)
+    figure.set_layout_engine("constrained")
+    panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
+    for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
+        _draw_tolerance(dress(axes), judged.tolerance)
+        levels = np.where(panel[:, np.newaxis], judged.excess, np.nan)
+        most = _MOST_MARKS // across
+        _draw_octaves(axes, dataset[name], columns[name], levels, most)
+        axes.set_title(title.replace("_", " "), fontsize=SIZE - 1)
+        lowest = i + across >= len(parts)
+        axes.tick_params(axis="x", labelbottom=lowest)
+        axes.xaxis.label.set_visible(lowest)
+    for axes in panels[len(parts) :]:
+        axes.remove()
+    figure.supylabel("Level - nominal, dB", fontsize=SIZE)
+    others = [n for n in varied if n not in {name, split}]
+    _add_legend(figure, judged, split, others)
+    return figure
+
+
+def _columns(dataset: xr.Dataset) -> Columns:
+    """Return the parameters of each set."""
+    names = [str(name) for name in dataset.coords if name != "octave"]
+    whole = dataset["status"]
+    return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
+
+
+def _judge(dataset: xr.Dataset, columns: Columns) -> _Judged:
+    """Return the levels of each set's judged force against the nominal ones of its source."""
+    levels = {
+        force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
+        for force in FORCES
+    }
+    count = len(dataset["status"].values.ravel())
+    forces = columns.get("force", np.full(count, dataset.attrs["judged_force"]))
+    sources = columns.get("source", np.full(count, dataset.attrs["limits"]))
+    found = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
+    tolerances: list[float] = []
+    for source in np.unique(sources):
+        lower, upper = octave_limits(source)
+        found[sources == source] -= (lower + upper) / 2
+        tolerances.extend((upper - lower) / 2)
+    return _Judged(found, (min(tolerances), max(tolerances)))
+
+
+def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
+    """Draw the largest tolerance of an octave, and the least on it, around the nominal level."""
+    for width, colour in zip(reversed(tolerance), ("0.92", "0.84"), strict=True):
+        axes.axhspan(-width, width, color=colour, linewidth=0, zorder=0)
+    axes.axhline(0, color="0.45", linewidth=0.8)
+
+
+def _draw_octaves(
+    axes: Axes,
+    parameter: xr.DataArray,
+    values: NDArray[Any],
+    levels: NDArray[np.float64],
+    most_marks: int,
+) -> None:
+    """Draw the octave levels of sets, those that are not NaN, against a parameter."""
+    places, members, names = _classes(values)
+    if names is None:
+        places = places * show_parameter(axes, "x", parameter)
+    else:
+        axes.set_xticks(places, names)
+        axes.tick_params(axis="x", labelrotation=20)
+        axes.set_xlabel(words(parameter), fontsize=SIZE)
+    for i, band in enumerate(get_bands().nominal):
+        found = [levels[chosen, i] for chosen in members]
+        middle, least, most = (
+            np.array([_of(part, f) for part in found]) for f in (np.median, np.min, np.max)
+        )
+        style: dict[str, Any] = {"color": COLOURS[i], "linestyle": LINES[i], "linewidth": 1.2}
+        if len(places) <= most_marks:
+            style |= {"marker": MARKERS[i], "markersize": 3}
+        axes.plot(places, middle, label=f"{band:g} Hz", **style)
+        if np.nanmax(most - least, initial=0) > _TINY:
+            axes.fill_between(places, least, most, color=COLOURS[i], alpha=0.15, linewidth=0)
+
+
+def _classes(
+    values: NDArray[Any],
+) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
+    """Return places on an axis, which sets belong to each, and their names where they have some."""
+    found = np.unique(values)
+    if values.dtype.kind not in "iuf":
+        members = [values == value for value in found]
+        return np.arange(len(found), dtype=float), members, [str(value) for value in found]
+    if len(found) <= _MOST_VALUES:
+        return found.astype(float), [values == value for value in found], None
+    edges = np.quantile(values, np.linspace(0, 1, _CLASSES + 1))
+    place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
+    members = [place == i for i in range(_CLASSES) if (place == i).any()]
+    return np.array([np.median(values[chosen]) for chosen in members]), members, None
+
+
+def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
+    """Return what a function makes of numbers; NaN where there are none."""
+    known = part[np.isfinite(part)]
+    return float(function(known)) if known.size else np.nan
+
+
+def _add_legend(figure: Figure, judged: _Judged, split: str | None, others: list[str]) -> None:
+    """Name the octaves over the panels, and what panels, lines, shades and grey are."""
+    least, most = judged.tolerance
+    lines = [f"Grey: tolerances of the octaves, ±{least:g} to ±{most:g} dB"]
+    if others:
+        over = plain_words(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
+        lines.insert(0, f"Lines: median over {over}; shades: range")
+    if split:
+        lines.insert(0, f"Panels: {plain_words(split)}")
+    figure.legend(
+        *figure.axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=5,
+        title="\n".join(lines), title_fontsize=SIZE - 1, alignment="left", fontsize=SIZE - 1,
+        frameon=False, borderpad=0, **COMPACT,
+    )  # fmt: skip

@@ -1,0 +1,132 @@
+"""Recordings: files of columns, even times that are written rounded, and what is none."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import thud
+from thud.columns import read_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RATE = 44100.0
+FORCE = np.sin(np.linspace(0, np.pi, 500))
+TIME = 0.2 + np.arange(500) / RATE
+
+
+@pytest.mark.parametrize("form", [".5f", ".6f", ".7f", ".9f", ".6e", ".18e", ""])
+@pytest.mark.parametrize("begin", [0.2, 123.0])
+def test_rounded_times_are_even(form: str, begin: float) -> None:
+    time = begin + np.arange(500) / RATE
+    written = np.array([float(format(value, form)) for value in time])
+    if form == ".6e" and begin > 1:
+        with pytest.raises(thud.InputError, match="not evenly spaced"):  # 0.1 ms are four steps
+            thud.Recording.from_arrays(np.column_stack([written, FORCE]))
+        return
+    record = thud.Recording.from_arrays(np.column_stack([written, FORCE]))
+    # The slope of a line through n points of standard deviation s has that of s sqrt(12 / n^3).
+    digit = float(np.abs(written - time).max())
+    assert record.sample_rate == pytest.approx(
+        RATE, rel=4 * digit / np.sqrt(3) * RATE * np.sqrt(12 / 500**3) + 1e-9
+    )
+    first = int(np.flatnonzero(FORCE > 0.01)[0])
+    assert record.origin == pytest.approx(begin + first / RATE, abs=digit + 1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        (np.where(np.arange(500) < 300, 0, 1 / RATE), r"row 30[01], 0\.20\d+ s, is 0\.\d+ steps"),
+        (np.where(np.arange(500) == 7, 3e-6, 0), r"row 8, 0\.20016\d+ s, is 0\.13 steps of 2\.268"),
+        (np.random.default_rng(1).uniform(-2e-6, 2e-6, 500), r"to 0\.001 steps"),
+    ],
+    ids=["gap", "outlier", "jitter"],
+)
+def test_uneven_times_are_told(fault: np.ndarray, words: str) -> None:
+    with pytest.raises(thud.InputError, match=f"not evenly spaced: .*{words}"):
+        thud.Recording.from_arrays(np.column_stack([(TIME + fault).round(9), FORCE]))
+
+
+def test_gap_is_told_however_the_times_are_rounded() -> None:
+    time = np.delete(TIME, 100).round(5)
+    with pytest.raises(thud.InputError, match=r"not evenly spaced: row \d+, .* to 0\.25 steps"):
+        thud.Recording.from_arrays(np.column_stack([time, FORCE[:-1]]))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "{}.5,-{}e-3",
+        "{}.5; -{}e-3",
+        "{},5;-{}e-3;",
+        "{}.5\t-{}e-3",
+        "{},5\t-{}e-3",
+        "  {}.5  -{}e-3",
+    ],
+)
+@pytest.mark.parametrize("head", ["", "# plate\n\ntime_s,force_N\n", "Zeit;Kraft\n[s];[µN]\n"])
+def test_columns_are_read_whatever_is_between(line: str, head: str, tmp_path: Path) -> None:
+    path = tmp_path / "plate.csv"
+    text = head + "".join(f"{line.format(i, i)}\r\n" for i in range(9))
+    path.write_bytes(text.encode("latin-1"))
+    expected = [(i + 0.5, -i * 1e-3) for i in range(9)]
+    np.testing.assert_array_equal(read_table(path), expected)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "cannot be read .no numbers"),
+        ("time,force\n", "no numbers"),
+        ("a,b\nc,d\n", "no numbers"),
+        ("time;force\n0;0\n1;2 N\n", "line 3: '2 N' is not a number"),
+        ("0,001,5,2\n0,002,5\n", "line 2: 3 columns, 4 above it"),
+        ("1,0\n2,\n", "line 2: '' is not a number"),
+        ("0,1 0,2\n", "line 1: '1 0' is not a number"),
+        ("0,1\n1,2\n", "2 rows of 2 numbers"),
+        ("".join(f"{i},1,2\n" for i in range(9)), "9 rows of 3 numbers"),
+        ("".join(f"{i},nan\n" for i in range(9)), "not finite"),
+        ("".join(f"{i**2},1\n" for i in range(9)), "not evenly spaced"),
+        ("".join(f"{-i},1\n" for i in range(9)), "times rise by -1 s"),
+        ("".join("0,1\n" for _ in range(9)), "times rise by 0 s"),
+        ("".join(f"{i},0\n" for i in range(9)), "nowhere positive"),
+    ],
+)
+def test_useless_recordings_are_told(tmp_path: Path, text: str, words: str) -> None:
+    (tmp_path / "plate.csv").write_text(text)
+    with pytest.raises(thud.InputError, match=rf"plate\.csv: .*({words}).*; allowed: ") as caught:
+        thud.Recording.from_csv(tmp_path / "plate.csv")
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_recording_is_told(tmp_path: Path) -> None:
+    with pytest.raises(thud.InputError, match=r"no\.csv: cannot be read .*; allowed: columns"):
+        thud.Recording.from_csv(tmp_path / "no.csv")
+
+
+def test_force_of_the_wrong_sign_is_told() -> None:
+    # As a plate gives it that counts pulling positive: the noise before the impact is positive.
+    impact = thud.solve(duration=0.03)
+    force = np.random.default_rng(1).normal(size=1323) - impact.floor_force
+    words = r"target: the force is mostly negative, -1\d+ to \d\.\d+ N; allowed: .*change its sign"
+    with pytest.raises(thud.InputError, match=words):
+        thud.fit((impact.time, force), ["youngs_modulus"])
+
+
+def test_rounded_times_do_not_move_the_fit() -> None:
+    impact = thud.solve(duration=0.03)
+    fit = thud.fit(((impact.time + 0.2).round(6), impact.floor_force), ["youngs_modulus"])
+    # Of 1323 times rounded to 1 us the mean is off by 1 us / sqrt(12 * 1323); four of that.
+    assert fit.time_shift == pytest.approx(0.2, abs=4e-6 / np.sqrt(12 * 1323))
+
+
+@pytest.mark.parametrize("digits", [5, 6, 7, 9, 16])
+def test_rounded_times_do_not_move_the_band(digits: int) -> None:
+    # 1.25 kHz are the 75th harmonic of 60 ms, and belong to the band.
+    force = np.append(thud.solve(duration=0.03).floor_force, np.zeros(1323))
+    time = (np.arange(2646) / RATE).round(digits)
+    assert thud.ForceTarget((time, force)).misfit().size == 2 * 75 + 1

@@ -1,0 +1,114 @@
+"""The figure of a sweep: axes in their scale, texts in panels, words for what is drawn."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import thud
+from thud.studies.sweep_figure import draw_sweep
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+HEIGHTS = {"values": [50, 100], "unit": "cm"}
+NOMINAL = np.array([39, 31, 23, 17, 12.5])
+
+
+def draw(**study: Any) -> Figure:  # noqa: ANN401 - of a study
+    return draw_sweep(thud.sweep(study))
+
+
+def curves(axes: Axes) -> np.ndarray:
+    """Return the medians of a panel, shape (n_place, 5)."""
+    lines = {str(line.get_label()): line.get_ydata() for line in axes.lines}
+    return np.column_stack([lines[f"{band} Hz"] for band in ("31.5", "63", "125", "250", "500")])
+
+
+def words(figure: Figure) -> str:
+    return figure.legends[0].get_title().get_text()
+
+
+def test_logarithmic_parameter_has_a_logarithmic_axis() -> None:
+    modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
+    figure = draw(parameters={"youngs_modulus": modulus})
+    (axes,) = figure.axes
+    assert axes.get_xscale() == "log"
+    assert axes.get_xlabel() == "Young's modulus, MPa"
+    figure.draw_without_rendering()
+    assert axes.xaxis.get_offset_text().get_text() == ""
+    assert draw(parameters={"height": HEIGHTS}).axes[0].get_xscale() == "linear"
+
+
+def test_first_numeric_parameter_is_the_axis_and_texts_have_panels() -> None:
+    fluxes = ["none", "retarding"]
+    figure = draw(parameters={"momentum_flux": {"values": fluxes}, "height": HEIGHTS})
+    assert [axes.get_title() for axes in figure.axes] == fluxes
+    for axes, flux in zip(figure.axes, fluxes, strict=True):
+        assert axes.get_xlabel() == "Height, cm"
+        drops = [thud.solve(drop=thud.Drop(height), momentum_flux=flux) for height in (0.5, 1.0)]
+        levels = [impact.levels(force="elastic") - NOMINAL for impact in drops]
+        np.testing.assert_allclose(curves(axes), levels, atol=1e-6)
+    assert "Panels: momentum flux" in words(figure)
+    assert "median" not in words(figure)
+
+
+def test_lowest_panels_have_the_numbers_of_the_axis() -> None:
+    fluxes = {"values": ["none", "retarding", "conservative"]}
+    figure = draw(parameters={"momentum_flux": fluxes, "height": HEIGHTS})
+    shown = [axes.xaxis.get_tick_params()["labelbottom"] for axes in figure.axes]
+    assert shown == [False, True, True]
+    assert [axes.xaxis.label.get_visible() for axes in figure.axes] == shown
+
+
+def test_texts_alone_are_the_axis() -> None:
+    (axes,) = draw(parameters={"momentum_flux": {"values": ["none", "retarding"]}}).axes
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["none", "retarding"]
+    assert axes.get_xlabel() == "Momentum flux"
+
+
+def test_every_set_has_the_nominal_levels_of_its_source_and_its_judged_force() -> None:
+    sources, forces = ["rubber_ball", "tyre"], ["elastic", "floor"]
+    for force in forces:
+        figure = draw(
+            fixed={"force": force}, parameters={"source": {"values": sources}, "height": HEIGHTS}
+        )
+        for axes, source in zip(figure.axes, sources, strict=True):
+            impact = thud.solve()
+            limits = impact.conformity(source).criteria[:5]
+            nominal = [(limit.lower + limit.upper) / 2 for limit in limits]
+            np.testing.assert_allclose(curves(axes)[1], impact.levels(force=force) - nominal)
+    figure = draw(parameters={"force": {"values": forces}, "height": HEIGHTS})
+    for axes, force in zip(figure.axes, forces, strict=True):
+        np.testing.assert_allclose(curves(axes)[1], thud.solve().levels(force=force) - NOMINAL)
+
+
+@pytest.mark.parametrize(
+    ("others", "expected"),
+    [
+        (
+            {"wall_thickness": {"values": [0.03, 0.032]}},
+            "median over wall thickness; shades: range",
+        ),
+        (
+            {"wall_thickness": {"values": [0.03, 0.032]}, "mass": {"values": [2.4, 2.5]}},
+            "median over 2 other parameters; shades: range",
+        ),
+    ],
+)
+def test_figure_says_what_lines_and_shades_are(others: dict[str, Any], expected: str) -> None:
+    figure = draw(parameters={"height": HEIGHTS, **others})
+    assert expected in words(figure)
+    assert "tolerances of the octaves, ±1 to ±2 dB" in words(figure)
+
+
+def test_figure_is_a_column_wide(tmp_path: Any) -> None:  # noqa: ANN401 - a path
+    values = ["momentum_balance", "retarding", "conservative", "none"]
+    figure = draw(parameters={"momentum_flux": {"values": values}, "height": HEIGHTS})
+    assert figure.get_figwidth() == pytest.approx(3.5)
+    thud.plot.save(figure, tmp_path / "sweep.png")
+    titles = [axes.title.get_window_extent() for axes in figure.axes]
+    assert titles[0].x1 < titles[1].x0
