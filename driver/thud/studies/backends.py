@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 from concurrent.futures import (
     FIRST_COMPLETED,
-    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
@@ -114,11 +114,11 @@ def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) 
             found = future.result()
         except ThudError:
             raise
-        except (Exception, CancelledError) as error:
+        except Exception as error:
             del running[future]
-            said = str(error).partition("\n")[0]
+            said = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
             message = (
-                f"the backend lost a block of sets ({type(error).__name__}: {said}); what was "
+                f"the backend lost a block of sets ({said}); what was "
                 f"finished is kept; allowed: run the study again"
             )
             raise NumericalError(message) from error
@@ -164,14 +164,19 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
     try:
         # A client of an unknown kind of address would fail again when it is thrown away.
         get_backend(parse_address(address)[0])
-        client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
+        client: Any = Client(  # type: ignore[no-untyped-call]
+            address,
+            timeout=PATIENCE,
+            # As default it would also be asked for the locks of files, which stay in this process.
+            set_as_default=False,
+        )
     except (OSError, ValueError, TypeError) as error:
         message = (
             f"scheduler = {address!r} does not answer within {PATIENCE} s; "
             f"allowed: the address of a running one, such as tcp://host:8786"
         )
         raise InputError(message) from error
-    with client:
+    with _silent("distributed"), client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as error:
@@ -180,3 +185,20 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
         width = sum(client.nthreads().values())
         with client.get_executor() as executor:
             yield executor, width
+
+
+@contextmanager
+def _silent(name: str) -> Iterator[None]:
+    """Keep the loggers of a package quiet: what goes wrong is told in one sentence."""
+    known = [
+        other for other in logging.root.manager.loggerDict if f"{other}.".startswith(f"{name}.")
+    ]
+    loggers = [logging.getLogger(other) for other in known]
+    usual = [logger.disabled for logger in loggers]
+    for logger in loggers:
+        logger.disabled = True
+    try:
+        yield
+    finally:
+        for logger, disabled in zip(loggers, usual, strict=True):
+            logger.disabled = disabled
