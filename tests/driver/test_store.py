@@ -48,6 +48,31 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert values(found).identical(expected)
 
 
+def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "six.toml"
+    path.write_text('format = "zarr"\nparameters.height.values = [0.5, 0.6, 0.7, 0.8, 0.9, 1]')
+    assert cli.main(["sweep", str(path), "-o", str(tmp_path)]) == 0
+    assert "conforming sets" in capsys.readouterr().out
+    assert (tmp_path / "six.zarr").is_dir()
+
+
+# h5netcdf stumbles over what it could not open when it throws it away.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_damaged_results_are_told(tmp_path: Path) -> None:
+    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
+    whole = (tmp_path / "a.nc").read_bytes()
+    told = 0
+    for place in range(0, len(whole), 256):
+        path = tmp_path / f"{place}.nc"
+        path.write_bytes(whole[:place] + bytes([255] * 64) + whole[place + 64 :])
+        try:
+            thud.read_sweep(path)
+        except thud.InputError as error:
+            told += 1
+            assert f"{path} cannot be read; allowed: results of a" in str(error)
+    assert 0 < told < len(whole) // 256
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     """Return the results of the long study, computed at a stretch."""

@@ -134,10 +134,11 @@ class Store:
         """Write a Zarr group, some variables at a time: only these have to fit into memory."""
         part = self.path.with_name(f".{self.path.name}.part")
         shutil.rmtree(part, ignore_errors=True)
-        with _named(self.path), _open(paths[0]) as first:
-            names = list(map(str, first.data_vars))
-            largest = max(variable.nbytes for variable in first.data_vars.values()) * len(paths)
-            together = max(1, 2 * LARGE // largest)
+        with _open(paths[0]) as first:
+            sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
+        names = list(sizes)
+        together = max(1, 2 * LARGE // (max(sizes.values()) * len(paths)))
+        with _named(self.path):
             for i in range(0, len(names), together):
                 grid = grid_of(self._study, _join(paths, names[i : i + together]))
                 grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
@@ -172,8 +173,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
         return _join(paths)
     if place.suffix == ".zarr":
         with _readable(place):
-            lazy: xr.Dataset = xr.open_zarr(place, consolidated=False)
-            return lazy
+            return _open_zarr(place)
     with _open(place) as dataset:
         return _loaded(dataset)
 
@@ -202,14 +202,19 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
-    """Open a file or Zarr group."""
-    with _readable(path), uninterrupted():
-        if path.suffix == ".zarr":
-            dataset = xr.open_zarr(path, consolidated=False)
-        else:
-            dataset = xr.open_dataset(path, engine="h5netcdf")
-    with dataset:
-        yield dataset
+    """Open a file or Zarr group to be read."""
+    with _readable(path):
+        with uninterrupted():
+            zarr = path.suffix == ".zarr"
+            dataset = _open_zarr(path) if zarr else xr.open_dataset(path, engine="h5netcdf")
+        with dataset:
+            yield dataset
+
+
+def _open_zarr(path: Path) -> xr.Dataset:
+    """Open a Zarr group: its arrays are read when they are needed, whether Dask is there or not."""
+    dataset: xr.Dataset = xr.open_zarr(path, consolidated=False, chunks=None)
+    return dataset
 
 
 @contextmanager
@@ -217,7 +222,7 @@ def _readable(path: Path) -> Iterator[None]:
     """Complain about what is not a dataset."""
     try:
         yield
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
         message = f"{path} cannot be read; allowed: results of a study, or remove it"
         raise InputError(message) from error
 
