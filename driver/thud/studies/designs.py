@@ -18,6 +18,8 @@ DESIGNS = {
     "uncertainty": ("random",),
 }
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
+# Fewer base samples than this give no Sobol indices.
+LEAST_SAMPLES = 4
 _LARGEST_SEED = 2**32 - 1
 
 
@@ -76,7 +78,11 @@ def read_design(
     if design not in DRAWN:
         return design, 0, 0
     size, seed = given.get("size", 0), given.get("seed", 0)
-    for word, number, least, most in (("size", size, 1, 2**30), ("seed", seed, 0, _LARGEST_SEED)):
+    least_size = LEAST_SAMPLES if design == "saltelli" else 1
+    for word, number, least, most in (
+        ("size", size, least_size, 2**30),
+        ("seed", seed, 0, _LARGEST_SEED),
+    ):
         if not isinstance(number, int) or isinstance(number, bool) or not least <= number <= most:
             message = (
                 f"[design] {word} = {number!r} is not allowed; "
