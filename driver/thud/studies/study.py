@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
+
+import numpy as np
 
 import thud
 from thud.case import Case, read_case
@@ -19,9 +22,6 @@ from thud.models import FiniteElement, new_model
 from thud.studies.designs import read_design, require_words
 from thud.studies.parameters import Parameter, checked, new_parameter
 from thud.units import power_of
-
-if TYPE_CHECKING:
-    import os
 
 # What `read_study` reads.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
@@ -124,19 +124,40 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
             raise InputError(message)
         return source
     if isinstance(source, Mapping):
-        text = json.dumps(source, default=repr)
-        return _new_study(dict(source), kind, Path(), "python", text)
+        text = _text(source)
+        return _new_study(json.loads(text), kind, Path(), "python", text)
     require_kind("study", source, str | Path)
     path = Path(source)
     try:
         content = path.read_text(encoding="utf-8")
         return _new_study(tomllib.loads(content), kind, path.parent, path.stem, content)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        message = f"{path}: {error}; allowed: TOML"
-        raise InputError(message) from error
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
+    except ValueError as error:  # no TOML, no UTF-8, or a number of thousands of digits
+        message = f"{path}: {error}; allowed: TOML"
+        raise InputError(message) from error
+
+
+def _text(source: Mapping[str, Any]) -> str:
+    """Return what would stand in a file as JSON, whatever kinds of numbers and tables it has."""
+    try:
+        return json.dumps(source, default=_plain)
+    except (TypeError, ValueError, RecursionError) as error:
+        message = f"the study is no text ({error}); allowed: tables, lists, numbers and text"
+        raise InputError(message) from error
+
+
+def _plain(value: object) -> object:
+    """Return tables, paths, and numbers and arrays of NumPy as what JSON knows."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    message = f"an object of {type(value).__name__}"
+    raise TypeError(message)
 
 
 def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: str) -> Study:
