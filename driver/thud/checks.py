@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+import numpy as np
+
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 # Longer values are told by their kind.
 LONGEST_SHOWN = 80
+# No key takes a larger number, and Python does not print the largest ones.
+LARGEST = 10**300
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
@@ -27,11 +31,27 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
         )
-        shown = repr(value)
-        if len(shown) > LONGEST_SHOWN:
-            shown = f"an object of {type(value).__name__}"
-        message = f"{name} = {shown} is not allowed; allowed: an object of {expected}"
+        message = f"{name} = {shown(value)} is not allowed; allowed: an object of {expected}"
         raise InputError(message)
+
+
+def require_whole(name: str, value: object, least: int, most: int) -> None:
+    """Complain about what is not a whole number between two others."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:  # type: ignore[operator]
+        message = (
+            f"{name} = {shown(value)} is not allowed; allowed: whole numbers from {least} to {most}"
+        )
+        raise InputError(message)
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: what is long or has lines by its kind."""
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return "a very large number"
+    text = repr(value)
+    fits = len(text) <= LONGEST_SHOWN and "\n" not in text
+    return text if fits else f"an object of {type(value).__name__}"
 
 
 @contextmanager

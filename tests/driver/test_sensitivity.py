@@ -112,7 +112,7 @@ def test_useless_designs_are_told() -> None:
     with pytest.raises(thud.InputError, match="such as 64 or 128"):
         thud.sensitivity({**LUMPED, "design": {"size": 100}})
     for size in (1, 2):
-        with pytest.raises(thud.InputError, match=rf"size = {size} is not allowed; allowed: 4 <="):
+        with pytest.raises(thud.InputError, match=rf"size = {size} is not .* numbers from 4"):
             thud.sensitivity({**LUMPED, "design": {"size": size}})
 
 

@@ -23,6 +23,7 @@ from thud.studies import evaluation, run, sets
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
     from types import ModuleType
 
@@ -273,7 +274,26 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.height = {low=1}", "no high end; allowed: high"),
         ("parameters.height = {low=2, high=1, count=3}", "low = 2 is not allowed; allowed: low <"),
         ("parameters.height = {low=0, high=1, count=3, scale='log'}", "allowed: low < high, 0"),
-        ("parameters.height = {low=1, high=2, count=1}", "allowed: 2 <= count, whole"),
+        ("parameters.height = {low=1, high=2, count=1}", "count = 1 is not .*whole numbers from 2"),
+        (
+            "parameters.height = {low=1, high=2, count=1000000000000}",
+            "count = 1000000000000 is not allowed; allowed: whole numbers from 2 to 1073741824",
+        ),
+        (
+            f"parameters.height = {{low=1, high=2, count=1{'0' * 400}}}",
+            "count = a very large number is not allowed",
+        ),
+        ("parameters.substeps = {low=1, high=3, count=4}", "allowed: whole numbers from 2 to 3"),
+        (
+            "parameters.substeps = {low=1, high=1e9, count=3}",
+            r"low = 1 and high = 1e\+09 are not allowed; allowed: 1 <= low < high <= 10000",
+        ),
+        (
+            "parameters = {height=$, mass=$, gravity=$}".replace(
+                "$", "{low=1, high=2, count=10_000_000}"),
+            r"make too many sets; allowed: up to 2\^63 - 1 in a grid",
+        ),
+        (f"design.seed = 1{'0' * 5000}", "allowed: TOML"),
         ("parameters.height = {std=1}", "no values for a grid design"),
         ("parameters.substeps.values = [1.5]", "values = 1.5 is not allowed; allowed: whole"),
         ("parameters.substeps = {std=1}", "allowed: values"),
@@ -290,7 +310,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("temperature.reference = 1\nparameters.temperature.values = [1]", "coefficient = None"),
         ("design.kind = 'cube'\nparameters.mass.values = [1]", "allowed: grid, list, random"),
         ("design.size = 3\nparameters.mass.values = [1]", "'size' is not known; allowed: kind"),
-        ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*allowed: 1 <= size"),
+        ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*numbers from 1"),
         ("design = {kind='sobol', size=100}\nparameters.mass.values = [1]", "as 64 or 128"),
         (
             "design = {kind='random', size=9}\nparameters.mass = {low=1, high=2, count=3}",
@@ -322,6 +342,39 @@ def test_bad_studies_are_told(
     with pytest.raises(thud.InputError, match=words):
         thud.read_study(path)
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design_map, "grid")]
+)
+def test_exploding_designs_are_told_before_they_are_made(
+    compute: Callable[[dict[str, Any]], object], design: str
+) -> None:
+    spread = {"low": 1, "high": 2, "count": 10**9}
+    study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
+    with pytest.raises(thud.InputError, match=r"000 sets of hollow_sphere.*; allowed: up to"):
+        compute(study)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    plain = {"fixed": {"substeps": 2}, "parameters": {"height": {"values": [0.5, 0.75, 1.0]}}}
+    for heights in (np.linspace(0.5, 1, 3), list(np.linspace(0.5, 1, 3)), (0.5, 0.75, 1)):
+        study = {"fixed": {"substeps": np.int64(2)}, "parameters": {"height": {"values": heights}}}
+        assert thud.read_study(study).fingerprint == thud.read_study(plain).fingerprint
+
+
+@pytest.mark.parametrize(
+    ("study", "words"),
+    [
+        ({"fixed": {"mass": np.ones((9, 9))}}, r"mass = an object of list is not allowed"),
+        ({"fixed": {"mass": {1, 2}}}, r"no text \(an object of set\); allowed: tables"),
+        ({"fixed": {"mass": 10**5000}}, r"no text .*; allowed: tables"),
+    ],
+)
+def test_bad_tables_are_told(study: dict[str, Any], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words) as told:
+        thud.sweep({**HEIGHTS, **study})
+    assert "\n" not in str(told.value)
 
 
 def test_study_that_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 from thud.case import Ball, Drop
 from thud.errors import InputError
 from thud.studies.dataset import coordinate
+from thud.studies.parameters import Parameter, Uniform
 from thud.studies.run import sweep
 from thud.studies.study import Study, read_study, value_in
 
@@ -83,14 +84,19 @@ def design_map(
         As `sweep`; also where there are not two numeric parameters with two values or more.
     """
     plan = read_study(study, "design")
-    if len(plan.parameters) != _AXES or not all(
-        parameter.numeric and len(set(parameter.spread.grid())) > 1 for parameter in plan.parameters
-    ):
+    if len(plan.parameters) != _AXES or not all(map(_is_axis, plan.parameters)):
         message = "[parameters] are no map; allowed: two numeric ones of two values or more"
         raise InputError(message)
     first, second = map(coordinate, plan.parameters)
     dataset = sweep(plan, output, **how).load().sortby([first, second])
     return DesignMap(dataset, (first, second), *_mark(plan))
+
+
+def _is_axis(parameter: Parameter) -> bool:
+    """Return whether a parameter has two numbers or more."""
+    spread = parameter.spread
+    # Very many values between two ends are not made for this.
+    return parameter.numeric and (isinstance(spread, Uniform) or len(set(spread.grid())) > 1)
 
 
 def _mark(plan: Study) -> tuple[tuple[float, float] | None, str]:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.keys import DENSITY, TEMPERATURE
-from thud.studies.parameters import Uniform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -24,19 +23,12 @@ if TYPE_CHECKING:
 def shape(study: Study) -> tuple[int, ...]:
     """Return the number of values of each parameter of a grid, or the one number of all sets."""
     if study.design == "grid":
-        return tuple(_length(parameter.spread) for parameter in study.parameters)
+        return tuple(parameter.spread.size for parameter in study.parameters)
     if study.design == "list":
-        return (_length(study.parameters[0].spread),)
+        return (study.parameters[0].spread.size,)
     if study.design == "saltelli":
         return (study.size * (len(study.parameters) + 2),)
     return (study.size,)
-
-
-def _length(spread: Any) -> int:  # noqa: ANN401 - any kind of spread
-    """Return the number of values of a grid without making them, if there may be very many."""
-    if isinstance(spread, Uniform) and not spread.whole:
-        return spread.count
-    return len(spread.grid())
 
 
 def count(study: Study) -> int:
