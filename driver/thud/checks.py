@@ -35,13 +35,21 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         raise InputError(message)
 
 
-def require_whole(name: str, value: object, least: int, most: int) -> None:
+def require_whole(name: str, value: Any, least: int, most: int) -> None:  # noqa: ANN401
     """Complain about what is not a whole number between two others."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not least <= value <= most:  # type: ignore[operator]
+    if not whole or not least <= value <= most:
         message = (
             f"{name} = {shown(value)} is not allowed; allowed: whole numbers from {least} to {most}"
         )
+        raise InputError(message)
+
+
+def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
+    """Complain about what is not a finite number."""
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    if not number or not abs(value) <= LARGEST:
+        message = f"{name} = {shown(value)} is not allowed; allowed: finite numbers"
         raise InputError(message)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 from thud.case import Case, read_case
+from thud.checks import require_number
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget
@@ -27,10 +28,8 @@ if TYPE_CHECKING:
     from thud.fitting.result import Fit
 
 OPTIONS = ("level", "starts", "seed", "max_steps")
-WHOLE = ("starts", "seed", "max_steps")
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
 LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
-LARGE = 1e300
 PARAMETER_KEYS = ("start", "lower", "upper", "unit")
 
 
@@ -98,12 +97,6 @@ def _study(place: Path, content: dict[str, Any]) -> Study:
     base = Case()
     if "base" in content:
         base = read_case(place.parent / _text("base", content["base"]))
-    for name in OPTIONS:
-        if name in content:
-            _number(name, content[name], whole=name in WHOLE)
-    if "seed" in content and content["seed"] < 0:
-        message = f"seed = {content['seed']} is not allowed; allowed: whole numbers from 0"
-        raise InputError(message)
     parameters: dict[str, Parameter] = {}
     units = {}
     for name, entries in _table("parameters", content).items():
@@ -115,7 +108,10 @@ def _study(place: Path, content: dict[str, Any]) -> Study:
         if "unit" in entries:
             factor = unit_factor(where, key.unit, entries["unit"])
             units[name] = (entries["unit"], factor)
-        values = {n: _number(f"{where} {n}", v) * factor for n, v in given.items() if n != "unit"}
+        numbers = {word: value for word, value in given.items() if word != "unit"}
+        for word, value in numbers.items():
+            require_number(f"{where} {word}", value)
+        values = {word: value * factor for word, value in numbers.items()}
         parameters[name] = Parameter(**values)
     target = _target(place, _table("target", content))
     options = {name: content[name] for name in OPTIONS if name in content}
@@ -137,10 +133,10 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
         Recording.from_arrays(samples, str(path))  # complains about what is no recording
         for name in ("noise", "below"):
             if name in options:
-                options[name] = _number(f"[target] {name}", options[name])
+                require_number(f"[target] {name}", options[name])
         if not isinstance(options.get("time_shift", True), bool):
-            shown = options["time_shift"]
-            message = f"[target] time_shift = {shown!r} is not allowed; allowed: true, false"
+            given = options["time_shift"]
+            message = f"[target] time_shift = {given!r} is not allowed; allowed: true, false"
             raise InputError(message)
         return ForceTarget((samples[:, 0], samples[:, 1]), **options)
     _require_keys("[target]", table, LEVEL_KEYS)
@@ -154,10 +150,9 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
             if not {"value", "uncertainty"} <= set(pair):
                 message = f"{where} = {pair} is not allowed; allowed: value and uncertainty"
                 raise InputError(message)
-            options[name] = tuple(
-                _number(f"{where}: {part}", pair[part]) * factor
-                for part in ("value", "uncertainty")
-            )
+            for part in ("value", "uncertainty"):
+                require_number(f"{where}: {part}", pair[part])
+            options[name] = tuple(pair[part] * factor for part in ("value", "uncertainty"))
     return LevelTarget(**options)
 
 
@@ -201,16 +196,5 @@ def _text(name: str, value: object) -> str:
     """Return a text of a file."""
     if not isinstance(value, str) or not value.strip():
         message = f"{name} = {value!r} is not allowed; allowed: text in quotes"
-        raise InputError(message)
-    return value
-
-
-def _number(name: str, value: object, *, whole: bool = False) -> float:
-    """Return a finite number of a file."""
-    kind = int if whole else float | int
-    if isinstance(value, bool) or not isinstance(value, kind) or not abs(value) < LARGE:
-        allowed = "whole numbers" if whole else "real numbers"
-        shown = "a very large number" if isinstance(value, int) and value > LARGE else repr(value)
-        message = f"{name} = {shown} is not allowed; allowed: {allowed}"
         raise InputError(message)
     return value
