@@ -62,6 +62,16 @@ def shown(value: object) -> str:
     return text if fits else f"an object of {type(value).__name__}"
 
 
+def require_own(path: Path, *, mine: bool) -> None:
+    """Complain about results of another study where those of a study are to be written."""
+    if not mine:
+        message = (
+            f"{path} belongs to another study, or to another version of this one; "
+            f"allowed: another directory, or remove it first"
+        )
+        raise InputError(message)
+
+
 @contextmanager
 def uninterrupted() -> Iterator[None]:
     """Hold an interrupt back until something short is done: libraries of files leave noise else."""

@@ -99,6 +99,56 @@ def test_search_without_an_end_is_a_failure(
     assert "the search has not come to an end" in capsys.readouterr().err
 
 
+def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\nwindow = [0, inf]"))
+    for _ in range(2):
+        assert cli.main(["fit", "-q", "--no-figures", "-o", "found", "study.toml"]) == 0
+    saved = json.loads((tmp_path / "found/fit.json").read_text())
+    assert saved["study"]["target"]["window"] == [0, "Infinity"]
+
+
+def test_results_of_another_fit_are_not_touched(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    arguments = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
+    assert cli.main(arguments) == 0
+    assert cli.main(arguments) == 0
+    before = (tmp_path / "found/fit.json").read_bytes()
+    (tmp_path / "study.toml").write_text(STUDY.replace("1.4", "1.5"))
+    assert cli.main(arguments) == 1
+    assert "found/fit.json belongs to another study" in capsys.readouterr().err
+    assert (tmp_path / "found/fit.json").read_bytes() == before
+    (tmp_path / "found/fit.json").write_text("[]")
+    assert cli.main(arguments) == 1
+
+
+@pytest.mark.parametrize("place", ["study.toml", "/proc"])
+def test_useless_directory_is_told_before_the_search(
+    place: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    monkeypatch.delattr("thud.fitting.study.fit")
+    assert cli.main(["fit", "-o", place, "study.toml"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"thud-driver: {place}")
+    assert error.endswith("; allowed: a place that you may write to\n")
+
+
+def test_fit_is_printed_even_if_it_cannot_be_saved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    (tmp_path / "found/fit.csv").mkdir(parents=True)
+    assert cli.main(["fit", "-o", "found", "study.toml"]) == 1
+    captured = capsys.readouterr()
+    assert "youngs_modulus  1.6" in captured.out
+    assert "found/fit.csv: Is a directory" in captured.err
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [

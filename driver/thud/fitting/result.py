@@ -243,6 +243,8 @@ class Fit:
     ) -> list[Path]:
         """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
 
+        Older files of these names are replaced.
+
         Parameters
         ----------
         directory

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tomllib
 import warnings
 from dataclasses import dataclass, fields
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import require_number
+from thud.checks import require_number, require_own
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget
@@ -52,7 +54,7 @@ class Study:
     options : dict
         Other arguments of `fit`.
     content : dict
-        The file as it is.
+        The file as JSON holds it.
     """
 
     name: str
@@ -115,7 +117,9 @@ def _study(place: Path, content: dict[str, Any]) -> Study:
         parameters[name] = Parameter(**values)
     target = _target(place, _table("target", content))
     options = {name: content[name] for name in OPTIONS if name in content}
-    return Study(place.stem, base, target, parameters, units, options, content)
+    # JSON knows neither dates nor infinity.
+    plain = json.loads(json.dumps(content, default=str), parse_constant=str)
+    return Study(place.stem, base, target, parameters, units, options, plain)
 
 
 def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
@@ -159,18 +163,37 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
 def run(options: argparse.Namespace) -> int:
     """Run the command ``thud-driver fit``: print the fit, save it, return the exit code."""
     study = read_study(options.study)
+    folder = Path(options.output or Path("outputs", study.name))
+    _claim(folder, study)
     try:
         found = study.run(progress=not options.quiet)
     except ThudError as error:
         message = f"{options.study}: {error}"
         raise type(error)(message) from error
-    folder = Path(options.output or Path("outputs", study.name))
-    found.save(folder, study.units, figures=not options.no_figures, study=study.content)
     if not options.quiet:
-        tqdm.write(f"{study.name}\n\n{found.table(study.units)}\nResults: {folder}")
+        tqdm.write(f"{study.name}\n\n{found.table(study.units)}")
     for sentence in found.warnings:
         tqdm.write(f"thud-driver: {options.study}: {sentence}", file=sys.stderr)
+    found.save(folder, study.units, figures=not options.no_figures, study=study.content)
+    if not options.quiet:
+        tqdm.write(f"Results: {folder}")
     return 0 if found.converged else NumericalError.exit_code
+
+
+def _claim(folder: Path, study: Study) -> None:
+    """Make a directory for a fit, or complain about one that cannot take it, before it is found."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=folder):
+        pass
+    path = folder / "fit.json"
+    if path.exists():
+        try:
+            mine = json.loads(path.read_bytes())["study"] == json.loads(
+                json.dumps(study.content, default=str)
+            )
+        except (ValueError, LookupError, TypeError):
+            mine = False
+        require_own(path, mine=mine)
 
 
 def _require_keys(where: str, table: Mapping[str, object], known: Iterable[str]) -> None:
