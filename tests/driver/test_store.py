@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 import thud
 from thud import cli
 from thud.studies import evaluation
+from thud.studies.dataset import disk_space
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -121,6 +123,9 @@ def test_ended_study_goes_on_where_it_stopped(
         return evaluate(block, threads)
 
     monkeypatch.setattr("thud.studies.backends.evaluate", count)
+    # What is finished needs no space again.
+    left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
     assert sum(computed) == 400 - finished.sizes["set"]
     assert values(resumed).identical(values(whole))
@@ -179,6 +184,10 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     assert len(list((tmp_path / "d.partial").iterdir())) == 2
     (tmp_path / "e.partial").mkdir()
     (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
+    # Kills leave half a file.
+    (tmp_path / "e.partial/.study.7.part").write_text("")
+    (tmp_path / ".e.nc.7.part").write_text("")
     with pytest.raises(thud.InputError, match="holds no finished sets"):
         thud.read_sweep(tmp_path / "e.partial")
     assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
+    assert not list(tmp_path.glob(".e.*"))
