@@ -216,8 +216,10 @@ def test_other_version_is_told() -> None:
         ({"backend": "gpu"}, "backend = 'gpu' is not known; allowed: threads, processes, dask"),
         ({"backend": "dask"}, "allowed: the address of a scheduler for dask"),
         ({"backend": "threads", "scheduler": "tcp://x:1"}, "and only there"),
-        ({"workers": 0}, "workers = 0 is not allowed; allowed: 1 <= workers"),
-        ({"workers": 2, "scheduler": "tcp://x:1"}, "not for dask"),
+        ({"workers": 0}, "workers = 0 is not allowed; allowed: whole numbers from 1"),
+        ({"workers": 2000}, "workers = 2000 is not allowed; allowed: whole numbers from 1 to 1024"),
+        ({"workers": 10**6, "backend": "processes"}, "whole numbers from 1 to 1024"),
+        ({"workers": 2, "scheduler": "tcp://x:1"}, "workers = 2 is not allowed for dask; allowed"),
     ],
 )
 def test_useless_backends_are_told(how: dict[str, Any], words: str) -> None:

@@ -17,6 +17,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
+from thud.checks import require_whole, shown
 from thud.errors import InputError, NumericalError, ThudError
 from thud.studies.evaluation import Block, evaluate
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 BACKENDS = ("threads", "processes", "dask")
 # A scheduler that does not answer within these seconds is not there.
 PATIENCE = 5
+# An ensemble takes no more threads.
+MOST_WORKERS = 1024
 
 
 def run_blocks(
@@ -50,7 +53,7 @@ def run_blocks(
     backend
         ``"threads"`` (the default), ``"processes"`` or ``"dask"`` (the default with a scheduler).
     workers
-        Number of threads or processes; by default one per processor.
+        Number of threads or processes, up to 1024; by default one per processor.
     scheduler
         Address of a Dask scheduler.
 
@@ -100,9 +103,11 @@ def _checked(
             f"allowed: the address of a scheduler for dask, and only there"
         )
         raise InputError(message)
-    if workers is not None and (scheduler or not isinstance(workers, int) or workers < 1):
-        message = f"workers = {workers!r} is not allowed; allowed: 1 <= workers, not for dask"
-        raise InputError(message)
+    if workers is not None:
+        if scheduler:
+            message = f"workers = {shown(workers)} is not allowed for dask; allowed: those it has"
+            raise InputError(message)
+        require_whole("workers", workers, 1, MOST_WORKERS)
     return backend, workers, scheduler
 
 
@@ -135,7 +140,7 @@ def _open(
         with _dask(scheduler) as opened:
             yield opened
         return
-    width = workers or len(os.sched_getaffinity(0))
+    width = workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             yield threads, width
