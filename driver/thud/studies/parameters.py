@@ -64,13 +64,13 @@ class Uniform:
 
     def quantile(self, share: NDArray[np.float64]) -> NDArray[Any]:
         """Return the values below which a share of all lies."""
+        # Every whole number has the share between itself and the next.
+        high = self.high + 1 if self.whole else self.high
         if self.logarithmic:
-            found = self.low * (self.high / self.low) ** share
-        elif self.whole:
-            found = np.floor(self.low + share * (self.high - self.low + 1))
+            found = self.low * (high / self.low) ** share
         else:
-            found = self.low + share * (self.high - self.low)
-        return np.rint(found).astype(int) if self.whole else found
+            found = self.low + share * (high - self.low)
+        return np.minimum(np.floor(found), self.high).astype(int) if self.whole else found
 
 
 @dataclass(frozen=True)
