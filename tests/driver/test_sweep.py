@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import scipy
 import xarray as xr
 from conftest import REPOSITORY
 from hypothesis import HealthCheck, given, settings
@@ -19,7 +20,7 @@ from scipy.stats import qmc
 import thud
 from thud import cli, units
 from thud.keys import known_keys
-from thud.studies import evaluation, run, sets
+from thud.studies import designs, evaluation, run, sets
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
@@ -79,6 +80,23 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
         assert "youngs_modulus = 1600000.0" in found.attrs["base_case"]
 
 
+def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = thud.read_study(
+        {
+            "design": {"kind": "sobol", "size": 2},
+            "parameters": {"height": {"low": 1, "high": 2}},
+        }
+    )
+    grid = thud.read_study(HEIGHTS)
+    before = drawn.fingerprint, grid.fingerprint
+    found = thud.sweep(drawn)
+    assert found.attrs["scipy_version"] == scipy.__version__
+    assert "salib_version" in found.attrs
+    monkeypatch.setattr(designs, "version", lambda _: "0.0.1")
+    assert drawn.fingerprint != before[0]
+    assert grid.fingerprint == before[1]
+
+
 @pytest.mark.parametrize("module", [run, units])
 def test_examples_are_true(module: ModuleType) -> None:
     found = doctest.testmod(module)
@@ -127,6 +145,7 @@ def test_spreads_have_their_quantiles() -> None:
                 "mass": {"std": 100, "unit": "g"},
                 "height": {"low": 0.01, "high": 100, "scale": "log"},
                 "rings": {"low": 10, "high": 12},
+                "harmonics": {"low": 2, "high": 7, "scale": "log"},
                 "damping_law": {"values": ["constant", "rising"]},
             },
         }
@@ -137,6 +156,8 @@ def test_spreads_have_their_quantiles() -> None:
     )
     assert np.median(found["height"]) == pytest.approx(1.0, rel=0.01)
     assert np.unique(found["rings"], return_counts=True)[1] == pytest.approx(4000 / 3, rel=0.01)
+    share = np.unique(found["harmonics"], return_counts=True)[1] / 4000
+    assert share == pytest.approx(np.diff(np.log(np.arange(2, 9))) / np.log(8 / 2), abs=1e-3)
     assert (found["damping_law"] == "rising").mean() == pytest.approx(0.5, abs=1e-3)
 
 
@@ -259,6 +280,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("sets = 3", "'sets' is not known; allowed: name, case"),
         ("parameters = 3", r"parameters = 3 .*allowed: a table"),
         ("name = 'a/b'\nparameters.height.values = [1]", "name = 'a/b'.*without folders"),
+        ("name = '..'\nparameters.height.values = [1]", r"name = '\.\.' .*without folders"),
         ("format = 'csv'\nparameters.height.values = [1]", "allowed: auto, netcdf, zarr"),
         ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere; allowed: outer"),

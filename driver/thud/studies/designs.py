@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole
@@ -25,6 +26,12 @@ LEAST_SAMPLES = 4
 _LARGEST_SEED = 2**32 - 1
 # NumPy counts no further.
 _MOST_SETS = 2**63 - 1
+
+
+def makers(design: str) -> dict[str, str]:
+    """Return the versions of what draws the points of a design; other versions may draw others."""
+    names = ("scipy", "SALib") if design in DRAWN else ()
+    return {f"{name.lower()}_version": version(name) for name in names}
 
 
 def require_words(place: str, given: Mapping[str, object], known: tuple[str, ...]) -> None:

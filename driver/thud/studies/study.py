@@ -19,7 +19,7 @@ from thud.checks import require_kind
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
 from thud.models import FiniteElement, new_model
-from thud.studies.designs import read_design, require_words
+from thud.studies.designs import makers, read_design, require_words
 from thud.studies.parameters import Parameter, checked, new_parameter
 from thud.units import power_of
 
@@ -94,8 +94,8 @@ class Study:
     @property
     def fingerprint(self) -> str:
         """What tells studies with other results apart; comments and formats do not count."""
-        parts = repr(replace(self, format=""))
-        return hashlib.sha256(f"{thud.__version__} {parts}".encode()).hexdigest()
+        versions = {"thud_version": thud.__version__, **makers(self.design)}
+        return hashlib.sha256(f"{versions} {replace(self, format='')}".encode()).hexdigest()
 
 
 def read_study(source: Source, kind: str = "sweep") -> Study:
@@ -173,6 +173,7 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
         or not name.strip()
         or not name.isprintable()
         or Path(name).name != name
+        or name == ".."
     ):
         message = f"name = {name!r} is not allowed; allowed: the name of a file, without folders"
         raise InputError(message)
