@@ -161,6 +161,13 @@ def test_spreads_have_their_quantiles() -> None:
     assert (found["damping_law"] == "rising").mean() == pytest.approx(0.5, abs=1e-3)
 
 
+def test_fixed_value_is_the_middle_of_a_normal_distribution() -> None:
+    study: dict[str, Any] = {"design": {"kind": "latin_hypercube", "size": 1000}}
+    study |= {"fixed": {"mass": 3}, "parameters": {"mass": {"std": 0.1}}}
+    found = sets.parameter_columns(thud.read_study(study), 0, 1000)
+    assert found["mass"].mean() == pytest.approx(3, abs=1e-3)
+
+
 def test_list_pairs_values_and_entries_of_lists() -> None:
     found = thud.sweep(
         {
@@ -327,6 +334,16 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),
         ("fixed = {mass=1, density=1000}\nparameters.height.values = [1]", "mass and density"),
         ("fixed.density = 1000\nparameters.mass.values = [1]", "mass and density are both given"),
+        ("fixed.mass = 2\nparameters.density.values = [1000]", "mass and density are both given"),
+        ("fixed.mass = 2\nparameters.mass.values = [1]", r"\[fixed\] mass has no use beside \[par"),
+        (
+            "fixed.density = 900\nparameters.density.values = [1000]",
+            r"\[fixed\] density has no use beside \[parameters\] density; allowed: one",
+        ),
+        (
+            "fixed.mass = 2\ndesign = {kind='random', size=9}\nparameters.mass={std=1, mean=3}",
+            r"allowed: one of them, or std without mean",
+        ),
         ("fixed.temperature = 1\nparameters.mass.values = [1]", r"temperature in \[parameters\]"),
         ("parameters.temperature.values = [1]", "allowed: reference, degC, and coefficient"),
         ("temperature.reference = 1\nparameters.temperature.values = [1]", "coefficient = None"),

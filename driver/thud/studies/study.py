@@ -181,13 +181,11 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
     if written not in FORMATS:
         message = f"format = {written!r} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
-    base, density = _fix(_base_case(given, folder), given.get("fixed", {}))
+    fixed = given.get("fixed", {})
+    base, density = _fix(_base_case(given, folder), fixed)
     parameters = _parameters(given.get("parameters", {}), base)
+    _require_use(fixed, given["parameters"])
     temperature = _temperature(given.get("temperature"), parameters)
-    names = {parameter.name for parameter in parameters}
-    if "mass" in names and (density is not None or DENSITY.name in names):
-        message = "mass and density are both given; allowed: one of them"
-        raise InputError(message)
     design, size, seed = read_design(given.get("design", {}), kind, parameters)
     return Study(
         name, kind, base, parameters, design, size, seed, density, temperature, written, text
@@ -233,10 +231,22 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
         else:
             values[name] = checked(place, key, value, power)
     density = values.pop(DENSITY.name, None)
-    if density is not None and "mass" in values:
-        message = "[fixed] mass and density are both given; allowed: one of them"
-        raise InputError(message)
     return put(case, values), density  # type: ignore[return-value]
+
+
+def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
+    """Complain about keys that others overrule."""
+    if {"mass", DENSITY.name} <= {*fixed, *parameters}:
+        message = "mass and density are both given; allowed: one of them"
+        raise InputError(message)
+    for name in fixed:
+        # A fixed value may be the middle of a normal distribution.
+        if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
+            message = (
+                f"[fixed] {name} has no use beside [parameters] {name}; "
+                f"allowed: one of them, or std without mean in [parameters]"
+            )
+            raise InputError(message)
 
 
 def _parameters(given: Mapping[str, Any], base: Case) -> tuple[Parameter, ...]:
