@@ -17,6 +17,7 @@ import thud
 from thud import cli
 from thud.studies import evaluation
 from thud.studies.dataset import disk_space
+from thud.studies.store import Store
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -161,6 +162,40 @@ def test_full_disk_is_told_and_loses_nothing(
         assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
         assert not list(tmp_path.rglob(".*part"))
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
+
+
+def test_disk_that_is_full_for_zarr_is_told_and_loses_nothing(
+    whole: xr.Dataset,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "long.toml"
+    path.write_text('format = "zarr"' + LONG)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    write = Store._write_zarr  # noqa: SLF001
+
+    def without_space(store: Store, paths: list[Path]) -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
+        try:
+            write(store, paths)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "_write_zarr", without_space)
+        assert cli.main(["sweep", str(path), "-q", "-o", str(tmp_path)]) == 1
+    errors = capsys.readouterr().err
+    assert "File too large; allowed: a place that you may write to" in errors
+    assert errors.count("\n") == 1
+    assert sorted(found.name for found in tmp_path.iterdir()) == ["long.partial", "long.toml"]
+    assert thud.read_sweep(tmp_path / "long.partial").sizes["set"] == 400
+
+    def compute_again(*_: object) -> None:
+        pytest.fail("all sets were kept")
+
+    monkeypatch.setattr("thud.studies.backends.evaluate", compute_again)
+    assert values(thud.sweep(path, tmp_path)).identical(values(whole))
 
 
 def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:

@@ -141,11 +141,14 @@ class Store:
             sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
         names = list(sizes)
         together = max(1, 2 * LARGE // (max(sizes.values()) * len(paths)))
-        with _named(self.path):
-            for i in range(0, len(names), together):
-                grid = grid_of(self._study, _join(paths, names[i : i + together]))
-                grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
-            part.rename(self.path)
+        try:
+            with _named(self.path):
+                for i in range(0, len(names), together):
+                    grid = grid_of(self._study, _join(paths, names[i : i + together]))
+                    grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
+                part.rename(self.path)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
