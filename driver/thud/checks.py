@@ -62,6 +62,13 @@ def shown(value: object) -> str:
     return text if fits else f"an object of {type(value).__name__}"
 
 
+def require_output(output: str | None) -> None:
+    """Complain about a directory of the command line that has no name."""
+    if output is not None and not output.strip():
+        message = "--output has no value; allowed: a directory"
+        raise InputError(message)
+
+
 def require_own(path: Path, *, mine: bool) -> None:
     """Complain about results of another study where those of a study are to be written."""
     if not mine:

@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 
 import thud
-from thud import cli, units
+from thud import cli, tables, units
 from thud.keys import known_keys
 from thud.studies import designs, evaluation, run, sets
 from thud.units import MULTIPLES, scaled
@@ -97,7 +97,7 @@ def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatc
     assert grid.fingerprint == before[1]
 
 
-@pytest.mark.parametrize("module", [run, units])
+@pytest.mark.parametrize("module", [run, tables, units])
 def test_examples_are_true(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 0
