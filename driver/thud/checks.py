@@ -15,7 +15,7 @@ import numpy as np
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterable, Iterator, Mapping
     from types import UnionType
 
 
@@ -60,6 +60,15 @@ def shown(value: object) -> str:
     text = repr(value)
     fits = len(text) <= LONGEST_SHOWN and "\n" not in text
     return text if fits else f"an object of {type(value).__name__}"
+
+
+def require_words(place: str, given: Mapping[str, object], known: Iterable[str]) -> None:
+    """Complain about words that mean nothing."""
+    allowed = list(known)
+    for word in given:
+        if word not in allowed:
+            message = f"{place}: {word!r} is not known; allowed: {', '.join(allowed)}"
+            raise InputError(message)
 
 
 def require_output(output: str | None) -> None:

@@ -177,24 +177,6 @@ def _get_range(case: Case, name: str, wish: Parameter) -> Range:
     return Range(name, key.unit, start, lower, upper, scale, spread)
 
 
-def unit_factor(name: str, key_unit: str, unit: object) -> float:
-    """Return how many of the library's units are one of another.
-
-    Raises
-    ------
-    InputError
-        Where the unit does not fit the parameter.
-    """
-    if unit == key_unit:
-        return 1.0
-    known = MULTIPLES.get(key_unit, {})
-    if not isinstance(unit, str) or unit not in known:
-        allowed = ", ".join(map(repr, known or [key_unit]))
-        message = f"{name}: unit = {unit!r} is not allowed; allowed: {allowed}"
-        raise InputError(message)
-    return scaled(1.0, known[unit])
-
-
 def handy_unit(unit: str, value: float) -> tuple[str, float]:
     """Return a unit in which a value has a digit before its point, and how many SI units it is."""
     known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}

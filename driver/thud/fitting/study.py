@@ -14,18 +14,19 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import require_number, require_own
+from thud.checks import require_number, require_own, require_words
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget
-from thud.fitting.parameters import Parameter, require_known, unit_factor
+from thud.fitting.parameters import Parameter, require_known
 from thud.fitting.search import fit
 from thud.recording import Recording, read_table
+from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
     import argparse
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from thud.fitting.result import Fit
 
@@ -95,7 +96,7 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 
 def _study(place: Path, content: dict[str, Any]) -> Study:
     """Return the study of a file's content."""
-    _require_keys("", content, ("base", "target", "parameters", *OPTIONS))
+    require_words("the study", content, ("base", "target", "parameters", *OPTIONS))
     base = Case()
     if "base" in content:
         base = read_case(place.parent / _text("base", content["base"]))
@@ -105,15 +106,14 @@ def _study(place: Path, content: dict[str, Any]) -> Study:
         where = f"[parameters.{name}]"
         key = require_known(base, name, "[parameters] ")
         given = _table(name, content["parameters"], where)
-        _require_keys(where, given, PARAMETER_KEYS)
-        factor = 1.0
+        require_words(where, given, PARAMETER_KEYS)
+        power = power_of(entries.get("unit", key.unit or "1"), key.unit, where)
         if "unit" in entries:
-            factor = unit_factor(where, key.unit, entries["unit"])
-            units[name] = (entries["unit"], factor)
+            units[name] = (entries["unit"], scaled(1.0, power))
         numbers = {word: value for word, value in given.items() if word != "unit"}
         for word, value in numbers.items():
             require_number(f"{where} {word}", value)
-        values = {word: value * factor for word, value in numbers.items()}
+        values = {word: scaled(value, power) for word, value in numbers.items()}
         parameters[name] = Parameter(**values)
     target = _target(place, _table("target", content))
     options = {name: content[name] for name in OPTIONS if name in content}
@@ -130,7 +130,7 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
         )
         raise InputError(message)
     if "file" in table:
-        _require_keys("[target]", table, FORCE_KEYS)
+        require_words("[target]", table, FORCE_KEYS)
         options = {name: value for name, value in table.items() if name != "file"}
         path = place.parent / _text("[target] file", table["file"])
         samples = read_table(path)
@@ -143,20 +143,20 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
             message = f"[target] time_shift = {given!r} is not allowed; allowed: true, false"
             raise InputError(message)
         return ForceTarget((samples[:, 0], samples[:, 1]), **options)
-    _require_keys("[target]", table, LEVEL_KEYS)
+    require_words("[target]", table, LEVEL_KEYS)
     options = dict(table)
     for name, unit in (("contact_time", "s"), ("restitution", "")):
         if name in options:
             where = f"[target] {name}"
             pair = _table(name, table, where)
-            _require_keys(where, pair, ("value", "uncertainty", "unit"))
-            factor = unit_factor(where, unit, pair["unit"]) if "unit" in pair else 1.0
+            require_words(where, pair, ("value", "uncertainty", "unit"))
+            power = power_of(pair.get("unit", unit or "1"), unit, where)
             if not {"value", "uncertainty"} <= set(pair):
                 message = f"{where} = {pair} is not allowed; allowed: value and uncertainty"
                 raise InputError(message)
             for part in ("value", "uncertainty"):
                 require_number(f"{where}: {part}", pair[part])
-            options[name] = tuple(pair[part] * factor for part in ("value", "uncertainty"))
+            options[name] = tuple(scaled(pair[part], power) for part in ("value", "uncertainty"))
     return LevelTarget(**options)
 
 
@@ -194,15 +194,6 @@ def _claim(folder: Path, study: Study) -> None:
         except (ValueError, LookupError, TypeError):
             mine = False
         require_own(path, mine=mine)
-
-
-def _require_keys(where: str, table: Mapping[str, object], known: Iterable[str]) -> None:
-    """Complain about a key that is not known."""
-    allowed = list(known)
-    for key in table:
-        if key not in allowed:
-            message = f"{where} {key} is not a known key; allowed: {', '.join(allowed)}".lstrip()
-            raise InputError(message)
 
 
 def _table(name: str, content: Mapping[str, Any], where: str = "") -> dict[str, Any]:

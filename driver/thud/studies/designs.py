@@ -6,7 +6,7 @@ import math
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from thud.checks import require_whole
+from thud.checks import require_whole, require_words
 from thud.errors import InputError
 from thud.studies.parameters import MOST_VALUES, Normal, Parameter, Uniform
 
@@ -32,14 +32,6 @@ def makers(design: str) -> dict[str, str]:
     """Return the versions of what draws the points of a design; other versions may draw others."""
     names = ("scipy", "SALib") if design in DRAWN else ()
     return {f"{name.lower()}_version": version(name) for name in names}
-
-
-def require_words(place: str, given: Mapping[str, object], known: tuple[str, ...]) -> None:
-    """Complain about words that mean nothing."""
-    for word in given:
-        if word not in known:
-            message = f"{place}: {word!r} is not known; allowed: {', '.join(known)}"
-            raise InputError(message)
 
 
 def read_design(

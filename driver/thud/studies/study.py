@@ -15,11 +15,11 @@ import numpy as np
 
 import thud
 from thud.case import Case, read_case
-from thud.checks import require_kind
+from thud.checks import require_kind, require_words
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
 from thud.models import FiniteElement, new_model
-from thud.studies.designs import makers, read_design, require_words
+from thud.studies.designs import makers, read_design
 from thud.studies.parameters import Parameter, checked, new_parameter
 from thud.units import power_of
 
