@@ -18,6 +18,7 @@ from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole, shown
+from thud.ensemble import MOST_THREADS
 from thud.errors import InputError, NumericalError, ThudError
 from thud.studies.evaluation import Block, evaluate
 
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 BACKENDS = ("threads", "processes", "dask")
 # A scheduler that does not answer within these seconds is not there.
 PATIENCE = 5
-# An ensemble takes no more threads.
-MOST_WORKERS = 1024
 
 
 def run_blocks(
@@ -107,7 +106,7 @@ def _checked(
         if scheduler:
             message = f"workers = {shown(workers)} is not allowed for dask; allowed: those it has"
             raise InputError(message)
-        require_whole("workers", workers, 1, MOST_WORKERS)
+        require_whole("workers", workers, 1, MOST_THREADS)
     return backend, workers, scheduler
 
 
@@ -140,7 +139,7 @@ def _open(
         with _dask(scheduler) as opened:
             yield opened
         return
-    width = workers or min(len(os.sched_getaffinity(0)), MOST_WORKERS)
+    width = workers or min(len(os.sched_getaffinity(0)), MOST_THREADS)
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             yield threads, width
