@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 LONGEST_SHOWN = 80
 # No key takes a larger number, and Python does not print the largest ones.
 LARGEST = 10**300
+# The libraries that draw points take no larger seed.
+LARGEST_SEED = 2**32 - 1
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
@@ -47,7 +49,9 @@ def require_whole(name: str, value: Any, least: int, most: int) -> None:  # noqa
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
     """Complain about what is not a finite number."""
-    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
+        value, bool
+    )
     if not number or not abs(value) <= LARGEST:
         message = f"{name} = {shown(value)} is not allowed; allowed: finite numbers"
         raise InputError(message)

@@ -22,6 +22,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         (RECORD, {"mass": "heavy"}, {}, r"mass: start = 'heavy' is not .* finite"),
         (RECORD, {"mass": thud.Parameter(2.5, "a")}, {}, r"mass: lower = 'a' is not allowed"),  # type: ignore[arg-type]
         (RECORD, {"mass": thud.Parameter(10**400)}, {}, r"start = a very large number is not"),
+        (RECORD, {"mass": np.complex128(2)}, {}, r"mass: start = np.complex128.* finite"),
         (RECORD, 3, {}, r"parameters = 3 is not allowed; allowed: an object of Iterable"),
         (RECORD, ["mass"], {"starts": 10**13}, r"starts = 10000000000000 .* from 1 to 100000"),
         (RECORD, ["mass"], {"starts": 2, "seed": -1}, r"seed = -1 is not .* from 0 to 4294967295"),

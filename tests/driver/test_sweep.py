@@ -296,6 +296,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.height.values = []", r"values = \[\] is empty"),
         ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
         ("parameters.height.values = [inf]", "allowed: finite numbers"),
+        ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}", "allowed: finite numbers"),
         ("parameters.height = {values=[1], unit='s'}", "unit 's' does not fit; allowed: m, cm, mm"),
         ("parameters.height = {values=[1], unit=['m']}", "does not fit; allowed: m, cm"),
         ("parameters.height = {values=[1], count=2}", "count is not known beside values; allowed:"),

@@ -12,7 +12,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
 from thud.case import Case
-from thud.checks import require_kind, require_whole
+from thud.checks import LARGEST_SEED, require_kind, require_whole
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.inference import (
@@ -41,7 +41,6 @@ if TYPE_CHECKING:
 
 # More starts, or steps of a search, than this come to no end.
 MOST = 100_000
-LARGEST_SEED = 2**32 - 1
 # Where steps and gains are this small, relative, the search ends.
 TOLERANCE = 1e-8
 # A parameter this close to a limit, relative, lies at it.

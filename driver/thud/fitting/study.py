@@ -102,14 +102,14 @@ def _study(place: Path, content: dict[str, Any]) -> Study:
         base = read_case(place.parent / _text("base", content["base"]))
     parameters: dict[str, Parameter] = {}
     units = {}
-    for name, entries in _table("parameters", content).items():
+    for name in _table("parameters", content):
         where = f"[parameters.{name}]"
         key = require_known(base, name, "[parameters] ")
         given = _table(name, content["parameters"], where)
         require_words(where, given, PARAMETER_KEYS)
-        power = power_of(entries.get("unit", key.unit or "1"), key.unit, where)
-        if "unit" in entries:
-            units[name] = (entries["unit"], scaled(1.0, power))
+        power = power_of(given.get("unit", key.unit or "1"), key.unit, where)
+        if "unit" in given:
+            units[name] = (given["unit"], scaled(1.0, power))
         numbers = {word: value for word, value in given.items() if word != "unit"}
         for word, value in numbers.items():
             require_number(f"{where} {word}", value)
@@ -188,9 +188,7 @@ def _claim(folder: Path, study: Study) -> None:
     path = folder / "fit.json"
     if path.exists():
         try:
-            mine = json.loads(path.read_bytes())["study"] == json.loads(
-                json.dumps(study.content, default=str)
-            )
+            mine = json.loads(path.read_bytes())["study"] == study.content
         except (ValueError, LookupError, TypeError):
             mine = False
         require_own(path, mine=mine)

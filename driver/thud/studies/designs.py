@@ -6,7 +6,7 @@ import math
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
-from thud.checks import require_whole, require_words
+from thud.checks import LARGEST_SEED, require_whole, require_words
 from thud.errors import InputError
 from thud.studies.parameters import MOST_VALUES, Normal, Parameter, Uniform
 
@@ -23,7 +23,6 @@ DESIGNS = {
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
 LEAST_SAMPLES = 4
-_LARGEST_SEED = 2**32 - 1
 # NumPy counts no further.
 _MOST_SETS = 2**63 - 1
 
@@ -86,7 +85,7 @@ def read_design(
     size, seed = given.get("size", 0), given.get("seed", 0)
     least = LEAST_SAMPLES if design == "saltelli" else 1
     require_whole("[design] size", size, least, MOST_VALUES)
-    require_whole("[design] seed", seed, 0, _LARGEST_SEED)
+    require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
         near = 1 << size.bit_length() - 1
         message = (

@@ -192,7 +192,7 @@ def checked(place: str, key: Key, value: object, power: int) -> Value:
         return value
     if key.kind in {"real", "whole", "list"} and _is_number(value):
         number = scaled(value, power)  # type: ignore[arg-type]
-        if key.kind != "whole":
+        if key.kind != "whole" and math.isfinite(number):
             return number
         if number.is_integer():
             return int(number)
