@@ -10,7 +10,7 @@ import f90nml
 import numpy as np
 
 from thud._library import call, door, text
-from thud.checks import replace_file, require_kind
+from thud.checks import LARGEST, replace_file, require_kind, shown
 from thud.errors import InputError
 from thud.models import LISTS, MODELS, FiniteElement, HollowSphere, ModelOptions, group_of
 
@@ -242,15 +242,12 @@ def _plain(group: str, key: str, value: object) -> float | str | list[float | st
     if isinstance(value, list | tuple) and key in LISTS:
         return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
     known = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
-    if not known or (isinstance(value, int) and abs(value) > _LARGEST):
-        shown = "a very large number" if isinstance(value, int) else repr(value)
-        message = f"&{group}: {key} = {shown} is not allowed; allowed: a number or plain text"
+    if not known or (isinstance(value, int) and abs(value) > LARGEST):
+        message = (
+            f"&{group}: {key} = {shown(value)} is not allowed; allowed: a number or plain text"
+        )
         raise InputError(message)
     return value  # type: ignore[return-value]
-
-
-# No key takes a larger number, and Python would not print it.
-_LARGEST = 10**300
 
 
 def case_text(case: Case) -> bytes:

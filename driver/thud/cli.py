@@ -15,7 +15,9 @@ from tqdm import tqdm
 
 import thud
 from thud._library import call, door, text
+from thud.checks import require_output
 from thud.study_commands import FORMATS, add_study_commands
+from thud.tables import aligned
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -159,7 +161,7 @@ def _run(options: argparse.Namespace) -> int:
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
     """Run one case as the executable does, then draw it; return whether it conforms."""
-    _require_output(options.output)
+    require_output(options.output)
     case = thud.read_case(path)
     output = options.output or ""
     if output and len(options.cases) > 1:
@@ -226,13 +228,6 @@ def _case_figures(case: thud.Case, folder: Path) -> dict[str, Callable[[], Figur
     return figures
 
 
-def _require_output(output: str | None) -> None:
-    """Complain about a directory without a name."""
-    if output is not None and not output.strip():
-        message = "--output has no value; allowed: a directory"
-        raise thud.InputError(message)
-
-
 def _figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper and of the documentation."""
     from thud.figures import get_figures  # noqa: PLC0415 - matplotlib takes its time
@@ -246,23 +241,19 @@ def _figures(options: argparse.Namespace) -> int:
 
 def _compare(options: argparse.Namespace) -> int:
     """Compare cases and recordings."""
-    _require_output(options.output)
+    require_output(options.output)
     found = thud.read_all(options.cases)
     comparison = thud.compare(found, options.force, options.source, progress=not options.quiet)
     paths = comparison.save(options.output)
     if not options.quiet:
-        rows = [thud.comparison.HEADER, *comparison.table()]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        for row in rows:
-            cells = zip(row, widths, strict=True)
-            print("   ".join(cell.ljust(width) for cell, width in cells).rstrip())
+        print(aligned([thud.comparison.HEADER, *comparison.table()]))
         print(f"Page: {paths[-1]}")
     return 0
 
 
 def _fit(options: argparse.Namespace) -> int:
     """Fit parameters as a study says."""
-    _require_output(options.output)
+    require_output(options.output)
     return int(thud.fitting.run(options))
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _KEYS, _FLUX_CHOICES = (words(names) for names in ensemble_door.ensemble_keys())
 _FLUX = "momentum_flux"
 _DEFAULTS: dict[str, Any] = vars(Ball()) | vars(Drop()) | vars(HollowSphere())
-_MOST_THREADS = 1024
+MOST_THREADS = 1024
 
 # The library keeps matrices from call to call, and one call uses all threads anyway.
 _ONE_AT_A_TIME = threading.Lock()
@@ -252,8 +252,8 @@ def _array(key: str, values: ArrayLike) -> NDArray[Any]:
 def _threads(threads: int | None) -> int:
     """Return the number of threads."""
     if threads is None:
-        return min(len(os.sched_getaffinity(0)), _MOST_THREADS)
-    return _whole("threads", threads, _MOST_THREADS)
+        return min(len(os.sched_getaffinity(0)), MOST_THREADS)
+    return _whole("threads", threads, MOST_THREADS)
 
 
 def _whole(name: str, value: object, most: int) -> int:

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import thud
-from thud.checks import replace_file
+from thud.checks import replace_file, require_output
+from thud.tables import aligned
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     import xarray as xr
     from matplotlib.figure import Figure
@@ -56,9 +57,7 @@ def _run(options: argparse.Namespace) -> int:
     from thud.studies.run import describe  # noqa: PLC0415
     from thud.studies.sweep_figure import draw_sweep  # noqa: PLC0415
 
-    if options.output is not None and not options.output.strip():
-        message = "--output has no value; allowed: a directory"
-        raise thud.InputError(message)
+    require_output(options.output)
     study = thud.read_study(options.study, options.kind)
     folder = Path(options.output or Path("outputs") / study.name)
     studies: dict[str, tuple[Callable[..., Any], Callable[..., Figure]]] = {
@@ -88,7 +87,7 @@ def _run(options: argparse.Namespace) -> int:
         for ending in FORMATS:
             thud.plot.save(figure, folder / f"{study.name}{ending}")
     if not options.quiet:
-        _print_table(_summary(dataset) if options.kind == "sweep" else result.table())
+        print(aligned(_summary(dataset) if options.kind == "sweep" else result.table()))
         print(f"Results: {folder}")
     _print_failures(dataset)
     return 0 if computed else thud.NumericalError.exit_code
@@ -107,14 +106,6 @@ def _summary(dataset: xr.Dataset) -> list[tuple[str, ...]]:
                 rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
     rows.append(("conforming sets", "", "", f"{int(dataset['conforms'].sum())}"))
     return rows
-
-
-def _print_table(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows of text in columns."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = zip(row, widths, strict=True)
-        print("   ".join(cell.ljust(width) for cell, width in cells).rstrip())
 
 
 def _print_failures(dataset: xr.Dataset) -> None:

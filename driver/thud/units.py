@@ -52,4 +52,4 @@ def scaled(value: float, power: int) -> float:
     >>> scaled(35, -3)
     0.035
     """
-    return float(Decimal(repr(value)).scaleb(power))
+    return float(Decimal(repr(float(value))).scaleb(power))

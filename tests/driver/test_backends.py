@@ -5,6 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import subprocess
+import sys
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ from thud import cli
 from thud.studies import sets
 from thud.studies.backends import run_blocks
 from thud.studies.evaluation import Block, block_size, evaluate
+from thud.studies.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -33,6 +36,15 @@ STUDY: dict[str, Any] = {
     },
 }
 BLOCKS = 12
+# A scheduler and a worker in one process, which can be killed.
+DOOMED = """
+from distributed import LocalCluster
+cluster = LocalCluster(
+    n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=":0"
+)
+print(cluster.scheduler_address, flush=True)
+input()
+"""
 
 
 @pytest.fixture(scope="module")
@@ -93,6 +105,66 @@ def test_killed_worker_of_dask_loses_nothing(cluster: LocalCluster) -> None:
             np.testing.assert_array_equal(found[name], values)
 
 
+@pytest.mark.parametrize("written", ["netcdf", "zarr"])
+def test_dask_writes_the_same(written: str, cluster: LocalCluster, tmp_path: Path) -> None:
+    expected = thud.sweep(STUDY)
+    study = {**STUDY, "format": written}
+    found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address).load()
+    assert found.drop_attrs(deep=False).identical(expected.drop_attrs(deep=False))
+
+
+def test_killed_worker_of_dask_leaves_no_gap_on_disk(
+    cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = {**STUDY, "fixed": {"model": "modal_ball", "rings": 20}}
+    with Client(cluster, set_as_default=False) as client:
+        pids = list(client.run(os.getpid).values())
+    keep = Store.keep
+
+    def kill_and_keep(store: Store, block: Block, found: dict[str, Any]) -> None:
+        if pids:
+            os.kill(pids.pop(), signal.SIGKILL)
+            pids.clear()
+        keep(store, block, found)
+
+    monkeypatch.setattr(Store, "keep", kill_and_keep)
+    found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address)
+    assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
+
+
+@pytest.mark.parametrize("rest", [{"backend": "processes", "workers": 2}, {"scheduler": True}])
+def test_lost_scheduler_is_told_and_its_study_goes_on_elsewhere(
+    rest: dict[str, Any], cluster: LocalCluster, tmp_path: Path
+) -> None:
+    study = tmp_path / "some.toml"
+    study.write_text(
+        "design = {kind='random', size=400}\nfixed = {model='modal_ball', rings=20}\n"
+        "parameters.height = {low=0.9, high=1.1}"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", DOOMED], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as doomed:
+        assert doomed.stdout
+        address = doomed.stdout.readline().strip()
+        command = [sys.executable, "-m", "thud.cli", "sweep", str(study), "-q", "-o", str(tmp_path)]
+        command += ["--scheduler", address]
+        process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+        while not list(tmp_path.glob("some.partial/block_*.nc")):
+            assert process.poll() is None
+            time.sleep(0.01)
+        doomed.kill()
+    _, errors = process.communicate()
+    assert process.returncode == 2
+    assert errors.startswith("thud-driver: the backend lost a block of sets (CancelledError); what")
+    assert errors.count("\n") == 1
+    finished = thud.read_sweep(tmp_path / "some.partial")
+    assert 0 < finished.sizes["set"] < 400
+    if "scheduler" in rest:
+        rest = {"scheduler": cluster.scheduler_address}
+    found = thud.sweep(study, tmp_path, **rest)
+    assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
+
+
 def test_killed_process_is_told_and_loses_nothing() -> None:
     kept = []
     others = set(multiprocessing.active_children())
@@ -144,8 +216,10 @@ def test_other_version_is_told() -> None:
         ({"backend": "gpu"}, "backend = 'gpu' is not known; allowed: threads, processes, dask"),
         ({"backend": "dask"}, "allowed: the address of a scheduler for dask"),
         ({"backend": "threads", "scheduler": "tcp://x:1"}, "and only there"),
-        ({"workers": 0}, "workers = 0 is not allowed; allowed: 1 <= workers"),
-        ({"workers": 2, "scheduler": "tcp://x:1"}, "not for dask"),
+        ({"workers": 0}, "workers = 0 is not allowed; allowed: whole numbers from 1"),
+        ({"workers": 2000}, "workers = 2000 is not allowed; allowed: whole numbers from 1 to 1024"),
+        ({"workers": 10**6, "backend": "processes"}, "whole numbers from 1 to 1024"),
+        ({"workers": 2, "scheduler": "tcp://x:1"}, "workers = 2 is not allowed for dask; allowed"),
     ],
 )
 def test_useless_backends_are_told(how: dict[str, Any], words: str) -> None:

@@ -132,6 +132,31 @@ def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
     assert thud.design_map(study).mark == (0.1, 1.0)
 
 
+def test_ball_is_that_of_the_paper_only_if_all_of_it_is() -> None:
+    axes: dict[str, Any] = {"mass": {"values": [2, 3]}, "height": {"values": [0.5, 1.5]}}
+    result = thud.design_map({"parameters": axes})
+    assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
+    for fixed in ({"outer_radius": 0.07}, {"gravity": 1.6}):
+        result = thud.design_map({"fixed": fixed, "parameters": axes})
+        assert (result.mark, result.mark_name) == ((2.5, 1.0), "base case")
+
+
+def test_density_of_the_paper_is_marked() -> None:
+    density = 2.5 / (4 / 3 * np.pi * (0.089**3 - 0.057**3))
+    height: dict[str, Any] = {"height": {"values": [0.5, 1.5]}}
+    axes = {"density": {"values": [1000, 1200]}, **height}
+    result = thud.design_map({"parameters": axes})
+    assert (result.mark, result.mark_name) == (pytest.approx((density, 1.0)), "paper's ball")
+    result = thud.design_map({"fixed": {"outer_radius": 0.088}, "parameters": axes})
+    heavier = 2.5 / (4 / 3 * np.pi * (0.088**3 - 0.056**3))
+    assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "base case")
+    assert thud.design_map({"fixed": {"outer_radius": 0}, "parameters": axes}).mark is None
+    axes = {"wall_thickness": {"values": [0.03, 0.034]}, **height}
+    for given, name in ((density, "paper's ball"), (1000, "base case")):
+        result = thud.design_map({"fixed": {"density": given}, "parameters": axes})
+        assert (result.mark, result.mark_name) == ((0.032, 1.0), name)
+
+
 def test_places_without_results_stay_empty() -> None:
     study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
     result = thud.design_map(study)

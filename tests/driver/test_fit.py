@@ -320,3 +320,19 @@ def test_best_of_several_starts_counts() -> None:
     assert often.evaluations > once.evaluations
     assert not once.converged
     assert "the search has not come to an end" in str(once)
+
+
+def test_start_around_which_the_model_fails_leaves_the_others(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solve = thud.fitting.objective.solve_case
+
+    def below_or_here(case: thud.Case) -> thud.Impact:
+        if case.ball.youngs_modulus > 1.95e6 and case.ball.youngs_modulus != 2e6:
+            message = "out of the model"
+            raise thud.NumericalError(message)
+        return solve(case)
+
+    monkeypatch.setattr(thud.fitting.objective, "solve_case", below_or_here)
+    fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6}, starts=4)
+    assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)

@@ -79,6 +79,13 @@ def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     assert "1.6" in fit.table(study.units)
 
 
+def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:
+    text = '[target]\nfile = "record.csv"\n[parameters.wall_thickness]\nstart = 36\nunit = "mm"'
+    (tmp_path / "study.toml").write_text(text)
+    study = thud.fitting.read_study("study.toml")
+    assert study.parameters == {"wall_thickness": thud.Parameter(start=0.036)}
+
+
 def test_doubts_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = STUDY.replace("[parameters", "[parameters.wall_thickness]\n[parameters", 1)
     text = text.replace("[parameters.wall_thickness]", "[parameters.wall_thickness]\nstart = 0.03")
@@ -99,20 +106,70 @@ def test_search_without_an_end_is_a_failure(
     assert "the search has not come to an end" in capsys.readouterr().err
 
 
+def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\nwindow = [0, inf]"))
+    for _ in range(2):
+        assert cli.main(["fit", "-q", "--no-figures", "-o", "found", "study.toml"]) == 0
+    saved = json.loads((tmp_path / "found/fit.json").read_text())
+    assert saved["study"]["target"]["window"] == [0, "Infinity"]
+
+
+def test_results_of_another_fit_are_not_touched(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    arguments = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
+    assert cli.main(arguments) == 0
+    assert cli.main(arguments) == 0
+    before = (tmp_path / "found/fit.json").read_bytes()
+    (tmp_path / "study.toml").write_text(STUDY.replace("1.4", "1.5"))
+    assert cli.main(arguments) == 1
+    assert "found/fit.json belongs to another study" in capsys.readouterr().err
+    assert (tmp_path / "found/fit.json").read_bytes() == before
+    (tmp_path / "found/fit.json").write_text("[]")
+    assert cli.main(arguments) == 1
+
+
+@pytest.mark.parametrize("place", ["study.toml", "/proc"])
+def test_useless_directory_is_told_before_the_search(
+    place: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    monkeypatch.delattr("thud.fitting.study.fit")
+    assert cli.main(["fit", "-o", place, "study.toml"]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith(f"thud-driver: {place}")
+    assert error.endswith("; allowed: a place that you may write to\n")
+
+
+def test_fit_is_printed_even_if_it_cannot_be_saved(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    (tmp_path / "found/fit.csv").mkdir(parents=True)
+    assert cli.main(["fit", "-o", "found", "study.toml"]) == 1
+    captured = capsys.readouterr()
+    assert "youngs_modulus  1.6" in captured.out
+    assert "found/fit.csv: Is a directory" in captured.err
+
+
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
         ("youngs_modulus", "hardness", r"\[parameters\] hardness is not a parameter .* allowed: o"),
-        ("MPa", "mm", r"\[parameters.youngs_modulus\]: unit = 'mm' is not .* allowed: 'Pa', 'kPa"),
+        ("MPa", "mm", r"\[parameters.youngs_modulus\]: unit 'mm' does not fit; allowed: Pa, kPa"),
         ("1.4", "-1", r"youngs_modulus: start = -1e\+06 is not allowed; allowed: 0 <= start <="),
-        ("1.4", "'soft'", r"youngs_modulus\] start = 'soft' is not allowed; allowed: real numbers"),
+        ("1.4", "'soft'", r"youngs_modulus\] start = 'soft' is not allowed; allowed: finite"),
         ("1.4", "nan", r"start = nan is not allowed"),
         ("1.4", f"1{'0' * 400}", r"start = a very large number is not allowed"),
         ("[parameters.youngs_modulus]", "[parameters]", r"parameters\] start is not a parameter"),
-        ("start", "begin", r"begin is not a known key; allowed: start, lower, upper, unit"),
+        ("start", "begin", r"'begin' is not known; allowed: start, lower, upper, unit"),
         ("file", "files", r"\[target\] takes one of file and levels"),
         ("record.csv", "nowhere.csv", r"nowhere.csv: cannot be read"),
-        ("[target]", "[targets]", r"targets is not a known key; allowed: base, target, parameters"),
+        ("[target]", "[targets]", r"'targets' is not known; allowed: base, target, parameters"),
         ("[target]", "base = 'no.nml'\n[target]", r"no.nml: there is no such file"),
         ("[target]", "starts = 1.5\n[target]", r"starts = 1.5 is not allowed; allowed: whole"),
         ("[target]", "seed = -1\n[target]", r"seed = -1 is not allowed"),
@@ -140,7 +197,7 @@ def test_search_without_an_end_is_a_failure(
         (
             'file = "record.csv"',
             "levels = [39, 31, 23, 17, 12]\ncontact_time = { value = 20, unit = 'm' }",
-            r"contact_time: unit = 'm' is not allowed; allowed: 's', 'ms', 'us'",
+            r"contact_time: unit 'm' does not fit; allowed: s, ms, us",
         ),
     ],
 )

@@ -131,6 +131,9 @@ def test_useless_designs_are_told() -> None:
         thud.sensitivity({**LUMPED, "design": {"kind": "grid"}})
     with pytest.raises(thud.InputError, match="such as 64 or 128"):
         thud.sensitivity({**LUMPED, "design": {"size": 100}})
+    for size in (1, 2):
+        with pytest.raises(thud.InputError, match=rf"size = {size} is not .* numbers from 4"):
+            thud.sensitivity({**LUMPED, "design": {"size": size}})
 
 
 @pytest.mark.parametrize("kind", ["sweep", "sensitivity", "design", "uncertainty"])

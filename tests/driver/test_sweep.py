@@ -1,18 +1,16 @@
-"""Sweeps: designs, units, datasets, stores that survive, and bad input."""
+"""Sweeps: designs, units, datasets, and bad input."""
 
 from __future__ import annotations
 
 import doctest
-import resource
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import scipy
 import xarray as xr
 from conftest import REPOSITORY
 from hypothesis import HealthCheck, given, settings
@@ -20,28 +18,17 @@ from hypothesis import strategies as st
 from scipy.stats import qmc
 
 import thud
-from thud import cli, units
+from thud import cli, tables, units
 from thud.keys import known_keys
-from thud.studies import evaluation, run, sets
+from thud.studies import designs, evaluation, run, sets
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
     from types import ModuleType
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
-# Several blocks of the modal ball, about one second.
-LONG = """
-name = "long"
-fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 48, rings = 20 }
-design = { kind = "random", size = 400, seed = 4 }
-parameters = { height = { low = 0.9, high = 1.1 } }
-"""
-
-
-def values(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset without the date of its making."""
-    return dataset.drop_attrs(deep=False).load()
 
 
 def test_grid_holds_what_single_drops_give() -> None:
@@ -93,7 +80,24 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
         assert "youngs_modulus = 1600000.0" in found.attrs["base_case"]
 
 
-@pytest.mark.parametrize("module", [run, units])
+def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = thud.read_study(
+        {
+            "design": {"kind": "sobol", "size": 2},
+            "parameters": {"height": {"low": 1, "high": 2}},
+        }
+    )
+    grid = thud.read_study(HEIGHTS)
+    before = drawn.fingerprint, grid.fingerprint
+    found = thud.sweep(drawn)
+    assert found.attrs["scipy_version"] == scipy.__version__
+    assert "salib_version" in found.attrs
+    monkeypatch.setattr(designs, "version", lambda _: "0.0.1")
+    assert drawn.fingerprint != before[0]
+    assert grid.fingerprint == before[1]
+
+
+@pytest.mark.parametrize("module", [run, tables, units])
 def test_examples_are_true(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 0
@@ -141,6 +145,7 @@ def test_spreads_have_their_quantiles() -> None:
                 "mass": {"std": 100, "unit": "g"},
                 "height": {"low": 0.01, "high": 100, "scale": "log"},
                 "rings": {"low": 10, "high": 12},
+                "harmonics": {"low": 2, "high": 7, "scale": "log"},
                 "damping_law": {"values": ["constant", "rising"]},
             },
         }
@@ -151,7 +156,16 @@ def test_spreads_have_their_quantiles() -> None:
     )
     assert np.median(found["height"]) == pytest.approx(1.0, rel=0.01)
     assert np.unique(found["rings"], return_counts=True)[1] == pytest.approx(4000 / 3, rel=0.01)
+    share = np.unique(found["harmonics"], return_counts=True)[1] / 4000
+    assert share == pytest.approx(np.diff(np.log(np.arange(2, 9))) / np.log(8 / 2), abs=1e-3)
     assert (found["damping_law"] == "rising").mean() == pytest.approx(0.5, abs=1e-3)
+
+
+def test_fixed_value_is_the_middle_of_a_normal_distribution() -> None:
+    study: dict[str, Any] = {"design": {"kind": "latin_hypercube", "size": 1000}}
+    study |= {"fixed": {"mass": 3}, "parameters": {"mass": {"std": 0.1}}}
+    found = sets.parameter_columns(thud.read_study(study), 0, 1000)
+    assert found["mass"].mean() == pytest.approx(3, abs=1e-3)
 
 
 def test_list_pairs_values_and_entries_of_lists() -> None:
@@ -223,18 +237,6 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
     assert np.isnan(found["elastic_level"].values[1:]).all()
 
 
-def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    expected = values(thud.sweep(HEIGHTS))
-    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path)
-    assert (tmp_path / "a.zarr").is_dir()
-    assert values(found).identical(expected)
-    # Whatever is larger than a byte is Zarr now, and written one variable at a time.
-    monkeypatch.setattr("thud.studies.store.LARGE", 1)
-    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
-    assert values(found).identical(expected)
-
-
 @pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
 def test_ensemble_gives_what_single_drops_give(
     fixed: dict[str, str], monkeypatch: pytest.MonkeyPatch
@@ -276,117 +278,6 @@ def test_ensemble_is_used_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> No
     assert asked == [3]
 
 
-@pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
-    """Return the results of the long study, computed at a stretch."""
-    path = tmp_path_factory.mktemp("whole") / "long.toml"
-    path.write_text(LONG)
-    return thud.sweep(path)
-
-
-def start(study: str, folder: Path) -> subprocess.Popen[str]:
-    """Start a study in a process of its own, and return when it has finished some of its sets."""
-    (folder / "long.toml").write_text(study)
-    command = [sys.executable, "-m", "thud.cli", "sweep", "long.toml", "-q", "-o", "."]
-    command += ["--workers", "1"]
-    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 30
-    while not list(folder.glob("long.partial/block_*.nc")):
-        assert process.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-    return process
-
-
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
-def test_ended_study_goes_on_where_it_stopped(
-    end: signal.Signals, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    process = start(LONG, tmp_path)
-    process.send_signal(end)
-    _, errors = process.communicate()
-    if end == signal.SIGINT:
-        assert process.returncode == 130
-        assert errors == "thud-driver: interrupted; what was finished is kept\n"
-    else:
-        assert process.returncode == -signal.SIGKILL
-    assert not (tmp_path / "long.nc").exists()
-    finished = thud.read_sweep(tmp_path / "long.partial")
-    assert 0 < finished.sizes["set"] < 400
-    known = np.isin(whole["height"], finished["height"])
-    assert values(finished).identical(values(whole.isel(set=known)))
-
-    computed = []
-    evaluate = evaluation.evaluate
-
-    def count(block: evaluation.Block, threads: int) -> dict[str, Any]:
-        computed.append(len(block.columns["height"]))
-        return evaluate(block, threads)
-
-    monkeypatch.setattr("thud.studies.backends.evaluate", count)
-    resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
-    assert sum(computed) == 400 - finished.sizes["set"]
-    assert values(resumed).identical(values(whole))
-    assert not (tmp_path / "long.partial").exists()
-    again = thud.sweep(tmp_path / "long.toml", tmp_path)
-    assert again.identical(resumed)
-    assert sum(computed) == 400 - finished.sizes["set"]
-
-
-def test_full_disk_is_told_and_loses_nothing(
-    whole: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "long.toml").write_text(LONG)
-    arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    size = evaluation.block_size(thud.read_study(tmp_path / "long.toml").base)
-    blocks = -(-whole.sizes["set"] // size)
-    assert blocks > 1
-    block, end = (
-        len(bytes(part.to_netcdf(engine="h5netcdf")))
-        for part in (whole.isel(set=slice(0, size)), whole)
-    )
-    # The disk is full for the first block already, then for the end, which is larger.
-    for limit, partial in ((block // 2, 0), ((block + end) // 2, blocks)):
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
-        try:
-            assert cli.main(arguments) == 1
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-        errors = capsys.readouterr().err
-        assert "File too large; allowed: a place that you may write to" in errors
-        assert errors.count("\n") == 1
-        assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
-        assert not list(tmp_path.rglob(".*part"))
-    assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
-
-
-def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
-    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
-    before = (tmp_path / "a.nc").read_bytes()
-    other = {"name": "a", "parameters": {"height": {"values": [1]}}}
-    with pytest.raises(thud.InputError, match=r"a\.nc belongs to another study.*allowed: another"):
-        thud.sweep(other, tmp_path)
-    (tmp_path / "a.nc").rename(tmp_path / "b.nc")
-    with pytest.raises(thud.InputError, match=r"b\.nc belongs to another study"):
-        thud.sweep({**other, "name": "b"}, tmp_path)
-    assert (tmp_path / "b.nc").read_bytes() == before
-    (tmp_path / "c.nc").write_text("no dataset")
-    with pytest.raises(thud.InputError, match=r"c\.nc cannot be read; allowed: "):
-        thud.sweep({**other, "name": "c"}, tmp_path)
-    (tmp_path / "d.partial").mkdir()
-    (tmp_path / "d.partial/study").write_text("something else")
-    (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
-    with pytest.raises(thud.InputError, match=r"d\.partial belongs to another study"):
-        thud.sweep({**other, "name": "d"}, tmp_path)
-    assert len(list((tmp_path / "d.partial").iterdir())) == 2
-    (tmp_path / "e.partial").mkdir()
-    (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
-    with pytest.raises(thud.InputError, match="holds no finished sets"):
-        thud.read_sweep(tmp_path / "e.partial")
-    assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
-
-
 def test_many_sets_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
@@ -409,6 +300,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("sets = 3", "'sets' is not known; allowed: name, case"),
         ("parameters = 3", r"parameters = 3 .*allowed: a table"),
         ("name = 'a/b'\nparameters.height.values = [1]", "name = 'a/b'.*without folders"),
+        ("name = '..'\nparameters.height.values = [1]", r"name = '\.\.' .*without folders"),
         ("format = 'csv'\nparameters.height.values = [1]", "allowed: auto, netcdf, zarr"),
         ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere; allowed: outer"),
@@ -417,6 +309,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.height.values = []", r"values = \[\] is empty"),
         ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
         ("parameters.height.values = [inf]", "allowed: finite numbers"),
+        ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}", "allowed: finite numbers"),
         ("parameters.height = {values=[1], unit='s'}", "unit 's' does not fit; allowed: m, cm, mm"),
         ("parameters.height = {values=[1], unit=['m']}", "does not fit; allowed: m, cm"),
         ("parameters.height = {values=[1], count=2}", "count is not known beside values; allowed:"),
@@ -424,7 +317,26 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.height = {low=1}", "no high end; allowed: high"),
         ("parameters.height = {low=2, high=1, count=3}", "low = 2 is not allowed; allowed: low <"),
         ("parameters.height = {low=0, high=1, count=3, scale='log'}", "allowed: low < high, 0"),
-        ("parameters.height = {low=1, high=2, count=1}", "allowed: 2 <= count, whole"),
+        ("parameters.height = {low=1, high=2, count=1}", "count = 1 is not .*whole numbers from 2"),
+        (
+            "parameters.height = {low=1, high=2, count=1000000000000}",
+            "count = 1000000000000 is not allowed; allowed: whole numbers from 2 to 1073741824",
+        ),
+        (
+            f"parameters.height = {{low=1, high=2, count=1{'0' * 400}}}",
+            "count = a very large number is not allowed",
+        ),
+        ("parameters.substeps = {low=1, high=3, count=4}", "allowed: whole numbers from 2 to 3"),
+        (
+            "parameters.substeps = {low=1, high=1e9, count=3}",
+            r"low = 1 and high = 1e\+09 are not allowed; allowed: 1 <= low < high <= 10000",
+        ),
+        (
+            "parameters = {height=$, mass=$, gravity=$}".replace(
+                "$", "{low=1, high=2, count=10_000_000}"),
+            r"make too many sets; allowed: up to 2\^63 - 1 in a grid",
+        ),
+        (f"design.seed = 1{'0' * 5000}", "allowed: TOML"),
         ("parameters.height = {std=1}", "no values for a grid design"),
         ("parameters.substeps.values = [1.5]", "values = 1.5 is not allowed; allowed: whole"),
         ("parameters.substeps = {std=1}", "allowed: values"),
@@ -436,12 +348,22 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),
         ("fixed = {mass=1, density=1000}\nparameters.height.values = [1]", "mass and density"),
         ("fixed.density = 1000\nparameters.mass.values = [1]", "mass and density are both given"),
+        ("fixed.mass = 2\nparameters.density.values = [1000]", "mass and density are both given"),
+        ("fixed.mass = 2\nparameters.mass.values = [1]", r"\[fixed\] mass has no use beside \[par"),
+        (
+            "fixed.density = 900\nparameters.density.values = [1000]",
+            r"\[fixed\] density has no use beside \[parameters\] density; allowed: one",
+        ),
+        (
+            "fixed.mass = 2\ndesign = {kind='random', size=9}\nparameters.mass={std=1, mean=3}",
+            r"allowed: one of them, or std without mean",
+        ),
         ("fixed.temperature = 1\nparameters.mass.values = [1]", r"temperature in \[parameters\]"),
         ("parameters.temperature.values = [1]", "allowed: reference, degC, and coefficient"),
         ("temperature.reference = 1\nparameters.temperature.values = [1]", "coefficient = None"),
         ("design.kind = 'cube'\nparameters.mass.values = [1]", "allowed: grid, list, random"),
         ("design.size = 3\nparameters.mass.values = [1]", "'size' is not known; allowed: kind"),
-        ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*allowed: 1 <= size"),
+        ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*numbers from 1"),
         ("design = {kind='sobol', size=100}\nparameters.mass.values = [1]", "as 64 or 128"),
         (
             "design = {kind='random', size=9}\nparameters.mass = {low=1, high=2, count=3}",
@@ -473,6 +395,39 @@ def test_bad_studies_are_told(
     with pytest.raises(thud.InputError, match=words):
         thud.read_study(path)
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize(
+    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design_map, "grid")]
+)
+def test_exploding_designs_are_told_before_they_are_made(
+    compute: Callable[[dict[str, Any]], object], design: str
+) -> None:
+    spread = {"low": 1, "high": 2, "count": 10**9}
+    study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
+    with pytest.raises(thud.InputError, match=r"000 sets of hollow_sphere.*; allowed: up to"):
+        compute(study)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    plain = {"fixed": {"substeps": 2}, "parameters": {"height": {"values": [0.5, 0.75, 1.0]}}}
+    for heights in (np.linspace(0.5, 1, 3), list(np.linspace(0.5, 1, 3)), (0.5, 0.75, 1)):
+        study = {"fixed": {"substeps": np.int64(2)}, "parameters": {"height": {"values": heights}}}
+        assert thud.read_study(study).fingerprint == thud.read_study(plain).fingerprint
+
+
+@pytest.mark.parametrize(
+    ("study", "words"),
+    [
+        ({"fixed": {"mass": np.ones((9, 9))}}, r"mass = an object of list is not allowed"),
+        ({"fixed": {"mass": {1, 2}}}, r"no text \(an object of set\); allowed: tables"),
+        ({"fixed": {"mass": 10**5000}}, r"no text .*; allowed: tables"),
+    ],
+)
+def test_bad_tables_are_told(study: dict[str, Any], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words) as told:
+        thud.sweep({**HEIGHTS, **study})
+    assert "\n" not in str(told.value)
 
 
 def test_study_that_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -113,7 +113,7 @@ def test_command_writes_figure_and_table(
     path.write_text("design.size = 30\nparameters.mass = {std=0.05}")
     assert cli.main(["uncertainty", str(path), "-o", str(tmp_path)]) == 0
     assert (tmp_path / "small.svg").exists()
-    assert "all criteria   0.0 %" in capsys.readouterr().out
+    assert "all criteria  0.0 %" in capsys.readouterr().out
 
 
 def test_only_independent_sets_are_taken() -> None:

@@ -44,7 +44,7 @@ class Objective:
         """Return the case of a place."""
         values = place[: self.count] * self.scale[: self.count]
         names = (entry.name for entry in self.ranges)
-        return with_values(self.case, dict(zip(names, map(float, values), strict=True)))
+        return with_values(self.case, dict(zip(names, values, strict=True)))
 
     def impact(self, place: NDArray[np.float64]) -> Impact | None:
         """Return the impact of a place, or None where there is none."""

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import require_kind
+from thud.checks import require_kind, require_number
 from thud.errors import InputError
 from thud.keys import key_table, put
 from thud.models import LISTS, group_of
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
     from thud.case import Case
     from thud.keys import Key
 
@@ -127,9 +126,10 @@ def get_ranges(
     InputError
         Where a parameter is not known, or its start and limits do not fit together.
     """
+    require_kind("parameters", parameters, Iterable)
     if isinstance(parameters, str):
         parameters = [parameters]
-    if not hasattr(parameters, "items"):
+    if not isinstance(parameters, Mapping):
         parameters = dict.fromkeys(parameters)
     if not parameters:
         message = f"parameters: none is given; allowed: {', '.join(known_parameters(case))}"
@@ -138,7 +138,9 @@ def get_ranges(
     for name, given in parameters.items():
         require_known(case, name, "parameters: ")
         wish = given if isinstance(given, Parameter) else Parameter(given)
-        require_kind(name, wish.start, float | int | np.floating | None)
+        for word, value in vars(wish).items():
+            if value is not None:
+                require_number(f"{name}: {word}", value)
         found.append(_get_range(case, name, wish))
     return found
 
@@ -173,24 +175,6 @@ def _get_range(case: Case, name: str, wish: Parameter) -> Range:
     room = min(INSIDE * scale, (upper - lower) / 4)
     start = min(max(start, lower + room), upper - room)
     return Range(name, key.unit, start, lower, upper, scale, spread)
-
-
-def unit_factor(name: str, key_unit: str, unit: object) -> float:
-    """Return how many of the library's units are one of another.
-
-    Raises
-    ------
-    InputError
-        Where the unit does not fit the parameter.
-    """
-    if unit == key_unit:
-        return 1.0
-    known = MULTIPLES.get(key_unit, {})
-    if not isinstance(unit, str) or unit not in known:
-        allowed = ", ".join(map(repr, known or [key_unit]))
-        message = f"{name}: unit = {unit!r} is not allowed; allowed: {allowed}"
-        raise InputError(message)
-    return scaled(1.0, known[unit])
 
 
 def handy_unit(unit: str, value: float) -> tuple[str, float]:

@@ -14,6 +14,7 @@ from thud.case import write_case
 from thud.checks import replace_file
 from thud.fitting.inference import coverage_factor
 from thud.fitting.parameters import handy_unit
+from thud.tables import aligned
 
 if TYPE_CHECKING:
     import os
@@ -167,12 +168,7 @@ class Fit:
             if not np.isfinite(error):
                 interval = "not known"
             rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-            for row in rows
-        ]
-        return "\n".join([*lines, "", *self._remarks()])
+        return "\n".join([aligned(rows), "", *self._remarks()])
 
     def shown_units(
         self, units: Mapping[str, tuple[str, float]] | None = None
@@ -254,6 +250,8 @@ class Fit:
         **extra: object,
     ) -> list[Path]:
         """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
+
+        Older files of these names are replaced.
 
         Parameters
         ----------

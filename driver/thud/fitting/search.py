@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import stats
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
 from thud.case import Case
-from thud.checks import require_kind
-from thud.errors import FitWarning, InputError, NumericalError
+from thud.checks import LARGEST_SEED, require_kind, require_whole
+from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.inference import (
     Inference,
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from thud.impact import Impact
     from thud.recording import Recording
 
+# More starts, or steps of a search, than this come to no end.
+MOST = 100_000
 # Where steps and gains are this small, relative, the search ends.
 TOLERANCE = 1e-8
 # A parameter this close to a limit, relative, lies at it.
@@ -102,10 +104,9 @@ def fit(  # noqa: PLR0913 - what there is to choose
     case = Case() if base is None else base
     require_kind("base", case, Case)
     require_level(level)
-    for name, value in (("starts", starts), ("max_steps", max_steps)):
-        if not isinstance(value, int | np.integer) or value < 1:
-            message = f"{name} = {value!r} is not allowed; allowed: whole numbers from 1"
-            raise InputError(message)
+    require_whole("starts", starts, 1, MOST)
+    require_whole("max_steps", max_steps, 1, MOST)
+    require_whole("seed", seed, 0, LARGEST_SEED)
     ranges = get_ranges(case, parameters)
     misfit = (
         target if isinstance(target, ForceTarget | LevelTarget) else ForceTarget(target)
@@ -137,10 +138,7 @@ def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[NDArray[np.f
     first = np.array([entry.start / entry.scale for entry in ranges])
     yield first
     lower, upper = np.array([np.array(entry.spread) / entry.scale for entry in ranges]).T
-    random = np.random.default_rng(seed)
-    rows = count - 1
-    cells = np.column_stack([random.permutation(rows) for _ in ranges])
-    for place in (cells + random.random(cells.shape)) / max(rows, 1):
+    for place in stats.qmc.LatinHypercube(len(ranges), rng=seed).random(count - 1):
         yield lower + place * (upper - lower)
 
 
@@ -148,32 +146,42 @@ def _search(
     objective: Objective, starts: Iterator[NDArray[np.float64]], max_steps: int
 ) -> tuple[NDArray[np.float64], bool]:
     """Return the best place from all starts, and whether the search came to an end there."""
-    best: tuple[float, NDArray[np.float64], bool] | None = None
+    best: OptimizeResult | None = None
+    failures: list[ThudError] = []
     for start in starts:
-        first = objective.impact(start)
-        if first is None:
+        try:
+            found = _descend(objective, start, max_steps)
+        except ThudError as error:
+            failures.append(error)
             continue
-        if objective.misfit.free_shift:
-            start = np.append(start, objective.misfit.first_shift(first) / SHIFT_SCALE)  # noqa: PLW2901
-        done = least_squares(
-            objective.residual,
-            start,
-            objective.jacobian,
-            bounds=(objective.lower, objective.upper),
-            ftol=TOLERANCE,
-            xtol=TOLERANCE,
-            gtol=np.finfo(float).eps,  # ends a search that starts at a perfect fit
-            # LSMR is regularised: parameters without effect do not hold up the others. It searches
-            # a plane, which a single parameter does not span.
-            tr_solver="lsmr" if len(start) > 1 else "exact",
-            max_nfev=max_steps,
-        )
-        if best is None or done.cost < best[0]:
-            best = float(done.cost), done.x, bool(done.status > 0)
+        if best is None or found.cost < best.cost:
+            best = found
     if best is None:
+        raise failures[0]
+    return best.x, bool(best.status > 0)
+
+
+def _descend(objective: Objective, start: NDArray[np.float64], max_steps: int) -> OptimizeResult:
+    """Return where the search from one start ends."""
+    first = objective.impact(start)
+    if first is None:
         message = f"the start cannot be computed: {objective.error}"
         raise type(objective.error or NumericalError())(message)
-    return best[1:]
+    if objective.misfit.free_shift:
+        start = np.append(start, objective.misfit.first_shift(first) / SHIFT_SCALE)
+    return least_squares(
+        objective.residual,
+        start,
+        objective.jacobian,
+        bounds=(objective.lower, objective.upper),
+        ftol=TOLERANCE,
+        xtol=TOLERANCE,
+        gtol=np.finfo(float).eps,  # ends a search that starts at a perfect fit
+        # LSMR is regularised: parameters without effect do not hold up the others. It searches
+        # a plane, which a single parameter does not span.
+        tr_solver="lsmr" if len(start) > 1 else "exact",
+        max_nfev=max_steps,
+    )
 
 
 def _conclude(

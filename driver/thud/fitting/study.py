@@ -2,36 +2,38 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import tomllib
 import warnings
 from dataclasses import dataclass, fields
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from tqdm import tqdm
 
 from thud.case import Case, read_case
+from thud.checks import require_number, require_own, require_words
 from thud.columns import read_table
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget
-from thud.fitting.parameters import Parameter, require_known, unit_factor
+from thud.fitting.parameters import Parameter, require_known
 from thud.fitting.search import fit
 from thud.recording import Recording
+from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
     import argparse
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from thud.fitting.result import Fit
 
 OPTIONS = ("level", "starts", "seed", "max_steps")
-WHOLE = ("starts", "seed", "max_steps")
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
 LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
-LARGE = 1e300
 PARAMETER_KEYS = ("start", "lower", "upper", "unit")
 
 
@@ -54,7 +56,7 @@ class Study:
     options : dict
         Other arguments of `fit`.
     content : dict
-        The file as it is.
+        The file as JSON holds it.
     """
 
     name: str
@@ -95,32 +97,30 @@ def read_study(path: str | os.PathLike[str]) -> Study:
 
 def _study(place: Path, content: dict[str, Any]) -> Study:
     """Return the study of a file's content."""
-    _require_keys("", content, ("base", "target", "parameters", *OPTIONS))
+    require_words("the study", content, ("base", "target", "parameters", *OPTIONS))
     base = Case()
     if "base" in content:
         base = read_case(place.parent / _text("base", content["base"]))
-    for name in OPTIONS:
-        if name in content:
-            _number(name, content[name], whole=name in WHOLE)
-    if "seed" in content and content["seed"] < 0:
-        message = f"seed = {content['seed']} is not allowed; allowed: whole numbers from 0"
-        raise InputError(message)
     parameters: dict[str, Parameter] = {}
     units = {}
-    for name, entries in _table("parameters", content).items():
+    for name in _table("parameters", content):
         where = f"[parameters.{name}]"
         key = require_known(base, name, "[parameters] ")
         given = _table(name, content["parameters"], where)
-        _require_keys(where, given, PARAMETER_KEYS)
-        factor = 1.0
-        if "unit" in entries:
-            factor = unit_factor(where, key.unit, entries["unit"])
-            units[name] = (entries["unit"], factor)
-        values = {n: _number(f"{where} {n}", v) * factor for n, v in given.items() if n != "unit"}
+        require_words(where, given, PARAMETER_KEYS)
+        power = power_of(given.get("unit", key.unit or "1"), key.unit, where)
+        if "unit" in given:
+            units[name] = (given["unit"], scaled(1.0, power))
+        numbers = {word: value for word, value in given.items() if word != "unit"}
+        for word, value in numbers.items():
+            require_number(f"{where} {word}", value)
+        values = {word: scaled(value, power) for word, value in numbers.items()}
         parameters[name] = Parameter(**values)
     target = _target(place, _table("target", content))
     options = {name: content[name] for name in OPTIONS if name in content}
-    return Study(place.stem, base, target, parameters, units, options, content)
+    # JSON knows neither dates nor infinity.
+    plain = json.loads(json.dumps(content, default=str), parse_constant=str)
+    return Study(place.stem, base, target, parameters, units, options, plain)
 
 
 def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
@@ -131,61 +131,68 @@ def _target(place: Path, table: dict[str, Any]) -> ForceTarget | LevelTarget:
         )
         raise InputError(message)
     if "file" in table:
-        _require_keys("[target]", table, FORCE_KEYS)
+        require_words("[target]", table, FORCE_KEYS)
         options = {name: value for name, value in table.items() if name != "file"}
         path = place.parent / _text("[target] file", table["file"])
         samples = read_table(path)
         Recording.from_arrays(samples, str(path))  # complains about what is no recording
         for name in ("noise", "below"):
             if name in options:
-                options[name] = _number(f"[target] {name}", options[name])
+                require_number(f"[target] {name}", options[name])
         if not isinstance(options.get("time_shift", True), bool):
-            shown = options["time_shift"]
-            message = f"[target] time_shift = {shown!r} is not allowed; allowed: true, false"
+            given = options["time_shift"]
+            message = f"[target] time_shift = {given!r} is not allowed; allowed: true, false"
             raise InputError(message)
         return ForceTarget((samples[:, 0], samples[:, 1]), **options)
-    _require_keys("[target]", table, LEVEL_KEYS)
+    require_words("[target]", table, LEVEL_KEYS)
     options = dict(table)
     for name, unit in (("contact_time", "s"), ("restitution", "")):
         if name in options:
             where = f"[target] {name}"
             pair = _table(name, table, where)
-            _require_keys(where, pair, ("value", "uncertainty", "unit"))
-            factor = unit_factor(where, unit, pair["unit"]) if "unit" in pair else 1.0
+            require_words(where, pair, ("value", "uncertainty", "unit"))
+            power = power_of(pair.get("unit", unit or "1"), unit, where)
             if not {"value", "uncertainty"} <= set(pair):
                 message = f"{where} = {pair} is not allowed; allowed: value and uncertainty"
                 raise InputError(message)
-            options[name] = tuple(
-                _number(f"{where}: {part}", pair[part]) * factor
-                for part in ("value", "uncertainty")
-            )
+            for part in ("value", "uncertainty"):
+                require_number(f"{where}: {part}", pair[part])
+            options[name] = tuple(scaled(pair[part], power) for part in ("value", "uncertainty"))
     return LevelTarget(**options)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command ``thud-driver fit``: print the fit, save it, return the exit code."""
     study = read_study(options.study)
+    folder = Path(options.output or Path("outputs", study.name))
+    _claim(folder, study)
     try:
         found = study.run(progress=not options.quiet)
     except ThudError as error:
         message = f"{options.study}: {error}"
         raise type(error)(message) from error
-    folder = Path(options.output or Path("outputs", study.name))
-    found.save(folder, study.units, figures=not options.no_figures, study=study.content)
     if not options.quiet:
-        tqdm.write(f"{study.name}\n\n{found.table(study.units)}\nResults: {folder}")
+        tqdm.write(f"{study.name}\n\n{found.table(study.units)}")
     for sentence in found.warnings:
         tqdm.write(f"thud-driver: {options.study}: {sentence}", file=sys.stderr)
+    found.save(folder, study.units, figures=not options.no_figures, study=study.content)
+    if not options.quiet:
+        tqdm.write(f"Results: {folder}")
     return 0 if found.converged else NumericalError.exit_code
 
 
-def _require_keys(where: str, table: Mapping[str, object], known: Iterable[str]) -> None:
-    """Complain about a key that is not known."""
-    allowed = list(known)
-    for key in table:
-        if key not in allowed:
-            message = f"{where} {key} is not a known key; allowed: {', '.join(allowed)}".lstrip()
-            raise InputError(message)
+def _claim(folder: Path, study: Study) -> None:
+    """Make a directory for a fit, or complain about one that cannot take it, before it is found."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryFile(dir=folder):
+        pass
+    path = folder / "fit.json"
+    if path.exists():
+        try:
+            mine = json.loads(path.read_bytes())["study"] == study.content
+        except (ValueError, LookupError, TypeError):
+            mine = False
+        require_own(path, mine=mine)
 
 
 def _table(name: str, content: Mapping[str, Any], where: str = "") -> dict[str, Any]:
@@ -202,16 +209,5 @@ def _text(name: str, value: object) -> str:
     """Return a text of a file."""
     if not isinstance(value, str) or not value.strip():
         message = f"{name} = {value!r} is not allowed; allowed: text in quotes"
-        raise InputError(message)
-    return value
-
-
-def _number(name: str, value: object, *, whole: bool = False) -> float:
-    """Return a finite number of a file."""
-    kind = int if whole else float | int
-    if isinstance(value, bool) or not isinstance(value, kind) or not abs(value) < LARGE:
-        allowed = "whole numbers" if whole else "real numbers"
-        shown = "a very large number" if isinstance(value, int) and value > LARGE else repr(value)
-        message = f"{name} = {shown} is not allowed; allowed: {allowed}"
         raise InputError(message)
     return value

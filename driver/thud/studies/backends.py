@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 from concurrent.futures import (
     FIRST_COMPLETED,
-    CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
@@ -17,6 +17,8 @@ from contextlib import contextmanager, suppress
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
+from thud.checks import require_whole, shown
+from thud.ensemble import MOST_THREADS
 from thud.errors import InputError, NumericalError, ThudError
 from thud.studies.evaluation import Block, evaluate
 
@@ -50,7 +52,7 @@ def run_blocks(
     backend
         ``"threads"`` (the default), ``"processes"`` or ``"dask"`` (the default with a scheduler).
     workers
-        Number of threads or processes; by default one per processor.
+        Number of threads or processes, up to 1024; by default one per processor.
     scheduler
         Address of a Dask scheduler.
 
@@ -100,9 +102,11 @@ def _checked(
             f"allowed: the address of a scheduler for dask, and only there"
         )
         raise InputError(message)
-    if workers is not None and (scheduler or not isinstance(workers, int) or workers < 1):
-        message = f"workers = {workers!r} is not allowed; allowed: 1 <= workers, not for dask"
-        raise InputError(message)
+    if workers is not None:
+        if scheduler:
+            message = f"workers = {shown(workers)} is not allowed for dask; allowed: those it has"
+            raise InputError(message)
+        require_whole("workers", workers, 1, MOST_THREADS)
     return backend, workers, scheduler
 
 
@@ -114,11 +118,11 @@ def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) 
             found = future.result()
         except ThudError:
             raise
-        except (Exception, CancelledError) as error:
+        except Exception as error:
             del running[future]
-            said = str(error).partition("\n")[0]
+            said = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
             message = (
-                f"the backend lost a block of sets ({type(error).__name__}: {said}); what was "
+                f"the backend lost a block of sets ({said}); what was "
                 f"finished is kept; allowed: run the study again"
             )
             raise NumericalError(message) from error
@@ -135,7 +139,7 @@ def _open(
         with _dask(scheduler) as opened:
             yield opened
         return
-    width = workers or len(os.sched_getaffinity(0))
+    width = workers or min(len(os.sched_getaffinity(0)), MOST_THREADS)
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             yield threads, width
@@ -164,14 +168,19 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
     try:
         # A client of an unknown kind of address would fail again when it is thrown away.
         get_backend(parse_address(address)[0])
-        client: Any = Client(address, timeout=PATIENCE)  # type: ignore[no-untyped-call]
+        client: Any = Client(  # type: ignore[no-untyped-call]
+            address,
+            timeout=PATIENCE,
+            # As default it would also be asked for the locks of files, which stay in this process.
+            set_as_default=False,
+        )
     except (OSError, ValueError, TypeError) as error:
         message = (
             f"scheduler = {address!r} does not answer within {PATIENCE} s; "
             f"allowed: the address of a running one, such as tcp://host:8786"
         )
         raise InputError(message) from error
-    with client:
+    with _silent("distributed"), client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as error:
@@ -180,3 +189,20 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
         width = sum(client.nthreads().values())
         with client.get_executor() as executor:
             yield executor, width
+
+
+@contextmanager
+def _silent(name: str) -> Iterator[None]:
+    """Keep the loggers of a package quiet: what goes wrong is told in one sentence."""
+    known = [
+        other for other in logging.root.manager.loggerDict if f"{other}.".startswith(f"{name}.")
+    ]
+    loggers = [logging.getLogger(other) for other in known]
+    usual = [logger.disabled for logger in loggers]
+    for logger in loggers:
+        logger.disabled = True
+    try:
+        yield
+    finally:
+        for logger, disabled in zip(loggers, usual, strict=True):
+            logger.disabled = disabled

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.case import Ball, Drop
+from thud.case import Case
 from thud.errors import InputError
+from thud.keys import DENSITY
 from thud.studies.dataset import coordinate
+from thud.studies.parameters import Parameter, Uniform
 from thud.studies.run import sweep
+from thud.studies.sets import wall_volume
 from thud.studies.study import Study, read_study, value_in
 
 if TYPE_CHECKING:
@@ -83,9 +87,7 @@ def design_map(
         As `sweep`; also where there are not two numeric parameters with two values or more.
     """
     plan = read_study(study, "design")
-    if len(plan.parameters) != _AXES or not all(
-        parameter.numeric and len(set(parameter.spread.grid())) > 1 for parameter in plan.parameters
-    ):
+    if len(plan.parameters) != _AXES or not all(map(_is_axis, plan.parameters)):
         message = "[parameters] are no map; allowed: two numeric ones of two values or more"
         raise InputError(message)
     first, second = map(coordinate, plan.parameters)
@@ -93,12 +95,22 @@ def design_map(
     return DesignMap(dataset, (first, second), *_mark(plan))
 
 
+def _is_axis(parameter: Parameter) -> bool:
+    """Return whether a parameter has two numbers or more."""
+    spread = parameter.spread
+    # Very many values between two ends are not made for this.
+    return parameter.numeric and (isinstance(spread, Uniform) or len(set(spread.grid())) > 1)
+
+
 def _mark(plan: Study) -> tuple[tuple[float, float] | None, str]:
-    """Return where the ball of the paper lies, or the base case."""
-    shape = vars(Ball()) | vars(Drop())
+    """Return where the ball of the paper lies if the rest is as in the paper, or the base case."""
     names = [parameter.name for parameter in plan.parameters]
-    of_paper = all(name in shape for name in names)
-    places: list[Any] = [shape[n] if of_paper else value_in(plan.base, n) for n in names]
+    paper, base = _ball_and_drop(Case(), None), _ball_and_drop(plan.base, plan.density)
+    by_density = plan.density is not None or DENSITY.name in names
+    rest = set(paper) - set(names) - {"mass" if by_density else DENSITY.name}
+    of_paper = set(names) <= set(paper) and all(math.isclose(base[n], paper[n]) for n in rest)
+    values = paper if of_paper else base
+    places: list[Any] = [values.get(name, value_in(plan.base, name)) for name in names]
     ends = [(min(grid), max(grid)) for grid in (p.spread.grid() for p in plan.parameters)]
     inside = all(
         place is not None and low <= float(place) <= high
@@ -106,3 +118,12 @@ def _mark(plan: Study) -> tuple[tuple[float, float] | None, str]:
     )
     x, y = places
     return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "base case"
+
+
+def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
+    """Return the numbers of ball and drop, the density of the wall among them."""
+    ball = case.ball
+    volume = wall_volume(ball.outer_radius, ball.wall_thickness)
+    if density is None:
+        density = ball.mass / volume if volume else math.nan
+    return vars(ball) | vars(case.drop) | {DENSITY.name: density}

@@ -13,6 +13,7 @@ import thud
 from thud._library import compiler
 from thud.levels import get_bands
 from thud.studies import sets
+from thud.studies.designs import makers
 from thud.studies.evaluation import SCALARS, block_size
 from thud.studies.parameters import Uniform
 from thud.units import power_of
@@ -118,6 +119,7 @@ def provenance(study: Study) -> dict[str, str]:
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,
         "xarray_version": xr.__version__,
+        **makers(study.design),
         "machine": platform.machine(),
         "date_created": datetime.now(UTC).isoformat(timespec="seconds"),
     }

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from thud.checks import LARGEST_SEED, require_whole, require_words
 from thud.errors import InputError
-from thud.studies.parameters import Normal, Parameter, Uniform
+from thud.studies.parameters import MOST_VALUES, Normal, Parameter, Uniform
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -18,15 +21,16 @@ DESIGNS = {
     "uncertainty": ("random",),
 }
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
-_LARGEST_SEED = 2**32 - 1
+# Fewer base samples than this give no Sobol indices.
+LEAST_SAMPLES = 4
+# NumPy counts no further.
+_MOST_SETS = 2**63 - 1
 
 
-def require_words(place: str, given: Mapping[str, object], known: tuple[str, ...]) -> None:
-    """Complain about words that mean nothing."""
-    for word in given:
-        if word not in known:
-            message = f"{place}: {word!r} is not known; allowed: {', '.join(known)}"
-            raise InputError(message)
+def makers(design: str) -> dict[str, str]:
+    """Return the versions of what draws the points of a design; other versions may draw others."""
+    names = ("scipy", "SALib") if design in DRAWN else ()
+    return {f"{name.lower()}_version": version(name) for name in names}
 
 
 def read_design(
@@ -70,19 +74,18 @@ def read_design(
                 f"allowed: values = [...], or low, high and count"
             )
             raise InputError(message)
-    if design == "list" and len({len(p.spread.grid()) for p in parameters}) > 1:
+    if design == "list" and len({p.spread.size for p in parameters}) > 1:
         message = "[parameters] differ in their number of values; allowed: the same for all"
+        raise InputError(message)
+    if design == "grid" and math.prod(p.spread.size for p in parameters) > _MOST_SETS:
+        message = "[parameters] make too many sets; allowed: up to 2^63 - 1 in a grid"
         raise InputError(message)
     if design not in DRAWN:
         return design, 0, 0
     size, seed = given.get("size", 0), given.get("seed", 0)
-    for word, number, least, most in (("size", size, 1, 2**30), ("seed", seed, 0, _LARGEST_SEED)):
-        if not isinstance(number, int) or isinstance(number, bool) or not least <= number <= most:
-            message = (
-                f"[design] {word} = {number!r} is not allowed; "
-                f"allowed: {least} <= {word} <= {most}, whole"
-            )
-            raise InputError(message)
+    least = LEAST_SAMPLES if design == "saltelli" else 1
+    require_whole("[design] size", size, least, MOST_VALUES)
+    require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
         near = 1 << size.bit_length() - 1
         message = (

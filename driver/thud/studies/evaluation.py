@@ -13,7 +13,7 @@ from thud.case import Ball, Case, Drop, Levels
 from thud.errors import InputError, ThudError
 from thud.impact import FORCES, solve_case
 from thud.keys import put
-from thud.levels import octave_limits
+from thud.levels import get_bands, octave_limits
 from thud.models import HollowSphere
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ SCALARS = {
     "restitution": ("1", "coefficient of restitution"),
     "impulse": ("N s", "time integral of the force on the floor"),
 }
-OCTAVES = 5
+OCTAVES = len(get_bands().nominal)
 # About the time of one set, s; a block of sets should take about _BLOCK_TIME.
 _SET_TIME = {"modal_ball": 8e-3, "finite_element": 0.25}
 _USUAL_TIME = 1.5e-3

@@ -11,6 +11,7 @@ import xarray as xr
 from thud.errors import InputError
 from thud.levels import get_bands
 from thud.studies.dataset import coordinate
+from thud.studies.designs import LEAST_SAMPLES
 from thud.studies.run import sweep
 from thud.studies.study import read_study
 
@@ -30,8 +31,6 @@ INDICES = {
 }
 CONFIDENCE = 0.95
 RESAMPLES = 200
-# Fewer base samples than this say nothing.
-LEAST_SAMPLES = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +81,7 @@ def sensitivity(
     ----------
     study
         Path of a TOML file, or what would stand in it. ``[design] size`` is the number of base
-        samples N, a power of 2; N (d + 2) sets are computed for d parameters.
+        samples N, a power of 2 from 4; N (d + 2) sets are computed for d parameters.
     output, **how
         See `sweep`.
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.special import ndtri
 
+from thud.checks import LARGEST, require_whole, shown
 from thud.errors import InputError
 from thud.keys import Key, Value, find_key
 from thud.units import power_of, scaled
@@ -24,6 +25,11 @@ class Listed:
     """Values as they stand in the study; where they are drawn, each is as likely."""
 
     values: tuple[Value, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of values in a grid."""
+        return len(self.values)
 
     def grid(self) -> NDArray[Any]:
         """Return the values of a grid."""
@@ -45,6 +51,11 @@ class Uniform:
     logarithmic: bool = False
     whole: bool = False
 
+    @property
+    def size(self) -> int:
+        """Number of values in a grid; very many are not made for it, whole numbers are few."""
+        return len(self.grid()) if self.whole and self.count else self.count
+
     def grid(self) -> NDArray[Any]:
         """Return the values of a grid."""
         ends = (self.low, self.high, self.count)
@@ -53,13 +64,13 @@ class Uniform:
 
     def quantile(self, share: NDArray[np.float64]) -> NDArray[Any]:
         """Return the values below which a share of all lies."""
+        # Every whole number has the share between itself and the next.
+        high = self.high + 1 if self.whole else self.high
         if self.logarithmic:
-            found = self.low * (self.high / self.low) ** share
-        elif self.whole:
-            found = np.floor(self.low + share * (self.high - self.low + 1))
+            found = self.low * (high / self.low) ** share
         else:
-            found = self.low + share * (self.high - self.low)
-        return np.rint(found).astype(int) if self.whole else found
+            found = self.low + share * (high - self.low)
+        return np.minimum(np.floor(found), self.high).astype(int) if self.whole else found
 
 
 @dataclass(frozen=True)
@@ -68,6 +79,7 @@ class Normal:
 
     mean: float
     deviation: float
+    size: ClassVar = 0
 
     def grid(self) -> NDArray[Any]:
         """Return no values: a normal distribution has no grid."""
@@ -107,6 +119,8 @@ class Parameter:
         return self.key.kind in {"real", "whole", "list"}
 
 
+# More values of a parameter, or base samples, than this do not fit into memory.
+MOST_VALUES = 2**30
 # What a parameter may be given by; `unit` may stand with each of them.
 _FORMS = {
     "values": {"values"},
@@ -178,7 +192,7 @@ def checked(place: str, key: Key, value: object, power: int) -> Value:
         return value
     if key.kind in {"real", "whole", "list"} and _is_number(value):
         number = scaled(value, power)  # type: ignore[arg-type]
-        if key.kind != "whole":
+        if key.kind != "whole" and math.isfinite(number):
             return number
         if number.is_integer():
             return int(number)
@@ -187,7 +201,7 @@ def checked(place: str, key: Key, value: object, power: int) -> Value:
         "flag": "true, false",
         "whole": "whole numbers",
     }.get(key.kind, "finite numbers")
-    message = f"{place} = {value!r} is not allowed; allowed: {allowed}"
+    message = f"{place} = {shown(value)} is not allowed; allowed: {allowed}"
     raise InputError(message)
 
 
@@ -195,7 +209,7 @@ def _is_number(value: object) -> bool:
     """Return whether a value is a finite number that a float holds."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
-    return -1e300 < value < 1e300  # noqa: PLR2004 - beyond any key's range
+    return -LARGEST < value < LARGEST
 
 
 def _listed(place: str, key: Key, values: object, power: int) -> Listed:
@@ -212,6 +226,13 @@ def _uniform(place: str, key: Key, given: Mapping[str, Any], power: int) -> Unif
         message = f"{place} has no high end; allowed: high beside low"
         raise InputError(message)
     low, high = (float(checked(f"{place}: {end}", key, given[end], power)) for end in _ENDS)
+    whole = key.kind == "whole"
+    if whole and not key.lower <= low <= high <= key.upper:
+        message = (
+            f"{place}: low = {low:g} and high = {high:g} are not allowed; "
+            f"allowed: {key.lower:g} <= low < high <= {key.upper:g}"
+        )
+        raise InputError(message)
     count, scale = given.get("count", 0), given.get("scale", "linear")
     if scale not in _SCALES:
         message = f"{place}: scale = {scale!r} is not known; allowed: {', '.join(_SCALES)}"
@@ -219,10 +240,9 @@ def _uniform(place: str, key: Key, given: Mapping[str, Any], power: int) -> Unif
     if not low < high or (scale == "log" and low <= 0):
         message = f"{place}: low = {given['low']!r} is not allowed; allowed: low < high"
         raise InputError(message + (", 0 < low" if scale == "log" else ""))
-    if "count" in given and (not isinstance(count, int) or isinstance(count, bool) or count < 2):  # noqa: PLR2004
-        message = f"{place}: count = {count!r} is not allowed; allowed: 2 <= count, whole"
-        raise InputError(message)
-    return Uniform(low, high, count, scale == "log", key.kind == "whole")
+    if "count" in given:
+        require_whole(f"{place}: count", count, 2, int(high - low) + 1 if whole else MOST_VALUES)
+    return Uniform(low, high, count, scale == "log", whole)
 
 
 _ENDS = ("low", "high")

@@ -10,12 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.keys import DENSITY, TEMPERATURE
-from thud.studies.parameters import Uniform
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.case import Ball
     from thud.studies.study import Study
 
     Columns = dict[str, NDArray[Any]]
@@ -24,19 +22,12 @@ if TYPE_CHECKING:
 def shape(study: Study) -> tuple[int, ...]:
     """Return the number of values of each parameter of a grid, or the one number of all sets."""
     if study.design == "grid":
-        return tuple(_length(parameter.spread) for parameter in study.parameters)
+        return tuple(parameter.spread.size for parameter in study.parameters)
     if study.design == "list":
-        return (_length(study.parameters[0].spread),)
+        return (study.parameters[0].spread.size,)
     if study.design == "saltelli":
         return (study.size * (len(study.parameters) + 2),)
     return (study.size,)
-
-
-def _length(spread: Any) -> int:  # noqa: ANN401 - any kind of spread
-    """Return the number of values of a grid without making them, if there may be very many."""
-    if isinstance(spread, Uniform) and not spread.whole:
-        return spread.count
-    return len(spread.grid())
 
 
 def count(study: Study) -> int:
@@ -133,7 +124,9 @@ def key_columns(study: Study, columns: Columns) -> Columns:
     found = dict(columns)
     density = found.pop(DENSITY.name, study.density)
     if density is not None:
-        found["mass"] = density * _volume(study.base.ball, found, len(_first(columns)))
+        ball = vars(study.base.ball) | found
+        volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
+        found["mass"] = density * volume * np.ones(len(_first(columns)))
     temperature = found.pop(TEMPERATURE.name, None)
     if study.temperature and temperature is not None:
         law = study.temperature
@@ -142,12 +135,12 @@ def key_columns(study: Study, columns: Columns) -> Columns:
     return found
 
 
-def _volume(ball: Ball, columns: Columns, size: int) -> NDArray[np.float64]:
-    """Return the volume of the wall, m3, shape (n_set,)."""
-    radius = columns.get("outer_radius", np.full(size, ball.outer_radius))
-    inner = radius - columns.get("wall_thickness", ball.wall_thickness)
-    volume: NDArray[np.float64] = 4 / 3 * np.pi * (radius**3 - inner**3)
-    return volume
+def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 - or arrays
+    """Return the volume of the wall of a ball, m3, from its measures, m."""
+    inner = outer_radius - wall_thickness
+    # Products of absurd radii are infinite, where their powers are errors of Python.
+    outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
+    return 4 / 3 * np.pi * (outer_cube - inner_cube)
 
 
 def _first(columns: Columns) -> NDArray[Any]:

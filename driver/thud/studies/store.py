@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.checks import replace_file, uninterrupted
+from thud.checks import replace_file, require_own, uninterrupted
 from thud.errors import InputError
 from thud.studies import sets
 from thud.studies.dataset import disk_space, grid_of, new_dataset
@@ -81,30 +81,29 @@ class Store:
     def _require_own(self, path: Path) -> None:
         """Complain about results of another study."""
         if path == self._partial:
-            # A directory without anything but a mark holds nothing that could be lost.
-            mine = set(path.iterdir()) <= {self._mark} or (
+            # A directory without blocks, whatever a kill has left there, holds nothing to be lost.
+            mine = not self._blocks() or (
                 self._mark.exists() and self._mark.read_bytes() == self._identity.encode()
             )
         else:
             with _open(path) as dataset:
                 mine = dataset.attrs.get("fingerprint") == self._study.fingerprint
-        if not mine:
-            message = (
-                f"{path} belongs to another study, or to another version of this one; "
-                f"allowed: another directory, or remove it first"
-            )
-            raise InputError(message)
+        require_own(path, mine=mine)
 
     def _require_space(self) -> None:
         """Complain about a disk that is too small."""
         free = shutil.disk_usage(self.path.parent).free
-        needed = disk_space(self._study)
+        needed = disk_space(self._study) - sum(path.stat().st_size for path in self._blocks())
         if needed > free:
             message = (
                 f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are "
                 f"free; allowed: fewer sets, or another disk"
             )
             raise InputError(message)
+
+    def _blocks(self) -> list[Path]:
+        """Return the files of the blocks that are finished, in their order."""
+        return sorted(self._partial.glob("block_*.nc"))
 
     def _block(self, start: int) -> Path:
         """Return the file of a block."""
@@ -123,25 +122,33 @@ class Store:
     def finish(self) -> None:
         """Put all blocks together, then remove them."""
         if not self.complete:
-            paths = sorted(self._partial.glob("block_*.nc"))
+            paths = self._blocks()
             if self.path.suffix == ".nc":
                 _write(grid_of(self._study, _join(paths)), self.path)
             else:
                 self._write_zarr(paths)
         shutil.rmtree(self._partial, ignore_errors=True)
+        # What a kill has left of the end of an earlier run.
+        for path in self.path.parent.iterdir():
+            if path.name.startswith(f".{self.path.name}.") and path.suffix == ".part":
+                path.unlink(missing_ok=True)
 
     def _write_zarr(self, paths: list[Path]) -> None:
         """Write a Zarr group, some variables at a time: only these have to fit into memory."""
         part = self.path.with_name(f".{self.path.name}.part")
         shutil.rmtree(part, ignore_errors=True)
-        with _named(self.path), _open(paths[0]) as first:
-            names = list(map(str, first.data_vars))
-            largest = max(variable.nbytes for variable in first.data_vars.values()) * len(paths)
-            together = max(1, 2 * LARGE // largest)
-            for i in range(0, len(names), together):
-                grid = grid_of(self._study, _join(paths, names[i : i + together]))
-                grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
-            part.rename(self.path)
+        with _open(paths[0]) as first:
+            sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
+        names = list(sizes)
+        together = max(1, 2 * LARGE // (max(sizes.values()) * len(paths)))
+        try:
+            with _named(self.path):
+                for i in range(0, len(names), together):
+                    grid = grid_of(self._study, _join(paths, names[i : i + together]))
+                    grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
+                part.rename(self.path)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -172,8 +179,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
         return _join(paths)
     if place.suffix == ".zarr":
         with _readable(place):
-            lazy: xr.Dataset = xr.open_zarr(place, consolidated=False)
-            return lazy
+            return _open_zarr(place)
     with _open(place) as dataset:
         return _loaded(dataset)
 
@@ -202,14 +208,19 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
-    """Open a file or Zarr group."""
-    with _readable(path), uninterrupted():
-        if path.suffix == ".zarr":
-            dataset = xr.open_zarr(path, consolidated=False)
-        else:
-            dataset = xr.open_dataset(path, engine="h5netcdf")
-    with dataset:
-        yield dataset
+    """Open a file or Zarr group to be read."""
+    with _readable(path):
+        with uninterrupted():
+            zarr = path.suffix == ".zarr"
+            dataset = _open_zarr(path) if zarr else xr.open_dataset(path, engine="h5netcdf")
+        with dataset:
+            yield dataset
+
+
+def _open_zarr(path: Path) -> xr.Dataset:
+    """Open a Zarr group: its arrays are read when they are needed, whether Dask is there or not."""
+    dataset: xr.Dataset = xr.open_zarr(path, consolidated=False, chunks=None)
+    return dataset
 
 
 @contextmanager
@@ -217,7 +228,7 @@ def _readable(path: Path) -> Iterator[None]:
     """Complain about what is not a dataset."""
     try:
         yield
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
         message = f"{path} cannot be read; allowed: results of a study, or remove it"
         raise InputError(message) from error
 

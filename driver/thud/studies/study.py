@@ -4,24 +4,24 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
+
+import numpy as np
 
 import thud
 from thud.case import Case, read_case
-from thud.checks import require_kind
+from thud.checks import require_kind, require_words
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
 from thud.models import FiniteElement, new_model
-from thud.studies.designs import read_design, require_words
+from thud.studies.designs import makers, read_design
 from thud.studies.parameters import Parameter, checked, new_parameter
 from thud.units import power_of
-
-if TYPE_CHECKING:
-    import os
 
 # What `read_study` reads.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
@@ -94,8 +94,8 @@ class Study:
     @property
     def fingerprint(self) -> str:
         """What tells studies with other results apart; comments and formats do not count."""
-        parts = repr(replace(self, format=""))
-        return hashlib.sha256(f"{thud.__version__} {parts}".encode()).hexdigest()
+        versions = {"thud_version": thud.__version__, **makers(self.design)}
+        return hashlib.sha256(f"{versions} {replace(self, format='')}".encode()).hexdigest()
 
 
 def read_study(source: Source, kind: str = "sweep") -> Study:
@@ -124,19 +124,40 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
             raise InputError(message)
         return source
     if isinstance(source, Mapping):
-        text = json.dumps(source, default=repr)
-        return _new_study(dict(source), kind, Path(), "python", text)
+        text = _text(source)
+        return _new_study(json.loads(text), kind, Path(), "python", text)
     require_kind("study", source, str | Path)
     path = Path(source)
     try:
         content = path.read_text(encoding="utf-8")
         return _new_study(tomllib.loads(content), kind, path.parent, path.stem, content)
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        message = f"{path}: {error}; allowed: TOML"
-        raise InputError(message) from error
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
+    except ValueError as error:  # no TOML, no UTF-8, or a number of thousands of digits
+        message = f"{path}: {error}; allowed: TOML"
+        raise InputError(message) from error
+
+
+def _text(source: Mapping[str, Any]) -> str:
+    """Return what would stand in a file as JSON, whatever kinds of numbers and tables it has."""
+    try:
+        return json.dumps(source, default=_plain)
+    except (TypeError, ValueError, RecursionError) as error:
+        message = f"the study is no text ({error}); allowed: tables, lists, numbers and text"
+        raise InputError(message) from error
+
+
+def _plain(value: object) -> object:
+    """Return tables, paths, and numbers and arrays of NumPy as what JSON knows."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    message = f"an object of {type(value).__name__}"
+    raise TypeError(message)
 
 
 def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: str) -> Study:
@@ -152,6 +173,7 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
         or not name.strip()
         or not name.isprintable()
         or Path(name).name != name
+        or name == ".."
     ):
         message = f"name = {name!r} is not allowed; allowed: the name of a file, without folders"
         raise InputError(message)
@@ -159,13 +181,11 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
     if written not in FORMATS:
         message = f"format = {written!r} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
-    base, density = _fix(_base_case(given, folder), given.get("fixed", {}))
+    fixed = given.get("fixed", {})
+    base, density = _fix(_base_case(given, folder), fixed)
     parameters = _parameters(given.get("parameters", {}), base)
+    _require_use(fixed, given["parameters"])
     temperature = _temperature(given.get("temperature"), parameters)
-    names = {parameter.name for parameter in parameters}
-    if "mass" in names and (density is not None or DENSITY.name in names):
-        message = "mass and density are both given; allowed: one of them"
-        raise InputError(message)
     design, size, seed = read_design(given.get("design", {}), kind, parameters)
     return Study(
         name, kind, base, parameters, design, size, seed, density, temperature, written, text
@@ -211,10 +231,22 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
         else:
             values[name] = checked(place, key, value, power)
     density = values.pop(DENSITY.name, None)
-    if density is not None and "mass" in values:
-        message = "[fixed] mass and density are both given; allowed: one of them"
-        raise InputError(message)
     return put(case, values), density  # type: ignore[return-value]
+
+
+def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
+    """Complain about keys that others overrule."""
+    if {"mass", DENSITY.name} <= {*fixed, *parameters}:
+        message = "mass and density are both given; allowed: one of them"
+        raise InputError(message)
+    for name in fixed:
+        # A fixed value may be the middle of a normal distribution.
+        if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
+            message = (
+                f"[fixed] {name} has no use beside [parameters] {name}; "
+                f"allowed: one of them, or std without mean in [parameters]"
+            )
+            raise InputError(message)
 
 
 def _parameters(given: Mapping[str, Any], base: Case) -> tuple[Parameter, ...]:

@@ -1,0 +1,228 @@
+"""Stores of studies: whatever ends a study, nothing finished is lost and nothing is mixed up."""
+
+from __future__ import annotations
+
+import resource
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import thud
+from thud import cli
+from thud.studies import evaluation
+from thud.studies.dataset import disk_space
+from thud.studies.store import Store
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import xarray as xr
+
+HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
+# Several blocks of the modal ball, about one second.
+LONG = """
+name = "long"
+fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 48, rings = 20 }
+design = { kind = "random", size = 400, seed = 4 }
+parameters = { height = { low = 0.9, high = 1.1 } }
+"""
+
+
+def values(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset without the date of its making."""
+    return dataset.drop_attrs(deep=False).load()
+
+
+def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    expected = values(thud.sweep(HEIGHTS))
+    found = thud.sweep({"name": "a", **HEIGHTS, "format": "zarr"}, tmp_path)
+    assert (tmp_path / "a.zarr").is_dir()
+    assert values(found).identical(expected)
+    # Whatever is larger than a byte is Zarr now, and written one variable at a time.
+    monkeypatch.setattr("thud.studies.store.LARGE", 1)
+    found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
+    assert values(found).identical(expected)
+
+
+def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "six.toml"
+    path.write_text('format = "zarr"\nparameters.height.values = [0.5, 0.6, 0.7, 0.8, 0.9, 1]')
+    assert cli.main(["sweep", str(path), "-o", str(tmp_path)]) == 0
+    assert "conforming sets" in capsys.readouterr().out
+    assert (tmp_path / "six.zarr").is_dir()
+
+
+# h5netcdf stumbles over what it could not open when it throws it away.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_damaged_results_are_told(tmp_path: Path) -> None:
+    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
+    whole = (tmp_path / "a.nc").read_bytes()
+    told = 0
+    for place in range(0, len(whole), 256):
+        path = tmp_path / f"{place}.nc"
+        path.write_bytes(whole[:place] + bytes([255] * 64) + whole[place + 64 :])
+        try:
+            thud.read_sweep(path)
+        except thud.InputError as error:
+            told += 1
+            assert f"{path} cannot be read; allowed: results of a" in str(error)
+    assert 0 < told < len(whole) // 256
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
+    """Return the results of the long study, computed at a stretch."""
+    path = tmp_path_factory.mktemp("whole") / "long.toml"
+    path.write_text(LONG)
+    return thud.sweep(path)
+
+
+def start(study: str, folder: Path) -> subprocess.Popen[str]:
+    """Start a study in a process of its own, and return when it has finished some of its sets."""
+    (folder / "long.toml").write_text(study)
+    command = [sys.executable, "-m", "thud.cli", "sweep", "long.toml", "-q", "-o", "."]
+    command += ["--workers", "1"]
+    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 30
+    while not list(folder.glob("long.partial/block_*.nc")):
+        assert process.poll() is None
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    return process
+
+
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
+def test_ended_study_goes_on_where_it_stopped(
+    end: signal.Signals, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process = start(LONG, tmp_path)
+    process.send_signal(end)
+    _, errors = process.communicate()
+    if end == signal.SIGINT:
+        assert process.returncode == 130
+        assert errors == "thud-driver: interrupted; what was finished is kept\n"
+    else:
+        assert process.returncode == -signal.SIGKILL
+    assert not (tmp_path / "long.nc").exists()
+    finished = thud.read_sweep(tmp_path / "long.partial")
+    assert 0 < finished.sizes["set"] < 400
+    known = np.isin(whole["height"], finished["height"])
+    assert values(finished).identical(values(whole.isel(set=known)))
+
+    computed = []
+    evaluate = evaluation.evaluate
+
+    def count(block: evaluation.Block, threads: int) -> dict[str, Any]:
+        computed.append(len(block.columns["height"]))
+        return evaluate(block, threads)
+
+    monkeypatch.setattr("thud.studies.backends.evaluate", count)
+    # What is finished needs no space again.
+    left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
+    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
+    resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
+    assert sum(computed) == 400 - finished.sizes["set"]
+    assert values(resumed).identical(values(whole))
+    assert not (tmp_path / "long.partial").exists()
+    again = thud.sweep(tmp_path / "long.toml", tmp_path)
+    assert again.identical(resumed)
+    assert sum(computed) == 400 - finished.sizes["set"]
+
+
+def test_full_disk_is_told_and_loses_nothing(
+    whole: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "long.toml").write_text(LONG)
+    arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    size = evaluation.block_size(thud.read_study(tmp_path / "long.toml").base)
+    blocks = -(-whole.sizes["set"] // size)
+    assert blocks > 1
+    block, end = (
+        len(bytes(part.to_netcdf(engine="h5netcdf")))
+        for part in (whole.isel(set=slice(0, size)), whole)
+    )
+    # The disk is full for the first block already, then for the end, which is larger.
+    for limit, partial in ((block // 2, 0), ((block + end) // 2, blocks)):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+        try:
+            assert cli.main(arguments) == 1
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        errors = capsys.readouterr().err
+        assert "File too large; allowed: a place that you may write to" in errors
+        assert errors.count("\n") == 1
+        assert len(list(tmp_path.glob("long.partial/*.nc"))) == partial
+        assert not list(tmp_path.rglob(".*part"))
+    assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
+
+
+def test_disk_that_is_full_for_zarr_is_told_and_loses_nothing(
+    whole: xr.Dataset,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    path = tmp_path / "long.toml"
+    path.write_text('format = "zarr"' + LONG)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    write = Store._write_zarr  # noqa: SLF001
+
+    def without_space(store: Store, paths: list[Path]) -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
+        try:
+            write(store, paths)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "_write_zarr", without_space)
+        assert cli.main(["sweep", str(path), "-q", "-o", str(tmp_path)]) == 1
+    errors = capsys.readouterr().err
+    assert "File too large; allowed: a place that you may write to" in errors
+    assert errors.count("\n") == 1
+    assert sorted(found.name for found in tmp_path.iterdir()) == ["long.partial", "long.toml"]
+    assert thud.read_sweep(tmp_path / "long.partial").sizes["set"] == 400
+
+    def compute_again(*_: object) -> None:
+        pytest.fail("all sets were kept")
+
+    monkeypatch.setattr("thud.studies.backends.evaluate", compute_again)
+    assert values(thud.sweep(path, tmp_path)).identical(values(whole))
+
+
+def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
+    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
+    before = (tmp_path / "a.nc").read_bytes()
+    other = {"name": "a", "parameters": {"height": {"values": [1]}}}
+    with pytest.raises(thud.InputError, match=r"a\.nc belongs to another study.*allowed: another"):
+        thud.sweep(other, tmp_path)
+    (tmp_path / "a.nc").rename(tmp_path / "b.nc")
+    with pytest.raises(thud.InputError, match=r"b\.nc belongs to another study"):
+        thud.sweep({**other, "name": "b"}, tmp_path)
+    assert (tmp_path / "b.nc").read_bytes() == before
+    (tmp_path / "c.nc").write_text("no dataset")
+    with pytest.raises(thud.InputError, match=r"c\.nc cannot be read; allowed: "):
+        thud.sweep({**other, "name": "c"}, tmp_path)
+    (tmp_path / "d.partial").mkdir()
+    (tmp_path / "d.partial/study").write_text("something else")
+    (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
+    with pytest.raises(thud.InputError, match=r"d\.partial belongs to another study"):
+        thud.sweep({**other, "name": "d"}, tmp_path)
+    assert len(list((tmp_path / "d.partial").iterdir())) == 2
+    (tmp_path / "e.partial").mkdir()
+    (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
+    # Kills leave half a file.
+    (tmp_path / "e.partial/.study.7.part").write_text("")
+    (tmp_path / ".e.nc.7.part").write_text("")
+    with pytest.raises(thud.InputError, match="holds no finished sets"):
+        thud.read_sweep(tmp_path / "e.partial")
+    assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
+    assert not list(tmp_path.glob(".e.*"))
