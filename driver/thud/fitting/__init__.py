@@ -7,10 +7,10 @@
 1800000
 """
 
+from thud.fitting.answer import Fit
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.level_target import LevelTarget, release
 from thud.fitting.parameters import Parameter, known_parameters, with_values
-from thud.fitting.result import Fit
 from thud.fitting.search import fit
 from thud.fitting.study import read_study, run
 

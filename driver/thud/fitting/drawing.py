@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from thud.fitting.result import Fit
+    from thud.fitting.result import Estimates
 
 # More parameters than that are drawn as a table of correlations.
 MOST_PANELS = 5
@@ -34,7 +34,7 @@ VISIBLE = 0.003
 BEFORE, AFTER = 0.15, 0.4
 
 
-def target_and_fit(fit: Fit) -> Figure:
+def target_and_fit(fit: Estimates) -> Figure:
     """Draw target and model, and below it their difference over the uncertainty.
 
     Parameters
@@ -61,7 +61,7 @@ def target_and_fit(fit: Fit) -> Figure:
     return figure
 
 
-def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
+def _draw_force(fit: Estimates, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
     """Draw record, fit and residual."""
     column = misfit.history_columns(fit.impact, fit.time_shift)
     time = 1e3 * column["time_s"]
@@ -92,7 +92,7 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     legend_above(above, 2, "lower right")
 
 
-def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
+def _draw_levels(fit: Estimates, above: Axes, below: Axes) -> None:
     """Draw levels with their uncertainty, and whatever else was compared in the residuals."""
     column = fit.misfit.columns(fit.impact, 0.0)
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
@@ -140,7 +140,7 @@ def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     above.legend(fontsize=SIZE - 1, frameon=False)
 
 
-def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
+def confidence(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> Figure:
     """Draw joint confidence regions of pairs of parameters, or their correlations.
 
     Parameters
@@ -180,7 +180,7 @@ def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
 
 
 def _draw_pair(
-    fit: Fit, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
+    fit: Estimates, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
 ) -> None:
     """Draw the joint confidence region of two parameters around their values."""
     factor = np.array([units[fit.names[i]][1] for i in pair])
@@ -226,7 +226,7 @@ def _add_ellipse(axes: Axes, centre: NDArray[np.float64], block: NDArray[np.floa
     )
 
 
-def _draw_correlation(fit: Fit) -> Figure:
+def _draw_correlation(fit: Estimates) -> Figure:
     """Draw the correlations of all parameters as a table of colours."""
     figure = Figure(figsize=(WIDTH, WIDTH), dpi=300, layout="constrained")
     axes = figure.add_subplot()

@@ -1,26 +1,20 @@
-"""The answer of a fit."""
+"""The answer of a fit in numbers."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud._library import version
-from thud.case import write_case
-from thud.checks import replace_file
 from thud.fitting.inference import coverage_factor
 from thud.fitting.parameters import handy_unit
 from thud.tables import aligned
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Mapping
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.case import Case
@@ -31,7 +25,7 @@ SHIFT = "time_shift"
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Estimates:
     """Parameters of a model that fit a target best, and how well they are known; SI units.
 
     Attributes
@@ -202,15 +196,6 @@ class Fit:
         """Return the fit as text, with its warnings."""
         return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
 
-    def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
-        """Return the figures by name; `units` as in `table`."""
-        from thud.fitting import drawing  # noqa: PLC0415 - matplotlib takes its time
-
-        figures = {"fit": drawing.target_and_fit(self)}
-        if len(self.names) > 1:
-            figures["confidence"] = drawing.confidence(self, self.shown_units(units))
-        return figures
-
     def summary(self) -> dict[str, Any]:
         """Return the numbers of the fit as JSON can hold them: what is not finite is None."""
         intervals = self.intervals()
@@ -240,57 +225,6 @@ class Fit:
             "converged": self.converged,
             "warnings": list(self.warnings),
         }
-
-    def save(
-        self,
-        directory: str | os.PathLike[str],
-        units: Mapping[str, tuple[str, float]] | None = None,
-        *,
-        figures: bool = True,
-        **extra: object,
-    ) -> list[Path]:
-        """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
-
-        Older files of these names are replaced.
-
-        Parameters
-        ----------
-        directory
-            Where they are written.
-        units
-            Other units of the figures by parameter, as in `table`; files have SI units.
-        figures
-            Draw the figures too.
-        **extra
-            What ``fit.json`` is to hold besides.
-
-        Returns
-        -------
-        list of Path
-            What was written.
-
-        Raises
-        ------
-        OSError
-            Where a file cannot be written.
-        """
-        folder = Path(directory)
-        folder.mkdir(parents=True, exist_ok=True)
-        paths = [folder / "fit.json", folder / "fit.csv", folder / "fitted.nml"]
-        content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
-        replace_file(paths[0], f"{content}\n".encode())
-        columns = self.misfit.columns(self.impact, self.time_shift)
-        rows = [columns, *zip(*columns.values(), strict=True)]
-        replace_file(paths[1], "".join(f"{','.join(map(str, row))}\n" for row in rows).encode())
-        write_case(self.case, paths[2])
-        if figures:
-            from thud import plot  # noqa: PLC0415 - matplotlib takes its time
-
-            for name, figure in self.figures(units).items():
-                for ending in ("png", "svg"):
-                    paths.append(folder / f"{name}.{ending}")
-                    plot.save(figure, paths[-1])
-        return paths
 
 
 def _digits(value: float, error: float) -> int:

@@ -14,6 +14,7 @@ from tqdm import tqdm
 from thud.case import Case
 from thud.checks import LARGEST_SEED, require_kind, require_whole
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
+from thud.fitting.answer import Fit
 from thud.fitting.force_target import ForceTarget
 from thud.fitting.inference import (
     Inference,
@@ -27,7 +28,7 @@ from thud.fitting.inference import (
 from thud.fitting.level_target import LevelTarget
 from thud.fitting.objective import SHIFT_SCALE, STEP, Objective
 from thud.fitting.parameters import get_ranges, handy_unit
-from thud.fitting.result import SHIFT, Fit
+from thud.fitting.result import SHIFT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

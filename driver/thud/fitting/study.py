@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-    from thud.fitting.result import Fit
+    from thud.fitting.answer import Fit
 
 OPTIONS = ("level", "starts", "seed", "max_steps")
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
