@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 Kind = Literal["real", "whole", "choice", "flag", "list"]
 Value = float | int | str | bool
 
-# What every model shares; and what says how results are written, which no set can change.
+# What every model shares; and what says which files a run writes, which does nothing for a set.
 SHARED = ("ball", "drop", "sampling", "levels", "limits")
-_NOT_VARIED = {"bands", "snapshot_interval"}
+_OF_FILES = {"snapshot_interval"}
 
 _LINE = re.compile(
     r"^(?:! )?&(?P<group>\w+)$"
@@ -107,7 +107,7 @@ def known_keys(model: str) -> Mapping[str, Key]:
     """Return the keys that sets of a model may differ in, by their names."""
     groups = {*SHARED, *(group_of(model, option) for option in dataclasses.fields(MODELS[model]))}
     known = {
-        key.name: key for key in key_table() if key.group in groups and key.name not in _NOT_VARIED
+        key.name: key for key in key_table() if key.group in groups and key.name not in _OF_FILES
     }
     return MappingProxyType(known | {key.name: key for key in (DENSITY, TEMPERATURE)})
 

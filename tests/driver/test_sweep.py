@@ -21,6 +21,7 @@ import thud
 from thud import cli, tables, units
 from thud.keys import known_keys
 from thud.studies import designs, evaluation, run, sets
+from thud.studies.sweep_figure import draw_sweep
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
@@ -61,6 +62,25 @@ def test_grid_holds_what_single_drops_give() -> None:
                 assert bool(cell["conforms"]) == verdict.conforms
                 margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
                 assert float(cell["margin"]) == pytest.approx(min(margins), abs=1e-6)
+
+
+@pytest.mark.parametrize("model", ["hollow_sphere", "modal_ball"])
+@pytest.mark.parametrize("bands", ["third", "both"])
+def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
+    study = {
+        "fixed": {"model": model, "bands": bands},
+        "parameters": {"height": {"values": [0.5, 1.0]}, "mass": {"values": [2.4, 2.5, 2.6]}},
+    }
+    found = thud.sweep(study, tmp_path)
+    assert found["floor_third_level"].dims == ("height", "mass", "third")
+    assert found["third"].values.tolist() == thud.get_bands("third").nominal.tolist()
+    assert found["elastic_level"].dims == ("height", "mass", "octave")
+    impact = thud.solve(thud.Ball(mass=2.6), thud.Drop(height=0.5), model)
+    for force in ("elastic", "floor"):
+        for name, kind in ((f"{force}_level", "octave"), (f"{force}_third_level", "third")):
+            cell = found[name].sel(height=0.5, mass=2.6)
+            np.testing.assert_allclose(cell, impact.levels(kind, force=force), atol=1e-6)
+    assert draw_sweep(found).axes
 
 
 def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
@@ -342,7 +362,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.substeps = {std=1}", "allowed: values"),
         ("parameters.momentum_flux.values = ['some']", "allowed: 'momentum_balance', 'retarding'"),
         ("parameters.momentum_flux = {low=1, high=2}", "is not a number; allowed: values"),
-        ("parameters.bands.values = ['third']", "'bands' is not a key"),
+        ("parameters.bands.values = ['third']", r"allowed: bands in \[fixed\]"),
         ("fixed.hight = 1\nparameters.mass.values = [1]", "'hight' is not a key"),
         ("fixed.model = 'cube'\nparameters.mass.values = [1]", "allowed: 'hollow_sphere', 'modal"),
         ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),

@@ -14,7 +14,7 @@ from thud._library import compiler
 from thud.levels import get_bands
 from thud.studies import sets
 from thud.studies.designs import makers
-from thud.studies.evaluation import SCALARS, block_size
+from thud.studies.evaluation import SCALARS, block_size, level_names
 from thud.studies.parameters import Uniform
 from thud.units import power_of
 
@@ -28,13 +28,17 @@ MEANINGS = {
     **SCALARS,
     "elastic_level": ("dB", _LEVEL.format("elastic")),
     "floor_level": ("dB", _LEVEL.format("floor")),
+    "elastic_third_level": ("dB", _LEVEL.format("elastic")),
+    "floor_third_level": ("dB", _LEVEL.format("floor")),
     "margin": ("dB", "least distance of the judged octave levels to a limit, positive inside"),
     "conforms": ("1", "all criteria of the standard are met"),
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
 }
-# Bytes of a set on disk besides its parameters, and of a file itself.
-_SET_BYTES = 175
+# Coordinates that are no parameters.
+BANDS = ("octave", "third")
+# Bytes of a set on disk besides its levels and parameters, and of a file itself.
+_SET_BYTES = 95
 _FILE_BYTES = 27_000
 
 
@@ -42,7 +46,8 @@ def disk_space(study: Study) -> int:
     """Return about how many bytes the results of a study need, those of its blocks included."""
     total = sets.count(study)
     files = 1 - (-total // block_size(study.base))
-    return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * len(study.parameters))
+    levels = sum(len(get_bands(bands).nominal) for _, bands in level_names(study.base).values())
+    return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * (levels + len(study.parameters)))
 
 
 def coordinate(parameter: Parameter) -> str:
@@ -66,11 +71,13 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
     Returns
     -------
     Dataset
-        Of the dimensions ``set`` and ``octave``.
+        Of the dimensions ``set`` and ``octave``, and ``third`` where the case wants them.
     """
-    nominal = get_bands().nominal
-    octave = ("octave", nominal, {"units": "Hz", "long_name": "nominal mid frequency"})
-    coordinates: dict[str, Any] = {"octave": octave}
+    levels = level_names(study.base)
+    coordinates: dict[str, Any] = {
+        bands: (bands, get_bands(bands).nominal, {"units": "Hz", "long_name": "nominal frequency"})
+        for _, bands in levels.values()
+    }
     for parameter in study.parameters:
         values = columns[parameter.name]
         if not parameter.numeric and values.dtype.kind == "U":
@@ -79,7 +86,7 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
     variables = {}
     for name, values in found.items():
         unit, meaning = MEANINGS[name]
-        dimensions = ("set", "octave") if values.ndim > 1 else ("set",)
+        dimensions = ("set", levels[name][1]) if name in levels else ("set",)
         variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
     return xr.Dataset(variables, coordinates, provenance(study))
 
@@ -145,5 +152,5 @@ def grid_of(study: Study, dataset: xr.Dataset) -> xr.Dataset:
         )
         for name, variable in dataset.data_vars.items()
     }
-    octave = {"octave": dataset["octave"]} if "octave" in dataset.coords else {}
-    return xr.Dataset(variables, {**octave, **axes}, dataset.attrs)
+    bands = {name: dataset[name] for name in BANDS if name in dataset.coords}
+    return xr.Dataset(variables, {**bands, **axes}, dataset.attrs)

@@ -79,7 +79,8 @@ def evaluate(block: Block, threads: int = 1) -> Columns:
     Returns
     -------
     dict of str to ndarray, shape (n_set,) or (n_set, 5)
-        The `SCALARS`; ``elastic_level`` and ``floor_level`` of each octave, dB; ``margin``, the
+        The `SCALARS`; ``elastic_level`` and ``floor_level`` of each octave, dB, and where the case
+        wants them ``elastic_third_level`` and ``floor_third_level``; ``margin``, the
         least distance of the judged force's levels to a limit, dB; ``conforms``; ``status``, 0 or
         the exit code of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
 
@@ -102,12 +103,15 @@ def evaluate(block: Block, threads: int = 1) -> Columns:
 def _one_by_one(base: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
     """Compute sets by the single solver."""
     size = len(next(iter(columns.values())))
-    found = _empty(size)
+    found = _empty(size, base)
     for i in range(size):
         try:
             case = put(base, {name: values[i].item() for name, values in columns.items()})
             impact = solve_case(case)
-            levels = {force: impact.levels(force=force) for force in FORCES}
+            levels = {
+                name: impact.levels(bands=bands, force=force)
+                for name, (force, bands) in level_names(base).items()
+            }
             verdict = impact.conformity()
         except ThudError as error:
             found["status"][i] = error.exit_code
@@ -115,18 +119,30 @@ def _one_by_one(base: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
             continue
         for name in SCALARS:
             found[name][i] = getattr(impact, name)
-        for force in FORCES:
-            found[f"{force}_level"][i] = levels[force]
+        for name, values in levels.items():
+            found[name][i] = values
         octaves = verdict.criteria[:OCTAVES]
         found["margin"][i] = min(min(o.value - o.lower, o.upper - o.value) for o in octaves)
         found["conforms"][i] = verdict.conforms
     return found
 
 
-def _empty(size: int) -> Columns:
+def level_names(base: Case) -> dict[str, tuple[str, str]]:
+    """Return force and bands of the levels that each set has, by their names.
+
+    The octaves serve the verdict also where the case wants thirds only.
+    """
+    names = {f"{force}_level": (force, "octave") for force in FORCES}
+    if base.levels.bands != "octave":
+        names |= {f"{force}_third_level": (force, "third") for force in FORCES}
+    return names
+
+
+def _empty(size: int, base: Case) -> Columns:
     """Return columns for the results of sets: not a number, not conforming, no error."""
     found: Columns = {name: np.full(size, np.nan) for name in (*SCALARS, "margin")}
-    found |= {f"{force}_level": np.full((size, OCTAVES), np.nan) for force in FORCES}
+    for name, (_, bands) in level_names(base).items():
+        found[name] = np.full((size, len(get_bands(bands).nominal)), np.nan)
     found["conforms"] = np.zeros(size, dtype=bool)
     found["status"] = np.zeros(size, dtype=np.int8)
     found["reason"] = np.full(size, "", dtype=object)
@@ -154,16 +170,19 @@ def _by_ensemble(base: Case, columns: Columns, threads: int) -> Columns:
     """Compute sets by the ensemble of the shell model."""
     shared = vars(base.ball) | vars(base.drop) | vars(base.model)
     source = base.limits.source
+    names = level_names(base)
+    widest = "third" if "elastic_third_level" in names else "octave"
     ensemble = thud.solve_many(
-        shared | columns, threads=threads, source=source, **vars(base.sampling)
+        shared | columns, threads=threads, bands=widest, source=source, **vars(base.sampling)
     )
-    found = _empty(len(next(iter(columns.values()))))
+    found = _empty(len(next(iter(columns.values()))), base)
     for name in SCALARS:
         found[name][:] = getattr(ensemble, name)
     judged_by_floor = base.levels.force == "floor"
     found["conforms"][:] = ensemble.floor_conforms if judged_by_floor else ensemble.conforms
-    for force in FORCES:
-        found[f"{force}_level"][:] = getattr(ensemble, f"{force}_levels")
+    for name, (force, bands) in names.items():
+        kind = "octaves" if bands == "octave" else "levels"
+        found[name][:] = getattr(ensemble, f"{force}_{kind}")
     lower, upper = octave_limits(source)
     judged = found[f"{base.levels.force}_level"]
     found["margin"][:] = np.minimum(judged - lower, upper - judged).min(axis=1)

@@ -254,6 +254,9 @@ def _parameters(given: Mapping[str, Any], base: Case) -> tuple[Parameter, ...]:
     if not given:
         message = "[parameters] is empty; allowed: one parameter or more"
         raise InputError(message)
+    if "bands" in given:
+        message = "[parameters] bands is not allowed; allowed: bands in [fixed], alike for all sets"
+        raise InputError(message)
     model = base.model.name  # type: ignore[union-attr]
     return tuple(
         new_parameter(name, spread, model, value_in(base, name)) for name, spread in given.items()

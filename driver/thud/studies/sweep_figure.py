@@ -11,6 +11,7 @@ from thud.impact import FORCES
 from thud.levels import get_bands, octave_limits
 from thud.plot import COLOURS, COMPACT, LINES, MARKERS, SIZE, WIDTH, dress
 from thud.studies.axes import plain_words, show_parameter, words
+from thud.studies.dataset import BANDS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,7 +87,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
 
 def _columns(dataset: xr.Dataset) -> Columns:
     """Return the parameters of each set."""
-    names = [str(name) for name in dataset.coords if name != "octave"]
+    names = [str(name) for name in dataset.coords if name not in BANDS]
     whole = dataset["status"]
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
 
