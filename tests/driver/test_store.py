@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,6 @@ from thud.studies.dataset import disk_space
 from thud.studies.store import Store
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
@@ -84,11 +83,11 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     return thud.sweep(path)
 
 
-def start(study: str, folder: Path) -> subprocess.Popen[str]:
+def start(study: str, folder: Path, *more: str) -> subprocess.Popen[str]:
     """Start a study in a process of its own, and return when it has finished some of its sets."""
     (folder / "long.toml").write_text(study)
     command = [sys.executable, "-m", "thud.cli", "sweep", "long.toml", "-q", "-o", "."]
-    command += ["--workers", "1"]
+    command += ["--workers", "1", *more]
     process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 30
     while not list(folder.glob("long.partial/block_*.nc")):
@@ -226,3 +225,35 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
         thud.read_sweep(tmp_path / "e.partial")
     assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1
     assert not list(tmp_path.glob(".e.*"))
+
+
+def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
+    study = thud.read_study(HEIGHTS)
+    with (
+        Store(tmp_path, study, 4),
+        pytest.raises(thud.InputError, match="is being computed; allowed: wait, or another"),
+    ):
+        thud.sweep(study, tmp_path)
+    assert thud.sweep(study, tmp_path).sizes["height"] == 2
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes that a process has started."""
+    return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_killed_study_leaves_no_process(tmp_path: Path) -> None:
+    process = start(LONG, tmp_path, "--backend", "processes")
+    started = children(process.pid)
+    assert started
+    process.kill()
+    process.communicate(timeout=30)
+    deadline = time.monotonic() + 10
+    while any(
+        Path(f"/proc/{pid}/status").exists()
+        and "Z (zombie)" not in Path(f"/proc/{pid}/status").read_text()
+        for pid in started
+    ):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)

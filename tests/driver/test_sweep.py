@@ -363,6 +363,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.momentum_flux.values = ['some']", "allowed: 'momentum_balance', 'retarding'"),
         ("parameters.momentum_flux = {low=1, high=2}", "is not a number; allowed: values"),
         ("parameters.bands.values = ['third']", r"allowed: bands in \[fixed\]"),
+        ("fixed.mass = -2\nparameters.height.values = [1]", "allowed: 0 to 1e\\+06 kg"),
         ("fixed.hight = 1\nparameters.mass.values = [1]", "'hight' is not a key"),
         ("fixed.model = 'cube'\nparameters.mass.values = [1]", "allowed: 'hollow_sphere', 'modal"),
         ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),

@@ -14,7 +14,8 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context
+from multiprocessing import connection, get_context, parent_process
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole, shown
@@ -146,13 +147,22 @@ def _open(
         return
     # Processes that were forked would share locks of threads that they do not have.
     context = get_context("spawn")
-    with ProcessPoolExecutor(width, context, initializer=_ignore_interrupts) as processes:
+    with ProcessPoolExecutor(width, context, initializer=_follow_parent) as processes:
         yield processes, width
 
 
-def _ignore_interrupts() -> None:
-    """Leave interrupts to the process that started this one."""
+def _follow_parent() -> None:
+    """Leave interrupts to the process that started this one, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    assert parent is not None  # noqa: S101 - this runs in processes that were started
+
+    def end_with_it() -> None:
+        # A parent that is killed tells nobody.
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+    Thread(target=end_with_it, daemon=True).start()
 
 
 @contextmanager

@@ -205,6 +205,25 @@ def checked(place: str, key: Key, value: object, power: int) -> Value:
     raise InputError(message)
 
 
+def within(place: str, key: Key, value: object, power: int) -> Value:
+    """Return one value in the unit of its key, in the range that the library takes at most.
+
+    Raises
+    ------
+    InputError
+        Where the key takes no such value.
+    """
+    found = checked(place, key, value, power)
+    if isinstance(found, int | float) and not key.lower <= found <= key.upper:
+        unit = f" {key.unit}" if key.unit else ""
+        message = (
+            f"{place} = {shown(value)} is not allowed; "
+            f"allowed: {key.lower:g} to {key.upper:g}{unit}"
+        )
+        raise InputError(message)
+    return found
+
+
 def _is_number(value: object) -> bool:
     """Return whether a value is a finite number that a float holds."""
     if isinstance(value, bool) or not isinstance(value, int | float):

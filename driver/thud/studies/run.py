@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from contextlib import nullcontext
 from typing import TYPE_CHECKING, TypedDict
 
 import numpy as np
@@ -99,24 +100,25 @@ def sweep(  # noqa: PLR0913 - a study has a place, a backend and a face
     size = block_size(plan.base)
     store = Store(output, plan, size) if output is not None else None
     memory: dict[int, Columns] = {}
-    if not (store and store.complete):
-        starts = [start for start in range(0, total, size) if not (store and store.has(start))]
-        left = sum(min(size, total - start) for start in starts)
-        with tqdm(
-            total=total, initial=total - left, unit="set", disable=not progress, file=sys.stderr
-        ) as bar:
 
-            def keep(block: Block, found: Columns) -> None:
-                if store:
-                    store.keep(block, found)
-                else:
-                    memory[block.start] = found
-                bar.update(len(found["status"]))
+    def keep(block: Block, found: Columns) -> None:
+        if store:
+            store.keep(block, found)
+        else:
+            memory[block.start] = found
+        bar.update(len(found["status"]))
 
-            run_blocks(_blocks(plan, starts, size), keep, backend, workers, scheduler)
-    if store:
-        store.finish()
-        return read_sweep(store.path)
+    with store or nullcontext():
+        if not (store and store.complete):
+            starts = [start for start in range(0, total, size) if not (store and store.has(start))]
+            left = sum(min(size, total - start) for start in starts)
+            with tqdm(
+                total=total, initial=total - left, unit="set", disable=not progress, file=sys.stderr
+            ) as bar:
+                run_blocks(_blocks(plan, starts, size), keep, backend, workers, scheduler)
+        if store:
+            store.finish()
+            return read_sweep(store.path)
     whole = {
         name: np.concatenate([memory[start][name] for start in sorted(memory)])
         for name in memory[0]

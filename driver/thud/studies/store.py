@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import xarray as xr
 
@@ -15,7 +17,6 @@ from thud.studies import sets
 from thud.studies.dataset import disk_space, grid_of, new_dataset
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterator
 
     from thud.studies.evaluation import Block
@@ -27,7 +28,7 @@ LARGE = 256 * 2**20
 
 
 class Store:
-    """The directory of a study.
+    """The directory of a study; a context in which no other process computes it.
 
     Parameters
     ----------
@@ -49,6 +50,7 @@ class Store:
     def __init__(self, folder: str | os.PathLike[str], study: Study, size: int) -> None:
         self._study = study
         self._size = size
+        self._descriptor: int | None = None
         large = disk_space(study) > LARGE
         ending = "zarr" if study.format == "zarr" or (large and study.format == "auto") else "nc"
         self.path = Path(folder) / f"{study.name}.{ending}"
@@ -62,6 +64,33 @@ class Store:
                 self._require_space()
                 self._partial.mkdir(exist_ok=True)
                 replace_file(self._mark, self._identity.encode())
+
+    def __enter__(self) -> Self:
+        """Keep other runs of the study away.
+
+        Raises
+        ------
+        InputError
+            Where one of them is at work.
+        """
+        # The directory is gone where another run has just finished; not every disk has locks.
+        with suppress(FileNotFoundError):
+            self._descriptor = os.open(self._partial, os.O_RDONLY)
+            try:
+                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                self.__exit__()
+                message = f"{self.path} is being computed; allowed: wait, or another directory"
+                raise InputError(message) from error
+            except OSError:
+                pass
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Let others in again."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+        self._descriptor = None
 
     @property
     def _mark(self) -> Path:

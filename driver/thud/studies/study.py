@@ -20,7 +20,7 @@ from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
 from thud.models import FiniteElement, new_model
 from thud.studies.designs import makers, read_design
-from thud.studies.parameters import Parameter, checked, new_parameter
+from thud.studies.parameters import Parameter, checked, new_parameter, within
 from thud.units import power_of
 
 # What `read_study` reads.
@@ -227,9 +227,9 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
         value = given.get("value")
         if key.kind == "list" and place_in_list is None:
             entries = value if isinstance(value, list) else [value]
-            values[name] = tuple(checked(place, key, item, power) for item in entries)
+            values[name] = tuple(within(place, key, item, power) for item in entries)
         else:
-            values[name] = checked(place, key, value, power)
+            values[name] = within(place, key, value, power)
     density = values.pop(DENSITY.name, None)
     return put(case, values), density  # type: ignore[return-value]
 
