@@ -171,7 +171,7 @@ contains
       if (status == 0) allocate (room%folded(force_count*block_size*n_row), stat=status, errmsg=message)
       if (status /= 0) room%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
-         //' sets no room in memory ('//trim(message)//'); allowed: shorter records, or fewer threads')
+         //' sets no room in memory; allowed: shorter records, or fewer threads')
       nothing = 0.0_wp
       room%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_room

@@ -9,8 +9,7 @@ module thud_file
    implicit none (type, external)
    private
 
-   public :: check_owner, close_part, finish_part, get_file_stem, open_part, read_text_file, remove_parts, text_file_type
-   public :: write_files, write_part
+   public :: check_owner, get_file_stem, get_part, read_text_file, remove_parts, text_file_type, write_files, writing_error
 
    !> Size of the largest input file that is read, bytes.
    integer(int64), parameter :: largest_input = 65536_int64
@@ -80,7 +79,7 @@ contains
    end function get_file_stem
 
    !> Complains where a directory holds anything else than an earlier run of the same case.
-   subroutine check_owner(directory, names, marker, content, differs, error)
+   subroutine check_owner(directory, names, marker, content, differs, error, locked)
       !> The directory.
       character(len=*), intent(in) :: directory
       !> Names of all files that a run may write: [n_file].
@@ -93,6 +92,8 @@ contains
       logical, intent(out) :: differs
       !> The directory belongs to something else.
       type(error_type), allocatable, intent(out) :: error
+      !> The caller holds the lock on the directory.
+      logical, intent(in), optional :: locked
       type(error_type), allocatable :: unreadable
       type(lock_type) :: lock
       character(len=:), allocatable :: text
@@ -100,7 +101,7 @@ contains
       differs = .false.
       if (.not. directory_exists(directory)) return
       ! Under the lock, so that nobody is writing the parts.
-      call lock_directory(directory, lock)
+      if (.not. present(locked)) call lock_directory(directory, lock)
       call remove_parts(directory, names)
       call unlock_directory(lock)
       if (is_empty_directory(directory)) return
@@ -119,13 +120,15 @@ contains
    !>
    !> The directory is locked meanwhile; a process that dies leaves no lock and nothing but files
    !> named `.<name>.part`, which the next one replaces.
-   subroutine write_files(directory, files, error)
+   subroutine write_files(directory, files, error, ready)
       !> The directory.
       character(len=*), intent(in) :: directory
       !> The files: [n_file].
       type(text_file_type), intent(in) :: files(:)
       !> A file could not be written; then none of them was, and older ones are as they were.
       type(error_type), allocatable, intent(out) :: error
+      !> Name of one more file, whose part is written already; then the caller holds the lock.
+      character(len=*), intent(in), optional :: ready
       type(lock_type) :: lock
       integer(c_intptr_t) :: interrupt
       logical :: done, was_there
@@ -137,7 +140,7 @@ contains
          error = input_error('--output '//directory//' cannot be made; allowed: a directory that you may write to')
          return
       end if
-      call lock_directory(directory, lock)
+      if (.not. present(ready)) call lock_directory(directory, lock)
       do i = 1, size(files)
          if (directory_exists(directory//'/'//trim(files(i)%name))) then
             error = input_error('--output '//directory//': '//trim(files(i)%name) &
@@ -150,13 +153,14 @@ contains
       ! Only renaming is left to do.
       if (.not. allocated(error)) then
          call ignore_interrupts(.true., interrupt)
+         if (present(ready)) call name_part(directory, ready, error)
          do i = 1, size(files)
-            call rename_file(get_part(directory, files(i)%name), directory//'/'//trim(files(i)%name), done)
-            if (.not. done) error = replacing_error(directory, files(i)%name)
+            call name_part(directory, files(i)%name, error)
          end do
          call ignore_interrupts(.false., interrupt)
       end if
       if (allocated(error)) call remove_parts(directory, files%name)
+      if (allocated(error) .and. present(ready)) call remove_parts(directory, [ready])
       call unlock_directory(lock)
       if (allocated(error) .and. .not. was_there) call remove_file(directory)
    end subroutine write_files
@@ -173,82 +177,6 @@ contains
          call remove_file(get_part(directory, names(i)))
       end do
    end subroutine remove_parts
-
-   !> Begins a file that is too large to be held as one text; it has its name when it is finished.
-   subroutine open_part(directory, name, unit, error)
-      !> The directory, which is made where it is missing.
-      character(len=*), intent(in) :: directory
-      !> Name of the file.
-      character(len=*), intent(in) :: name
-      !> The unit.
-      integer, intent(out) :: unit
-      !> The file cannot be made.
-      type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message
-      logical :: done
-      integer :: status
-
-      message = 'the directory cannot be made'
-      status = 1
-      call make_directory(directory, done)
-      if (done) open (newunit=unit, file=get_part(directory, name), status='replace', action='write', access='stream', &
-         form='unformatted', iostat=status, iomsg=message)
-      if (status /= 0) error = writing_error(get_part(directory, name), message)
-   end subroutine open_part
-
-   !> Adds to such a file.
-   subroutine write_part(directory, name, unit, text, error)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Name of the file.
-      character(len=*), intent(in) :: name
-      !> Its unit.
-      integer, intent(in) :: unit
-      !> The text.
-      character(len=*), intent(in) :: text
-      !> It could not be written completely.
-      type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message
-      integer :: status
-
-      write (unit, iostat=status, iomsg=message) text
-      if (status == 0) flush (unit, iostat=status, iomsg=message)
-      if (status /= 0) error = writing_error(get_part(directory, name), message)
-   end subroutine write_part
-
-   !> Closes such a file; after an error it is removed, and a directory without files with it.
-   subroutine close_part(directory, name, unit, error)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Name of the file.
-      character(len=*), intent(in) :: name
-      !> Its unit.
-      integer, intent(in) :: unit
-      !> What went wrong before, or now.
-      type(error_type), allocatable, intent(inout) :: error
-      character(len=256) :: message
-      integer :: status
-
-      close (unit, iostat=status, iomsg=message)
-      if (status /= 0 .and. .not. allocated(error)) error = writing_error(get_part(directory, name), message)
-      if (.not. allocated(error)) return
-      call remove_file(get_part(directory, name))
-      if (is_empty_directory(directory)) call remove_file(directory)
-   end subroutine close_part
-
-   !> Gives such a file its name.
-   subroutine finish_part(directory, name, error)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Name of the file.
-      character(len=*), intent(in) :: name
-      !> There is something else of that name.
-      type(error_type), allocatable, intent(out) :: error
-      logical :: done
-
-      call rename_file(get_part(directory, name), directory//'/'//name, done)
-      if (.not. done) error = replacing_error(directory, name)
-   end subroutine finish_part
 
    !> Path of a file while it is written.
    pure function get_part(directory, name) result(path)
@@ -275,18 +203,21 @@ contains
          //'); allowed: a directory that you may write to, with room on its disk')
    end function writing_error
 
-   !> Error of a file that cannot have its name.
-   pure function replacing_error(directory, name) result(error)
+   !> Gives a file that is written its name, unless something went wrong before.
+   subroutine name_part(directory, name, error)
       !> The directory.
       character(len=*), intent(in) :: directory
       !> Name of the file.
       character(len=*), intent(in) :: name
-      !> The error.
-      type(error_type) :: error
+      !> What went wrong; there may be something else of that name.
+      type(error_type), allocatable, intent(inout) :: error
+      logical :: done
 
-      error = input_error('--output '//directory//': '//trim(name)//' cannot be replaced; allowed: a directory that you ' &
-         //'may write to')
-   end function replacing_error
+      if (allocated(error)) return
+      call rename_file(get_part(directory, name), directory//'/'//trim(name), done)
+      if (.not. done) error = input_error('--output '//directory//': '//trim(name)//' cannot be replaced; allowed: a ' &
+         //'directory that you may write to')
+   end subroutine name_part
 
    !> Writes one file.
    subroutine write_text_file(path, content, error)

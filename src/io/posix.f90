@@ -7,7 +7,7 @@ module thud_posix
    private
 
    public :: directory_exists, get_free_bytes, ignore_interrupts, ignore_signals, is_empty_directory, is_terminal
-   public :: lock_directory, lock_type, make_directory, print_text
+   public :: close_descriptor, lock_directory, lock_type, make_directory, open_descriptor, print_text, read_bytes
    public :: remove_file, rename_file, standard_error, standard_output, unlock_directory
 
    !> Descriptors of the process.
@@ -103,6 +103,30 @@ module thud_posix
          integer(c_intptr_t) :: written
       end function c_write
 
+      function c_open(path, flags) bind(c, name='open') result(descriptor)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+         integer(c_int) :: descriptor
+      end function c_open
+
+      function c_read(descriptor, buffer, length) bind(c, name='read') result(count)
+         import :: c_char, c_int, c_intptr_t, c_size_t
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         character(kind=c_char), intent(out) :: buffer(*)
+         integer(c_size_t), value :: length
+         integer(c_intptr_t) :: count
+      end function c_read
+
+      function c_close(descriptor) bind(c, name='close') result(status)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         integer(c_int) :: status
+      end function c_close
+
       function c_signal(number, handler) bind(c, name='signal') result(old_handler)
          import :: c_int, c_intptr_t
          implicit none (type, external)
@@ -133,6 +157,41 @@ contains
          at = at + int(written)
       end do
    end subroutine print_text
+
+   !> Opens a file, pipe or device to be read.
+   function open_descriptor(path) result(descriptor)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> The descriptor; negative where it cannot be opened.
+      integer :: descriptor
+      integer(c_int), parameter :: read_only = 0
+
+      descriptor = int(c_open(path//c_null_char, read_only))
+   end function open_descriptor
+
+   !> Reads what there is, at most as much as there is room for.
+   subroutine read_bytes(descriptor, buffer, count)
+      !> The descriptor.
+      integer, intent(in) :: descriptor
+      !> The bytes.
+      character(len=*), intent(out) :: buffer
+      !> Their number; 0 at the end, negative where they cannot be read.
+      integer, intent(out) :: count
+
+      count = int(c_read(int(descriptor, c_int), buffer, int(len(buffer), c_size_t)))
+   end subroutine read_bytes
+
+   !> Closes a descriptor.
+   subroutine close_descriptor(descriptor)
+      !> The descriptor; negative where it is closed.
+      integer, intent(inout) :: descriptor
+      integer(c_int) :: status
+
+      if (descriptor < 0) return
+      status = c_close(int(descriptor, c_int))
+      descriptor = -1
+      if (status /= 0) return
+   end subroutine close_descriptor
 
    !> Makes two signals errors of the write that causes them and not the end of the process: a file
    !> that grows beyond the limit of the process, and a pipe that nobody reads.

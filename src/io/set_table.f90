@@ -6,18 +6,16 @@ module thud_set_table
    use thud_field, only: field_type
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
+   use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_posix, only: directory_exists
    use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: close_set_table, open_set_table, read_sets, set_table_type
+   public :: open_set_table, read_sets, set_table_type
 
    !> Longest path of a file.
    integer, parameter :: path_length = 4096
-
-   !> Longest line.
-   integer, parameter :: line_length = 4096
 
    !> Number of the column that chooses the flux term, behind those of the numbers.
    integer, parameter :: flux_column = parameter_count + 1
@@ -26,10 +24,8 @@ module thud_set_table
    type :: set_table_type
       !> Path of the file.
       character(len=path_length) :: path = ''
-      !> Its unit.
-      integer :: unit = -1
-      !> Lines that were read.
-      integer :: line = 0
+      !> Its lines.
+      type(line_reader_type) :: reader
       !> Keys of all columns that there may be.
       character(len=24) :: keys(flux_column) = ''
       !> For each column of the file its place among the keys: [n_column].
@@ -47,12 +43,11 @@ contains
       !> The file cannot be read, or a key is not known or given twice.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
-      character(len=256) :: message
       character(len=:), allocatable :: key
       type(set_type), target :: set
       type(field_type) :: fields(parameter_count)
-      integer :: status, at, place
-      logical :: there
+      integer :: at, place
+      logical :: done, there
 
       table%path = path
       fields = get_set_fields(set)
@@ -62,13 +57,12 @@ contains
          error = input_error(path//': this is a directory; allowed: a table of sets')
          return
       end if
-      open (newunit=table%unit, file=path, status='old', action='read', iostat=status, iomsg=message)
-      if (status /= 0) then
-         table%unit = -1
-         error = input_error(path//': the file cannot be read ('//trim(message)//'); allowed: a table of sets')
+      call open_lines(path, table%reader, done)
+      if (.not. done) then
+         error = input_error(path//': the file cannot be read; allowed: a table of sets')
          return
       end if
-      call read_line(table, line, there, error)
+      call next_line(table, line, there, error)
       if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
          //'first line and one set in each of the others')
       at = 1
@@ -84,7 +78,7 @@ contains
          end if
          at = get_end(line, at) + 2
       end do
-      if (allocated(error)) call close_set_table(table)
+      if (allocated(error)) call close_lines(table%reader)
    end subroutine open_set_table
 
    !> The next sets.
@@ -108,7 +102,7 @@ contains
       fields = get_set_fields(set)
       n_set = 0
       do while (n_set < size(sets))
-         call read_line(table, line, there, error)
+         call next_line(table, line, there, error)
          if (allocated(error) .or. .not. there) return
          set = base
          at = 1
@@ -128,18 +122,9 @@ contains
       end do
    end subroutine read_sets
 
-   !> Closes a table.
-   subroutine close_set_table(table)
-      !> The table; one that is not open stays so.
-      type(set_table_type), intent(inout) :: table
-
-      if (table%unit /= -1) close (table%unit)
-      table%unit = -1
-   end subroutine close_set_table
-
    !> The next line with something in it.
-   subroutine read_line(table, line, there, error)
-      !> The table.
+   subroutine next_line(table, line, there, error)
+      !> The table; closed at its end.
       type(set_table_type), intent(inout) :: table
       !> The line.
       character(len=line_length), intent(out) :: line
@@ -147,30 +132,20 @@ contains
       logical, intent(out) :: there
       !> The line is too long or cannot be read.
       type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message
-      integer :: status
+      integer :: length
 
-      do
-         there = table%unit /= -1
-         if (.not. there) return
-         read (table%unit, '(a)', iostat=status, iomsg=message) line
-         if (is_iostat_end(status)) call close_set_table(table)
-         if (is_iostat_end(status)) cycle
-         table%line = table%line + 1
-         if (status /= 0) then
-            error = line_error(table, 'it cannot be read ('//trim(message)//'); allowed: a table of sets')
-         else if (line(line_length:) /= '') then
-            error = line_error(table, 'it is too long; allowed: fewer than '//to_text(line_length)//' characters')
-         end if
-         if (allocated(error)) return
-         ! Lines of other systems end with a carriage return.
-         status = len_trim(line)
-         if (status > 0) then
-            if (line(status:status) == achar(13)) line(status:status) = ' '
-         end if
-         if (line /= '' .and. line(1:1) /= '#') return
+      there = .false.
+      do while (.not. there)
+         call read_line(table%reader, line, length)
+         if (length == -1) exit
+         if (length < 0) error = input_error(trim(table%path)//': the file cannot be read; allowed: a table of sets')
+         if (length > line_length .and. line(1:1) /= '#') error = line_error(table, 'it is too long; allowed: up to ' &
+            //to_text(line_length)//' characters')
+         if (allocated(error)) exit
+         there = line /= '' .and. line(1:1) /= '#'
       end do
-   end subroutine read_line
+      if (.not. there) call close_lines(table%reader)
+   end subroutine next_line
 
    !> One value of a set.
    subroutine read_value(table, column, text, fields, flux, error)
@@ -200,6 +175,7 @@ contains
       end if
       status = 1
       if (is_number(word)) read (word, *, iostat=status, iomsg=message) number
+      if (status == 0) status = merge(0, 1, abs(number) <= huge(number))
       if (status == 0) then
          fields(column)%real_value = number
       else
@@ -245,7 +221,7 @@ contains
       !> The error, with file and line.
       type(error_type) :: error
 
-      error = input_error(trim(table%path)//', line '//to_text(table%line)//': '//message)
+      error = input_error(trim(table%path)//', line '//to_text(table%reader%line)//': '//message)
    end function line_error
 
 end module thud_set_table

@@ -7,15 +7,17 @@ module thud_sets_run
    use thud_ensemble, only: set_outcome_type, set_type
    use thud_ensemble_run, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
    use thud_error, only: error_type, input_error
-   use thud_file, only: check_owner, close_part, finish_part, open_part, text_file_type, write_files, write_part
+   use thud_file, only: check_owner, text_file_type, write_files
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
+   use thud_long_file, only: close_part, open_part, write_part
+   use thud_posix, only: directory_exists, lock_directory, lock_type, make_directory, remove_file, unlock_directory
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type
    use thud_sampling, only: get_sample_count
    use thud_set_report, only: get_band_name, get_set_header, get_set_rows
    use thud_set_status, only: set_is_fine
-   use thud_set_table, only: close_set_table, open_set_table, read_sets, set_table_type
+   use thud_set_table, only: open_set_table, read_sets, set_table_type
    use thud_text, only: fixed, newline, quoted, to_text
    implicit none (type, external)
    private
@@ -26,7 +28,7 @@ module thud_sets_run
    integer, parameter :: chunk_size = 16384
 
    !> Files of the results.
-   character(len=*), parameter :: result_file = 'sets.csv', input_file = 'effective.nml'
+   character(len=*), parameter :: result_file = 'sets.csv', input_file = 'sets.nml'
 
    !> What many sets came to.
    type :: tally_type
@@ -54,9 +56,9 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(case_type) :: case
       type(set_table_type) :: table
-      type(text_file_type) :: input(1)
       type(tally_type) :: tally
-      logical :: differs
+      type(lock_type) :: lock
+      logical :: done, was_there
 
       call load_case(path, case, error)
       if (allocated(error)) return
@@ -70,19 +72,48 @@ contains
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
       outcome%remark = ''
-      input(1)%name = input_file
-      input(1)%content = get_case_text(case)
-      call check_owner(outcome%directory, [character(len=13) :: result_file, input_file], input_file, input(1)%content, &
-         differs, error)
-      if (.not. allocated(error)) call write_sets(case, table, threads, outcome%directory, tally, error)
-      call close_set_table(table)
-      if (.not. allocated(error)) call write_files(outcome%directory, input, error)
-      if (.not. allocated(error)) call finish_part(outcome%directory, result_file, error)
+      was_there = directory_exists(outcome%directory)
+      call make_directory(outcome%directory, done)
+      if (.not. done) then
+         error = input_error('--output '//outcome%directory//' cannot be made; allowed: a directory that you may write to')
+         return
+      end if
+      ! All the time, so that no other run takes this one's unfinished file for its own.
+      call lock_directory(outcome%directory, lock)
+      call write_results(case, table, threads, outcome, tally, error)
+      call unlock_directory(lock)
+      if (allocated(error) .and. .not. was_there) call remove_file(outcome%directory)
       if (allocated(error)) return
-      if (differs) outcome%remark = path//': replaces the results of another input of the same name in '//outcome%directory
+      if (outcome%remark /= '') outcome%remark = path//': '//outcome%remark
       outcome%conforms = tally%conforming == tally%sets
       call describe(case, tally, outcome%table)
    end subroutine run_sets
+
+   !> Computes all sets and writes both files, or none, into the locked directory.
+   subroutine write_results(case, table, threads, outcome, tally, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> The table, open.
+      type(set_table_type), intent(inout) :: table
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Place of the results; gets a remark.
+      type(outcome_type), intent(inout) :: outcome
+      !> What the sets came to.
+      type(tally_type), intent(out) :: tally
+      !> The run failed; nothing was written.
+      type(error_type), allocatable, intent(out) :: error
+      type(text_file_type) :: input(1)
+      logical :: differs
+
+      input(1)%name = input_file
+      input(1)%content = get_case_text(case)
+      call check_owner(outcome%directory, [character(len=8) :: result_file, input_file], input_file, input(1)%content, &
+         differs, error, locked=.true.)
+      if (.not. allocated(error)) call write_sets(case, table, threads, outcome%directory, tally, error)
+      if (.not. allocated(error)) call write_files(outcome%directory, input, error, ready=result_file)
+      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
+   end subroutine write_results
 
    !> Complains about cases whose sets cannot be computed together.
    subroutine check_case(case, error)
@@ -106,7 +137,7 @@ contains
       type(set_table_type), intent(inout) :: table
       !> Number of threads.
       integer, intent(in) :: threads
-      !> Directory of the results, which is made where it is missing.
+      !> Directory of the results.
       character(len=*), intent(in) :: directory
       !> What the sets came to.
       type(tally_type), intent(inout) :: tally

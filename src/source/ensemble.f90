@@ -1,5 +1,5 @@
 !> Many drops of `thud_hollow_sphere`, a block of lanes at a time: the same equation, steps and checks
-!> as `solve_hollow_sphere`, and the same numbers to 1e-10.
+!> as `solve_hollow_sphere`, and the same numbers to 1e-10; the impulse to the residual of its balance.
 !>
 !> Sets that cannot be computed have a status and NaN; they leave the others as they are.
 module thud_ensemble

@@ -23,10 +23,6 @@ module thud_impact_lanes
       type(state_lanes_type) :: states(2)
       !> Ones, the length of whole steps: [lane_count].
       real(wp) :: whole_step(lane_count)
-      !> Elastic force at the beginning of a step, N, where nobody else takes it: [lane_count].
-      real(wp) :: elastic_force(lane_count)
-      !> Force on the floor, likewise, N: [lane_count].
-      real(wp) :: floor_force(lane_count)
       !> Largest deflection: [lane_count].
       real(wp) :: max_deflection(lane_count)
       !> Largest elastic force, at samples and turning point, N: [lane_count].
@@ -187,9 +183,10 @@ contains
          real(wp), intent(in) :: part(lane_count)
          !> What the end of the phase brings to zero: [lane_count].
          real(wp), intent(out) :: part_value(lane_count)
+         real(wp), dimension(lane_count) :: elastic_force, floor_force
          logical :: missed
 
-         call advance(impacts, ends, part, impacts%elastic_force, impacts%floor_force, missed)
+         call advance(impacts, ends, part, elastic_force, floor_force, missed)
          part_value = get_watched(impacts%states(3 - impacts%now), compressing)
       end subroutine try_length
 
@@ -209,19 +206,23 @@ contains
    end function get_watched
 
    !> Takes a part of a step in some of the lanes.
-   subroutine finish_step(impacts, goes, length)
+   subroutine finish_step(impacts, goes, length, elastic_force, floor_force)
       !> The impacts; their series are placed at the end.
       type(impact_lanes_type), intent(inout) :: impacts
       !> The lane takes the step: [lane_count].
       logical, intent(in) :: goes(lane_count)
       !> Its length: [lane_count].
       real(wp), intent(in) :: length(lane_count)
+      !> Elastic force at its beginning, N: [lane_count].
+      real(wp), intent(out) :: elastic_force(lane_count)
+      !> Force on the floor, likewise, N: [lane_count].
+      real(wp), intent(out) :: floor_force(lane_count)
       logical :: missed
 
       associate (state => impacts%states(impacts%now), new => impacts%states(3 - impacts%now))
          call place_series(impacts%shell, state, goes, impacts%series)
          call add_end(impacts, goes, length/2, length**2/12)
-         call advance(impacts, goes, length, impacts%elastic_force, impacts%floor_force, missed)
+         call advance(impacts, goes, length, elastic_force, floor_force, missed)
          where (goes)
             state%deflection = new%deflection
             state%velocity = new%velocity

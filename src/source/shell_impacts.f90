@@ -31,7 +31,7 @@ contains
       real(wp), intent(inout) :: force(2*lane_count, n_sample)
       !> Number of the last sample that was written.
       integer, intent(out) :: last_sample
-      real(wp), dimension(lane_count) :: start, last, length
+      real(wp), dimension(lane_count) :: start, last, length, elastic_force, floor_force
       logical :: turns(lane_count)
       integer :: n_step, last_step
 
@@ -53,7 +53,7 @@ contains
       call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
       impacts%released = last < never .and. .not. impacts%left
       call locate(impacts, .false., impacts%released, length)
-      call finish_step(impacts, impacts%released, length)
+      call finish_step(impacts, impacts%released, length, elastic_force, floor_force)
       impacts%contact = last + length
       last_sample = last_step/substeps + 1
       call get_peaks(force(:, :last_sample), impacts%peak_force, impacts%peak_floor_force)
@@ -81,6 +81,7 @@ contains
       real(wp), intent(inout) :: force(2*lane_count, n_sample)
       !> Last step of any lane; unchanged where none began.
       integer, intent(inout) :: last_step
+      real(wp), dimension(lane_count) :: elastic_force, floor_force
       real(wp) :: latest
       integer :: n, first, sample
       logical :: done, undisturbed, strayed
@@ -112,8 +113,8 @@ contains
             call advance(impacts, goes, impacts%whole_step, force(:lane_count, sample), force(lane_count + 1:, sample), &
                strayed)
          else
-            call advance(impacts, goes, impacts%whole_step, impacts%elastic_force, impacts%floor_force, strayed)
-            if (mod(n, substeps) == 0) call record(impacts, real(n, wp), start, last, force(:, sample))
+            call advance(impacts, goes, impacts%whole_step, elastic_force, floor_force, strayed)
+            if (mod(n, substeps) == 0) call record(elastic_force, floor_force, real(n, wp), start, last, force(:, sample))
          end if
          if (n == nint(latest)) undisturbed = all(start < never .and. last >= never)
          call settle(impacts, compressing, real(n, wp), start, last, undisturbed, done)
@@ -127,9 +128,11 @@ contains
 
    !> Forces of one sample: those of moving lanes, none after the contact; lanes whose turn is still to
    !> come keep what they have.
-   pure subroutine record(impacts, n, start, last, force)
-      !> The impacts.
-      type(impact_lanes_type), intent(inout) :: impacts
+   pure subroutine record(elastic_force, floor_force, n, start, last, force)
+      !> Elastic forces, N: [lane_count].
+      real(wp), intent(in) :: elastic_force(lane_count)
+      !> Forces on the floor, N: [lane_count].
+      real(wp), intent(in) :: floor_force(lane_count)
       !> Number of the step.
       real(wp), intent(in) :: n
       !> Step with which each lane begins: [lane_count].
@@ -138,23 +141,8 @@ contains
       real(wp), intent(in) :: last(lane_count)
       !> The sample, N: [2 lane_count].
       real(wp), intent(inout) :: force(2*lane_count)
-      integer :: i
 
-      !$omp simd
-      do i = 1, lane_count
-         associate (elastic => impacts%elastic_force, whole => impacts%floor_force)
-            if (n > last(i)) then
-               elastic(i) = 0.0_wp
-               whole(i) = 0.0_wp
-            end if
-            if (n < start(i)) then
-               elastic(i) = force(i)
-               whole(i) = force(lane_count + i)
-            end if
-            force(i) = elastic(i)
-            force(lane_count + i) = whole(i)
-         end associate
-      end do
+      where ([start, start] <= n) force = merge([elastic_force, floor_force], 0.0_wp, [last, last] >= n)
    end subroutine record
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
@@ -228,17 +216,17 @@ contains
       type(impact_lanes_type), intent(inout) :: impacts
       !> The lane has a turning point: [lane_count].
       logical, intent(in) :: turns(lane_count)
-      real(wp) :: length(lane_count)
+      real(wp), dimension(lane_count) :: length, elastic_force, floor_force
 
       call locate(impacts, .true., turns, length)
-      call finish_step(impacts, turns, length)
+      call finish_step(impacts, turns, length, elastic_force, floor_force)
       where (turns) impacts%states(impacts%now)%velocity = 0.0_wp
       impacts%shell%weight = impacts%restitution_weight
       impacts%max_deflection = impacts%states(impacts%now)%deflection
-      call finish_step(impacts, turns, 1 - length)
-      ! Taken at the beginning of that part of the step.
-      impacts%peak_force = impacts%elastic_force
-      impacts%peak_floor_force = impacts%floor_force
+      call finish_step(impacts, turns, 1 - length, elastic_force, floor_force)
+      ! Those at the turning point.
+      impacts%peak_force = elastic_force
+      impacts%peak_floor_force = floor_force
    end subroutine turn
 
    !> Raises the forces at the turning point to the largest of all samples.

@@ -152,7 +152,7 @@ contains
       pull = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
    end function get_pull
 
-   !> Acceleration z**2/(1 - y) by the flux, for s = 1; seven terms of the geometric series as a product.
+   !> Acceleration z**2/(1 - y) by the flux, for s = 1; eight terms of the geometric series as a product.
    elemental function get_push(z, d, inverse) result(push)
       !> z, the distance from the place of the series, and 1/(1 - y) there.
       real(wp), intent(in) :: z, d, inverse

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import resource
+import subprocess
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +13,6 @@ import pytest
 import thud
 
 if TYPE_CHECKING:
-    import subprocess
     from collections.abc import Callable
     from pathlib import Path
 
@@ -122,7 +123,9 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("height,mass\n1,\n", "line 2: mass = '' is not a number"),
         ("height,mass\nnan,2\n", "line 2: height = 'nan' is not a number"),
         ("height,momentum_flux\n1,all\n", "line 2: momentum_flux = 'all' is not allowed"),
+        ("height\n1e400\n", "line 2: height = '1e400' is not a number"),
         ("height\n" + "1" * 5000 + "\n", "line 2: it is too long"),
+        ("height,mass\n1" + " " * 5000 + ",99\n", "line 2: it is too long"),
     ],
 )
 def test_bad_tables_are_refused(
@@ -147,7 +150,7 @@ def test_bad_tables_are_refused(
         (["--sets", "table.csv", "--threads", "0"], "'0' is not allowed; allowed: 1 to 1024"),
         (["--sets", "table.csv", "--threads", "2x"], "--threads = '2x' is not allowed"),
         (["--sets", "table.csv", "-o", "."], "--output . holds files of something else"),
-        (["--sets", "table.csv", "-o", "table.csv"], "table.csv/.sets.csv.part cannot be written"),
+        (["--sets", "table.csv", "-o", "table.csv"], "--output table.csv cannot be made"),
     ],
 )  # fmt: skip
 def test_bad_arguments_are_refused(
@@ -175,3 +178,84 @@ def test_cases_without_sets_are_refused(
     result = run(case, "--sets", "table.csv")
     assert result.returncode == 1
     assert sentence in result.stderr
+
+
+def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:
+    lines = ["\ufeffheight,mass\r\n", "#" * 9000 + "\n", "1, 2.5\r\n", "\r\n", "1.5,2.4"]
+    (tmp_path / "table.csv").write_text("".join(lines), encoding="utf-8", newline="")
+    result = run(case, "--sets", "table.csv", "-q")
+    assert (result.returncode, result.stderr) == (0, "")
+    rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
+    assert [(float(row["height"]), float(row["mass"])) for row in rows] == [(1, 2.5), (1.5, 2.4)]
+
+
+def test_endless_lines_take_no_memory(run: Run, case: Path) -> None:
+    def little_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (300 * 2**20, 300 * 2**20))
+
+    result = run(case, "--sets", "/dev/zero", preexec_fn=little_memory)
+    assert (result.returncode, result.stdout) == (1, "")
+    assert "/dev/zero, line 1: it is too long; allowed: up to 4096 characters" in result.stderr
+
+
+def test_nothing_is_written_where_results_have_no_place(
+    run: Run, case: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    assert run(case, "--sets", "table.csv", "-o", "o").returncode == 0
+    before = (tmp_path / "o/sets.nml").read_bytes()
+    (tmp_path / "o/sets.csv").unlink()
+    (tmp_path / "o/sets.csv/in_the_way").mkdir(parents=True)
+    case.write_text(CASE.replace("2.45", "2.5"))
+    result = run(case, "--sets", "table.csv", "-o", "o")
+    assert result.returncode == 1
+    assert "sets.csv is a directory; allowed: a file of this name" in result.stderr
+    assert (tmp_path / "o/sets.nml").read_bytes() == before
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == ["sets.csv", "sets.nml"]
+
+
+def test_results_of_single_drops_and_of_sets_are_kept_apart(
+    run: Run, case: Path, tmp_path: Path
+) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    assert run(case, "-o", "single").returncode == 0
+    assert run(case, "--sets", "table.csv", "-o", "many").returncode == 0
+    for arguments in (["-o", "many"], ["--sets", "table.csv", "-o", "single"]):
+        result = run(case, *arguments)
+        assert result.returncode == 1
+        assert "holds files of something else" in result.stderr
+
+
+def test_runs_in_one_directory_wait_for_each_other(
+    executable: str, run: Run, case: Path, tmp_path: Path
+) -> None:
+    heights = np.linspace(0.5, 1.5, 60_000)
+    (tmp_path / "long.csv").write_text("height\n" + "\n".join(map(str, heights)))
+    (tmp_path / "short.csv").write_text("height\n1\n")
+    first = subprocess.Popen(
+        [executable, case, "--sets", "long.csv", "-q", "-o", "o"], cwd=tmp_path
+    )
+    part = tmp_path / "o/.sets.csv.part"
+    while not part.exists():
+        assert first.poll() is None
+    assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0
+    assert first.wait() == 0
+    assert len(rows_of(tmp_path / "o/sets.csv")) == 1
+    assert not part.exists()
+
+
+def test_run_after_a_killed_one_clears_up(
+    executable: str, run: Run, case: Path, tmp_path: Path
+) -> None:
+    heights = np.linspace(0.5, 1.5, 60_000)
+    (tmp_path / "long.csv").write_text("height\n" + "\n".join(map(str, heights)))
+    (tmp_path / "short.csv").write_text("height\n1\n")
+    killed = subprocess.Popen(
+        [executable, case, "--sets", "long.csv", "-q", "-o", "o"], cwd=tmp_path
+    )
+    while not (tmp_path / "o/.sets.csv.part").exists():
+        assert killed.poll() is None
+    killed.kill()
+    killed.wait()
+    assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == ["sets.csv", "sets.nml"]

@@ -1,0 +1,109 @@
+!> Lines of texts of any size, from files and pipes: the run-time library would take a whole line into memory,
+!> however long.
+module thud_line_reader
+   use thud_posix, only: close_descriptor, open_descriptor, read_bytes
+   implicit none (type, external)
+   private
+
+   public :: close_lines, line_length, line_reader_type, open_lines, read_line
+
+   !> Longest line.
+   integer, parameter :: line_length = 4096
+
+   !> Bytes that are read at a time.
+   integer, parameter :: buffer_length = 65536
+
+   !> The mark that some editors put before a text.
+   character(len=*), parameter :: byte_order_mark = achar(239)//achar(187)//achar(191)
+
+   !> An open text.
+   type :: line_reader_type
+      private
+      !> Its descriptor.
+      integer :: descriptor = -1
+      !> What was read last.
+      character(len=buffer_length) :: buffer = ''
+      !> Bytes in it, and those that were given out.
+      integer :: filled = 0, taken = 0
+      !> Number of the latest line.
+      integer, public :: line = 0
+   end type line_reader_type
+
+contains
+
+   !> Opens a text.
+   subroutine open_lines(path, reader, done)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> The text.
+      type(line_reader_type), intent(out) :: reader
+      !> It can be read.
+      logical, intent(out) :: done
+
+      reader%descriptor = open_descriptor(path)
+      done = reader%descriptor >= 0
+      if (.not. done) return
+      call fill(reader)
+      done = reader%filled >= 0
+      if (.not. done) then
+         call close_lines(reader)
+      else if (index(reader%buffer(:reader%filled), byte_order_mark) == 1) then
+         reader%taken = len(byte_order_mark)
+      end if
+   end subroutine open_lines
+
+   !> The next line, without its end.
+   subroutine read_line(reader, line, length)
+      !> The text.
+      type(line_reader_type), intent(inout) :: reader
+      !> The line, as far as there is room.
+      character(len=line_length), intent(out) :: line
+      !> Its characters, at most one more than there is room for; -1 at the end of the text, -2 where it cannot
+      !> be read.
+      integer, intent(out) :: length
+      integer :: stop, n
+
+      line = ''
+      length = -1
+      if (reader%descriptor < 0) return
+      do
+         if (reader%taken >= reader%filled) call fill(reader)
+         if (reader%filled < 0) length = -2
+         if (reader%filled <= 0) exit
+         length = max(length, 0)
+         stop = index(reader%buffer(reader%taken + 1:reader%filled), achar(10))
+         n = merge(stop - 1, reader%filled - reader%taken, stop > 0)
+         if (length < line_length) line(length + 1:) = reader%buffer(reader%taken + 1:reader%taken + n)
+         length = min(length + n, line_length + 1)
+         reader%taken = reader%taken + n + min(stop, 1)
+         if (stop > 0) exit
+         ! A comment may be longer, but nobody writes endless ones.
+         if (length > line_length .and. line(1:1) /= '#') exit
+      end do
+      if (length < 0) return
+      reader%line = reader%line + 1
+      ! Lines of other systems end with a carriage return.
+      if (length == 0 .or. length > line_length) return
+      if (line(length:length) /= achar(13)) return
+      line(length:length) = ' '
+      length = length - 1
+   end subroutine read_line
+
+   !> Reads on.
+   subroutine fill(reader)
+      !> The text; with -1 bytes where it cannot be read.
+      type(line_reader_type), intent(inout) :: reader
+
+      reader%taken = 0
+      call read_bytes(reader%descriptor, reader%buffer, reader%filled)
+   end subroutine fill
+
+   !> Closes a text; one that is closed stays so.
+   subroutine close_lines(reader)
+      !> The text.
+      type(line_reader_type), intent(inout) :: reader
+
+      call close_descriptor(reader%descriptor)
+   end subroutine close_lines
+
+end module thud_line_reader
