@@ -14,7 +14,7 @@ module thud_line_reader
    integer, parameter :: buffer_length = 65536
 
    !> The mark that some editors put before a text.
-   character(len=*), parameter :: byte_order_mark = achar(239)//achar(187)//achar(191)
+   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
 
    !> An open text.
    type :: line_reader_type
