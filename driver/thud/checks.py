@@ -52,7 +52,7 @@ def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
         value, bool
     )
-    if not number or not abs(value) <= LARGEST:
+    if not number or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:
         message = f"{name} = {shown(value)} is not allowed; allowed: finite numbers"
         raise InputError(message)
 

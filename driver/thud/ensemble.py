@@ -12,6 +12,7 @@ import numpy as np
 
 from thud._library import call, ensemble_door, text, words
 from thud.case import Ball, Drop, Limits, Sampling
+from thud.checks import require_number, require_whole
 from thud.errors import InputError
 from thud.levels import get_bands
 from thud.models import HollowSphere
@@ -136,9 +137,11 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
     octaves = len(get_bands().nominal)
     count = 0 if bands is None else len(get_bands(bands).nominal)
     more = count if bands == "third" else 0
-    sampling = (_real("sample_rate", sample_rate), _real("duration", duration))
-    steps = _whole("substeps", substeps, 10_000)
-    (n_sample,) = call(ensemble_door.ensemble_size, *sampling, steps)
+    require_number("sample_rate", sample_rate)
+    require_number("duration", duration)
+    sampling = (float(sample_rate), float(duration))
+    require_whole("substeps", substeps, 1, 10_000)
+    (n_sample,) = call(ensemble_door.ensemble_size, *sampling, int(substeps))
     # f2py knows no empty arrays; a set of zeros, which is out of range, stands in for none.
     n_set = len(flux)
     numbers = np.zeros((max(n_set, 1), len(_KEYS)))
@@ -150,7 +153,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
                 numbers.T,
                 np.resize(flux + 1, len(numbers)),
                 *sampling,
-                steps,
+                int(substeps),
                 str(source).encode("ascii", "replace"),
                 _threads(threads),
                 int(bands is not None),
@@ -253,25 +256,5 @@ def _threads(threads: int | None) -> int:
     """Return the number of threads."""
     if threads is None:
         return min(len(os.sched_getaffinity(0)), MOST_THREADS)
-    return _whole("threads", threads, MOST_THREADS)
-
-
-def _whole(name: str, value: object, most: int) -> int:
-    """Return a whole number from 1."""
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not 1 <= value <= most:  # type: ignore[operator]
-        message = f"{name} = {value!r} is not allowed; allowed: 1 to {most}, whole"
-        raise InputError(message)
-    return int(value)  # type: ignore[call-overload, no-any-return]
-
-
-def _real(name: str, value: object) -> float:
-    """Return a number as a float."""
-    if not isinstance(value, int | float | np.integer | np.floating) or isinstance(value, bool):
-        message = f"{name} = {value!r} is not a number; allowed: real numbers"
-        raise InputError(message)
-    try:
-        return float(value)
-    except OverflowError as error:
-        message = f"{name} is a very large number; allowed: real numbers"
-        raise InputError(message) from error
+    require_whole("threads", threads, 1, MOST_THREADS)
+    return int(threads)

@@ -166,3 +166,13 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
         group: dataclasses.replace(getattr(case, group), **found) for group, found in groups.items()
     }
     return dataclasses.replace(case, **changed)
+
+
+def plain_words(name: str) -> str:
+    """Return the name of a key in words.
+
+    >>> plain_words("youngs_modulus")
+    "Young's modulus"
+    """
+    persons = {"youngs": "Young's", "poisson": "Poisson's"}
+    return " ".join(persons.get(word, word) for word in name.split("_"))

@@ -25,8 +25,8 @@ STEPS = (1e-9, 1e3)
 # Parts of the sampling interval by which times may miss an even grid: any, and rounded ones.
 JITTER = 1e-3
 ROUNDED = 0.25
-# Part of the largest time that is an error of arithmetic.
-EXACT = 1e-12
+# Digits of a number.
+DIGITS = 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,12 +156,14 @@ def _even_grid(time: NDArray[np.float64], name: str) -> tuple[float, float]:
 def _last_digit(time: NDArray[np.float64]) -> float:
     """Return what the last digit of times is worth, s, by decimals or by significant digits."""
     size = np.abs(time)
-    scale = 10.0 ** np.floor(np.log10(np.maximum(size, EXACT * size.max())))
+    # What numbers of this size cannot tell apart.
+    rounding = 4 * np.spacing(size.max())
+    scale = 10.0 ** np.floor(np.log10(np.maximum(size, rounding)))
     worth = 0.0
     for unit in (np.full_like(scale, scale.max()), scale):
-        for power in range(-round(np.log10(EXACT))):
+        for power in range(DIGITS):
             digit = unit * 10.0**-power
-            if (np.abs(time - digit * np.rint(time / digit)) <= EXACT * size.max()).all():
+            if (np.abs(time - digit * np.rint(time / digit)) <= rounding).all():
                 worth = max(worth, float(digit.max()))
                 break
     return worth

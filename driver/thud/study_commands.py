@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import thud
 from thud.checks import replace_file, require_output
+from thud.levels import BANDWIDTHS
 from thud.tables import aligned
 
 if TYPE_CHECKING:
@@ -98,8 +99,9 @@ def _summary(dataset: xr.Dataset) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("", "least", "median", "largest")]
     for name, variable in dataset.data_vars.items():
         if variable.dtype.kind == "f":
-            for band in dataset["octave"].values if "octave" in variable.dims else [None]:
-                values = variable if band is None else variable.sel(octave=band)
+            bands = next((name for name in BANDWIDTHS if name in variable.dims), None)
+            for band in dataset[bands].values if bands else [None]:
+                values = variable.sel({bands: band}) if bands else variable
                 place = "" if band is None else f" {band:g} Hz"
                 label = f"{name}{place}, {variable.attrs['units']}"
                 numbers = (values.min(), values.median(), values.max())

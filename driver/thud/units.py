@@ -20,6 +20,8 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "K": {"K": 0},
     "": {"1": 0, "%": -2},
 }
+# Those that tables and figures choose from, ascending.
+HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
 
 
 def power_of(unit: object, key_unit: str, place: str) -> int:
@@ -53,3 +55,10 @@ def scaled(value: float, power: int) -> float:
     0.035
     """
     return float(Decimal(repr(float(value))).scaleb(power))
+
+
+def handy_unit(unit: str, value: float) -> tuple[str, float]:
+    """Return a unit in which a value has a digit before its point, and how many SI units it is."""
+    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
+    small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
+    return small[-1] if small and value else (unit, 1.0)

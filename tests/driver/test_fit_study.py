@@ -232,3 +232,21 @@ def test_targets_are_those_of_their_script(
     np.testing.assert_allclose(made, kept, atol=2e-3)
     first = capsys.readouterr().out.splitlines()[0]
     assert first in (STUDIES / "fit_levels.toml").read_text()
+
+
+def test_results_of_another_record_or_base_are_not_touched(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = np.loadtxt("record.csv", delimiter=",")
+    (tmp_path / "study.toml").write_text('base = "ball.nml"\n' + STUDY)
+    fit = ["fit", "-q", "--no-figures", "study.toml", "-o", "found"]
+    for mass, scale in ((2.5, 1), (2.4, 1), (2.5, 0.9)):
+        (tmp_path / "ball.nml").write_text(f"&ball mass = {mass} / &drop / &model /\n")
+        np.savetxt("record.csv", record * [1, scale], delimiter=",")
+        if (mass, scale) == (2.5, 1):
+            assert cli.main(fit) == 0
+            before = (tmp_path / "found/fit.json").read_bytes()
+            continue
+        assert cli.main(fit) == 1
+        assert "belongs to another study, or to another version" in capsys.readouterr().err
+        assert (tmp_path / "found/fit.json").read_bytes() == before

@@ -76,6 +76,8 @@ def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
     result = run(case, "--sets", "table.csv", "--check")
     assert result.returncode == 3
     assert "3 sets, 1 computed" in result.stdout
+    sentence = "2 of 3 sets have no results, such as: the drop closes the shell"
+    assert result.stderr == f"thud: {case}: {sentence}\n"
     rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
     assert [row["status"] for row in rows] == [
         "computed", "the drop closes the shell", "mass lies outside its range",

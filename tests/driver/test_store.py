@@ -237,6 +237,19 @@ def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     assert thud.sweep(study, tmp_path).sizes["height"] == 2
 
 
+def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
+    other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
+    study = thud.read_study(HEIGHTS)
+    with Store(tmp_path, study, 1), pytest.raises(thud.InputError, match="is being computed"):
+        thud.sweep(other, tmp_path)
+    # Nothing was finished, so that the directory may change hands, but with nothing in it.
+    with Store(tmp_path, study, 1) as store:
+        block = evaluation.Block(0, study.base, {"height": np.array([0.5])}, thud.__version__)
+        store.keep(block, evaluation.evaluate(block))
+    with pytest.raises(thud.InputError, match="belongs to another study"):
+        thud.sweep(other, tmp_path)
+
+
 def children(pid: int) -> list[int]:
     """Return the processes that a process has started."""
     return [int(child) for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
@@ -257,3 +270,18 @@ def test_killed_study_leaves_no_process(tmp_path: Path) -> None:
     ):
         assert time.monotonic() < deadline
         time.sleep(0.05)
+
+
+def test_zarr_keeps_the_order(tmp_path: Path) -> None:
+    values = {"values": [1.0, 1.1]}
+    study = {
+        "parameters": {
+            "mass": {"values": [2.4, 2.5]},
+            "height": values,
+            "wall_thickness": {"values": [30, 32], "unit": "mm"},
+        }
+    }
+    expected = thud.sweep({**study, "format": "netcdf"}, tmp_path)
+    found = thud.sweep({**study, "format": "zarr"}, tmp_path)
+    assert list(found.variables) == list(expected.variables)
+    assert [name for name in found.coords if name != "octave"] == list(study["parameters"])

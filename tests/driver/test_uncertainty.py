@@ -119,3 +119,22 @@ def test_command_writes_figure_and_table(
 def test_only_independent_sets_are_taken() -> None:
     with pytest.raises(thud.InputError, match="kind = 'sobol' is not allowed; allowed: random"):
         thud.uncertainty({**SMALL, "design": {"kind": "sobol", "size": 8}})
+
+
+@pytest.mark.parametrize("name", ["source", "force"])
+def test_limits_are_alike_for_all_sets(name: str) -> None:
+    values = {"source": ["rubber_ball", "tyre"], "force": ["elastic", "floor"]}[name]
+    study = {"design": {"size": 4}, "parameters": {name: {"values": values}, "mass": {"std": 0.1}}}
+    with pytest.raises(thud.InputError, match=rf"{name} is not allowed, .*{name} in \[fixed\]"):
+        thud.uncertainty(study)
+
+
+def test_fixed_values_are_the_middle_of_normal_distributions() -> None:
+    ball = {"fixed": {"density": 1148}, "parameters": {"density": {"std": 1}}}
+    study = {"design": {"size": 4}, **ball}
+    density = thud.uncertainty(study).dataset["density"].values
+    assert abs(density - 1148).max() < 6
+    frequency = {"frequency(2)": {"std": 0.1}}
+    modes = {"fixed": {"model": "measured_modes", "frequency": [24, 89]}, "parameters": frequency}
+    parameter = thud.read_study({"design": {"size": 2}, **modes}, "uncertainty").parameters[0]
+    assert parameter.spread.mean == 89

@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 
 class Fit(Estimates):
-    """What a fit came to, see `Estimates`; it draws itself and writes its files."""
+    """What a fit came to; it draws itself and writes its files.
+
+    Attributes, intervals and tables are those of `thud.fitting.result.Estimates`.
+    """
 
     def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
         """Return the figures by name; `units` as in `table`."""

@@ -10,6 +10,7 @@ from matplotlib.ticker import MaxNLocator, NullLocator
 from scipy import stats
 
 from thud.fitting.force_target import ForceMisfit
+from thud.keys import plain_words
 from thud.plot import COLOURS, SIZE, WIDTH, dress, legend_above
 
 if TYPE_CHECKING:
@@ -27,7 +28,6 @@ BAND = "0.85"
 LINE = 44
 # Names that are too long for the axis or the key.
 BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
-PERSONS = {"youngs_modulus": "Young's modulus", "poisson_ratio": "Poisson's ratio"}
 # Where half of the samples are this part of the largest force off, they show beside the lines.
 VISIBLE = 0.003
 # Time that is drawn before and after the contact, as part of it.
@@ -255,7 +255,7 @@ def _draw_correlation(fit: Estimates) -> Figure:
 def _label(name: str, units: Mapping[str, tuple[str, float]], room: float) -> str:
     """Return a parameter with its unit, on two lines where one has no room for its letters."""
     unit = units[name][0]
-    text = PERSONS.get(name, name.replace("_", " ").capitalize())
+    text = plain_words(name).capitalize()
     if not unit:
         return text
     line = f"{text}, {unit}"

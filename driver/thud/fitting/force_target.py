@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.signal import ZoomFFT
 
+from thud.checks import shown
 from thud.errors import InputError
 from thud.fitting.misfit import require_choice, require_positive
 from thud.impact import FORCES, Impact
@@ -114,13 +115,13 @@ def _cut(
     """Return the part of a record in a window of time."""
     try:
         begin, end = map(float, window)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         begin = end = np.nan
     inside = (time >= begin) & (time <= end)
     if np.count_nonzero(inside) < LEAST_ROWS or not force[inside].max() > 0:
         message = (
-            f"target: window = {window!r} is not allowed; allowed: begin and end, s, of an impact "
-            f"between {time[0]:g} and {time[-1]:g}"
+            f"target: window = {shown(window)} is not allowed; allowed: begin and end, s, of an "
+            f"impact between {time[0]:g} and {time[-1]:g}"
         )
         raise InputError(message)
     return time[inside], force[inside]

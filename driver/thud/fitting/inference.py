@@ -9,6 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import qr
 
+from thud.checks import shown
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -200,5 +201,5 @@ def coverage_factor(level: float, freedom: int | None) -> float:
 def require_level(level: object) -> None:
     """Complain about a confidence that is none."""
     if not (isinstance(level, float | np.floating) and 0 < level < 1):
-        message = f"level = {level!r} is not allowed; allowed: 0 < level < 1"
+        message = f"level = {shown(level)} is not allowed; allowed: 0 < level < 1"
         raise InputError(message)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from thud.checks import require_number, shown
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,10 +61,10 @@ def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
     """Return a list of finite numbers of a given length."""
     try:
         array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != (count,) or not np.isfinite(array).all():
-        message = f"target: {name} = {values!r} is not allowed; allowed: {count} real numbers"
+        message = f"target: {name} = {shown(values)} is not allowed; allowed: {count} real numbers"
         raise InputError(message)
     return array
 
@@ -76,8 +77,9 @@ def require_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
         raise InputError(message)
 
 
-def require_positive(name: str, value: object, unit: str) -> None:
+def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - that is the question
     """Complain about what is not a number above 0."""
-    if not (isinstance(value, float | int | np.floating) and 0 < value < np.inf):
+    require_number(f"target: {name}", value)
+    if not value > 0:
         message = f"target: {name} = {value!r} is not allowed; allowed: numbers above 0, {unit}"
         raise InputError(message)

@@ -12,14 +12,11 @@ from thud.checks import require_kind, require_number
 from thud.errors import InputError
 from thud.keys import key_table, put
 from thud.models import LISTS, group_of
-from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
     from thud.case import Case
     from thud.keys import Key
 
-# The ones that tables and figures choose from, ascending.
-HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
 # A start that lies on a limit is moved away from it by this part of itself.
 INSIDE = 0.01
 # A limit of the library that is this much larger than the start does not guide the search.
@@ -175,10 +172,3 @@ def _get_range(case: Case, name: str, wish: Parameter) -> Range:
     room = min(INSIDE * scale, (upper - lower) / 4)
     start = min(max(start, lower + room), upper - room)
     return Range(name, key.unit, start, lower, upper, scale, spread)
-
-
-def handy_unit(unit: str, value: float) -> tuple[str, float]:
-    """Return a unit in which a value has a digit before its point, and how many SI units it is."""
-    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
-    small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
-    return small[-1] if small and value else (unit, 1.0)

@@ -9,8 +9,8 @@ import numpy as np
 
 from thud._library import version
 from thud.fitting.inference import coverage_factor
-from thud.fitting.parameters import handy_unit
 from thud.tables import aligned
+from thud.units import handy_unit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -27,8 +27,9 @@ from thud.fitting.inference import (
 )
 from thud.fitting.level_target import LevelTarget
 from thud.fitting.objective import SHIFT_SCALE, STEP, Objective
-from thud.fitting.parameters import get_ranges, handy_unit
+from thud.fitting.parameters import get_ranges
 from thud.fitting.result import SHIFT
+from thud.units import handy_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping

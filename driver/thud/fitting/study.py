@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import sys
 import tomllib
 import warnings
 from dataclasses import dataclass, fields
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
@@ -66,6 +68,12 @@ class Study:
     units: dict[str, tuple[str, float]]
     options: dict[str, Any]
     content: dict[str, Any]
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """What tells it from other fits, as JSON holds it: its file, base case and target."""
+        target = hashlib.sha256(self.target.misfit().target_vector().tobytes()).hexdigest()
+        return {"study": self.content, "base_case": f"{self.base.to_namelist()}", "target": target}
 
     def run(self, *, progress: bool = False) -> Fit:
         """Return the fit; its warnings are not issued."""
@@ -175,7 +183,9 @@ def run(options: argparse.Namespace) -> int:
         tqdm.write(f"{study.name}\n\n{found.table(study.units)}")
     for sentence in found.warnings:
         tqdm.write(f"thud-driver: {options.study}: {sentence}", file=sys.stderr)
-    found.save(folder, study.units, figures=not options.no_figures, study=study.content)
+    # Another fit may have come in between.
+    _claim(folder, study)
+    found.save(folder, study.units, figures=not options.no_figures, **study.identity)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if found.converged else NumericalError.exit_code
@@ -189,7 +199,8 @@ def _claim(folder: Path, study: Study) -> None:
     path = folder / "fit.json"
     if path.exists():
         try:
-            mine = json.loads(path.read_bytes())["study"] == study.content
+            before = json.loads(path.read_bytes())
+            mine = all(before[name] == content for name, content in study.identity.items())
         except (ValueError, LookupError, TypeError):
             mine = False
         require_own(path, mine=mine)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from thud.fitting.parameters import handy_unit
+from thud.keys import plain_words
 from thud.plot import SIZE
+from thud.units import handy_unit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +63,7 @@ def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
     if ratio < _HALF_DECADE:
         axis.set_major_locator(MaxNLocator(5))
     else:
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,)))
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,), numticks=12))
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
 
@@ -70,8 +71,3 @@ def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
 def words(parameter: xr.DataArray) -> str:
     """Return the name of a parameter in words, as a label begins."""
     return plain_words(str(parameter.name)).capitalize()
-
-
-def plain_words(name: str) -> str:
-    """Return the name of a parameter in words."""
-    return name.replace("youngs", "Young's").replace("_", " ")

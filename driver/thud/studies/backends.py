@@ -64,7 +64,7 @@ def run_blocks(
     NumericalError
         Where the backend loses a block.
     """
-    backend, workers, scheduler = _checked(backend, workers, scheduler)
+    backend, workers, scheduler = checked_backend(backend, workers, scheduler)
     with _open(backend, workers, scheduler) as (executor, width):
         # An ensemble in this process uses all its threads; elsewhere blocks run side by side.
         threads = width if backend == "threads" else 1
@@ -89,7 +89,7 @@ def run_blocks(
             raise
 
 
-def _checked(
+def checked_backend(
     backend: str | None, workers: int | None, scheduler: str | None
 ) -> tuple[str, int | None, str | None]:
     """Return a backend, number of workers and scheduler that belong together."""

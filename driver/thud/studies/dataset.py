@@ -11,7 +11,7 @@ import xarray as xr
 
 import thud
 from thud._library import compiler
-from thud.levels import get_bands
+from thud.levels import BANDWIDTHS, get_bands
 from thud.studies import sets
 from thud.studies.designs import makers
 from thud.studies.evaluation import SCALARS, block_size, level_names
@@ -35,8 +35,6 @@ MEANINGS = {
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
 }
-# Coordinates that are no parameters.
-BANDS = ("octave", "third")
 # Bytes of a set on disk besides its levels and parameters, and of a file itself.
 _SET_BYTES = 95
 _FILE_BYTES = 27_000
@@ -88,7 +86,7 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
         unit, meaning = MEANINGS[name]
         dimensions = ("set", levels[name][1]) if name in levels else ("set",)
         variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
-    return xr.Dataset(variables, coordinates, provenance(study))
+    return in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 
 def _attributes(study: Study, parameter: Parameter) -> dict[str, Any]:
@@ -118,6 +116,7 @@ def provenance(study: Study) -> dict[str, str]:
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
         "model": study.model,
+        "parameters": " ".join(map(coordinate, study.parameters)),
         "judged_force": study.base.levels.force,
         "limits": study.base.limits.source,
         "base_case": f"{study.base.to_namelist()}",
@@ -130,6 +129,14 @@ def provenance(study: Study) -> dict[str, str]:
         "machine": platform.machine(),
         "date_created": datetime.now(UTC).isoformat(timespec="seconds"),
     }
+
+
+def in_order(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset with results and parameters in one order, whatever Zarr made of it."""
+    results = {name: dataset.variables[name] for name in MEANINGS if name in dataset.data_vars}
+    names = [*BANDWIDTHS, *dataset.attrs["parameters"].split()]
+    coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
+    return xr.Dataset(results, coordinates, dataset.attrs)
 
 
 def grid_of(study: Study, dataset: xr.Dataset) -> xr.Dataset:
@@ -152,5 +159,5 @@ def grid_of(study: Study, dataset: xr.Dataset) -> xr.Dataset:
         )
         for name, variable in dataset.data_vars.items()
     }
-    bands = {name: dataset[name] for name in BANDS if name in dataset.coords}
+    bands = {name: dataset[name] for name in BANDWIDTHS if name in dataset.coords}
     return xr.Dataset(variables, {**bands, **axes}, dataset.attrs)

@@ -29,7 +29,7 @@ _MOST_SETS = 2**63 - 1
 
 def makers(design: str) -> dict[str, str]:
     """Return the versions of what draws the points of a design; other versions may draw others."""
-    names = ("scipy", "SALib") if design in DRAWN else ()
+    names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in DRAWN else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 
 

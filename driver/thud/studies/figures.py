@@ -8,9 +8,10 @@ import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import MaxNLocator
 
+from thud.keys import plain_words
 from thud.levels import octave_limits
 from thud.plot import COLOURS, SIZE, empty_axes, legend_above, octave_axis
-from thud.studies.axes import plain_words, show_parameter
+from thud.studies.axes import show_parameter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from tqdm import tqdm
 import thud
 from thud.errors import InputError
 from thud.studies import sets
-from thud.studies.backends import run_blocks
+from thud.studies.backends import checked_backend, run_blocks
 from thud.studies.dataset import disk_space, grid_of, new_dataset
 from thud.studies.evaluation import Block, block_size
 from thud.studies.store import Store, read_sweep
@@ -97,6 +97,7 @@ def sweep(  # noqa: PLR0913 - a study has a place, a backend and a face
     if total > MOST_SETS and not yes:
         message = f"{describe(plan)}; allowed: up to {MOST_SETS} sets, more with yes=True (--yes)"
         raise InputError(message)
+    checked_backend(backend, workers, scheduler)
     size = block_size(plan.base)
     store = Store(output, plan, size) if output is not None else None
     memory: dict[int, Columns] = {}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shutil
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,7 +14,7 @@ import xarray as xr
 from thud.checks import replace_file, require_own, uninterrupted
 from thud.errors import InputError
 from thud.studies import sets
-from thud.studies.dataset import disk_space, grid_of, new_dataset
+from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,7 +28,7 @@ LARGE = 256 * 2**20
 
 
 class Store:
-    """The directory of a study; a context in which no other process computes it.
+    """The directory of a study: a context, in which no other process computes it.
 
     Parameters
     ----------
@@ -55,36 +55,36 @@ class Store:
         ending = "zarr" if study.format == "zarr" or (large and study.format == "auto") else "nc"
         self.path = Path(folder) / f"{study.name}.{ending}"
         self._partial = self.path.with_suffix(".partial")
-        for path in (self.path, self._partial):
-            if path.exists():
-                self._require_own(path)
-        with _named(self.path):
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            if not self.complete:
-                self._require_space()
-                self._partial.mkdir(exist_ok=True)
-                replace_file(self._mark, self._identity.encode())
 
     def __enter__(self) -> Self:
-        """Keep other runs of the study away.
-
-        Raises
-        ------
-        InputError
-            Where one of them is at work.
-        """
-        # The directory is gone where another run has just finished; not every disk has locks.
-        with suppress(FileNotFoundError):
-            self._descriptor = os.open(self._partial, os.O_RDONLY)
-            try:
-                fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                self.__exit__()
-                message = f"{self.path} is being computed; allowed: wait, or another directory"
-                raise InputError(message) from error
-            except OSError:
-                pass
+        """Take the directory, unless it belongs to another study or to another run of this one."""
+        try:
+            with _named(self.path):
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                if self.complete:
+                    self._require_own(self.path)
+                else:
+                    self._require_space()
+                    self._partial.mkdir(exist_ok=True)
+                    # Nothing is looked at or changed while another run may be writing.
+                    self._lock()
+                    self._require_own(self._partial)
+                    replace_file(self._mark, self._identity.encode())
+        except BaseException:
+            self.__exit__()
+            raise
         return self
+
+    def _lock(self) -> None:
+        """Keep other runs away; some disks have no locks."""
+        self._descriptor = os.open(self._partial, os.O_RDONLY)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            message = f"{self.path} is being computed; allowed: wait, or another directory"
+            raise InputError(message) from error
+        except OSError:
+            pass
 
     def __exit__(self, *_: object) -> None:
         """Let others in again."""
@@ -248,8 +248,7 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
 
 def _open_zarr(path: Path) -> xr.Dataset:
     """Open a Zarr group: its arrays are read when they are needed, whether Dask is there or not."""
-    dataset: xr.Dataset = xr.open_zarr(path, consolidated=False, chunks=None)
-    return dataset
+    return in_order(xr.open_zarr(path, consolidated=False, chunks=None))
 
 
 @contextmanager

@@ -15,10 +15,10 @@ import numpy as np
 
 import thud
 from thud.case import Case, read_case
-from thud.checks import require_kind, require_words
+from thud.checks import require_kind, require_words, shown
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
-from thud.models import FiniteElement, new_model
+from thud.models import MODELS, FiniteElement, new_model
 from thud.studies.designs import makers, read_design
 from thud.studies.parameters import Parameter, checked, new_parameter, within
 from thud.units import power_of
@@ -183,7 +183,7 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
         raise InputError(message)
     fixed = given.get("fixed", {})
     base, density = _fix(_base_case(given, folder), fixed)
-    parameters = _parameters(given.get("parameters", {}), base)
+    parameters = _parameters(given.get("parameters", {}), base, density)
     _require_use(fixed, given["parameters"])
     temperature = _temperature(given.get("temperature"), parameters)
     design, size, seed = read_design(given.get("design", {}), kind, parameters)
@@ -200,6 +200,9 @@ def _base_case(given: Mapping[str, Any], folder: Path) -> Case:
         raise InputError(message)
     case = Case() if path is None else read_case(folder / path)
     model = given.get("fixed", {}).get("model")
+    if model is not None and not isinstance(model, str):
+        message = f"[fixed] model = {shown(model)} is not allowed; allowed: {', '.join(MODELS)}"
+        raise InputError(message)
     if model is not None and (case.model is None or model != case.model.name):
         case = replace(case, model=new_model(model, {}))
     if case.model is None:
@@ -249,7 +252,9 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
             raise InputError(message)
 
 
-def _parameters(given: Mapping[str, Any], base: Case) -> tuple[Parameter, ...]:
+def _parameters(
+    given: Mapping[str, Any], base: Case, density: float | None
+) -> tuple[Parameter, ...]:
     """Return what varies."""
     if not given:
         message = "[parameters] is empty; allowed: one parameter or more"
@@ -259,15 +264,22 @@ def _parameters(given: Mapping[str, Any], base: Case) -> tuple[Parameter, ...]:
         raise InputError(message)
     model = base.model.name  # type: ignore[union-attr]
     return tuple(
-        new_parameter(name, spread, model, value_in(base, name)) for name, spread in given.items()
+        new_parameter(
+            name, spread, model, density if name == DENSITY.name else value_in(base, name)
+        )
+        for name, spread in given.items()
     )
 
 
 def value_in(base: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None where it has none, or a list of them."""
     groups = (base.ball, base.drop, base.sampling, base.levels, base.limits, base.model)
-    values = (getattr(group, name, None) for group in groups)
-    return next((value for value in values if isinstance(value, Value)), None)
+    key, _, entry = name.partition("(")
+    values = (getattr(group, key, None) for group in groups)
+    found = next((value for value in values if value is not None), None)
+    if isinstance(found, tuple) and entry:
+        found = next(iter(found[int(entry.rstrip(")")) - 1 :]), None)
+    return found if isinstance(found, Value) else None
 
 
 def _temperature(given: Mapping[str, Any] | None, parameters: tuple[Parameter, ...]) -> Any:  # noqa: ANN401

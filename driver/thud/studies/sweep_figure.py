@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from thud.impact import FORCES
-from thud.levels import get_bands, octave_limits
+from thud.keys import plain_words
+from thud.levels import BANDWIDTHS, get_bands, octave_limits
 from thud.plot import COLOURS, COMPACT, LINES, MARKERS, SIZE, WIDTH, dress
-from thud.studies.axes import plain_words, show_parameter, words
-from thud.studies.dataset import BANDS
+from thud.studies.axes import show_parameter, words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -87,7 +87,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
 
 def _columns(dataset: xr.Dataset) -> Columns:
     """Return the parameters of each set."""
-    names = [str(name) for name in dataset.coords if name not in BANDS]
+    names = [str(name) for name in dataset.coords if name not in BANDWIDTHS]
     whole = dataset["status"]
     return {name: dataset[name].broadcast_like(whole).values.ravel() for name in names}
 

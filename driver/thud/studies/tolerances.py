@@ -129,6 +129,13 @@ def uncertainty(
         As `sweep`; also where fewer than two sets have results.
     """
     plan = read_study(study, "uncertainty")
+    for parameter in plan.parameters:
+        if parameter.name in {"source", "force"}:
+            message = (
+                f"[parameters] {parameter.name} is not allowed, because all levels are held "
+                f"against the same limits; allowed: {parameter.name} in [fixed]"
+            )
+            raise InputError(message)
     dataset = sweep(plan, output, **how).load()
     good = dataset["status"].values == 0
     if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
