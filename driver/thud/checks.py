@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import signal
 import threading
@@ -90,6 +91,27 @@ def require_own(path: Path, *, mine: bool) -> None:
             f"allowed: another directory, or remove it first"
         )
         raise InputError(message)
+
+
+def lock(folder: Path, result: Path) -> int:
+    """Keep other runs away from a directory, until the descriptor that it returns is closed.
+
+    Raises
+    ------
+    InputError
+        Where another run is at work there; names the result that it will write.
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        message = f"{result} is being computed; allowed: wait, or another directory"
+        raise InputError(message) from error
+    except OSError:
+        # Some disks have no locks.
+        pass
+    return descriptor
 
 
 @contextmanager

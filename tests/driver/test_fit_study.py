@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
+from thud.checks import lock
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -250,3 +252,16 @@ def test_results_of_another_record_or_base_are_not_touched(
         assert cli.main(fit) == 1
         assert "belongs to another study, or to another version" in capsys.readouterr().err
         assert (tmp_path / "found/fit.json").read_bytes() == before
+
+
+def test_fits_take_a_directory_one_at_a_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY)
+    fit = ["fit", "-q", "--no-figures", "study.toml", "-o", "found"]
+    (tmp_path / "found").mkdir()
+    descriptor = lock(tmp_path / "found", tmp_path / "found/fit.json")
+    assert cli.main(fit) == 1
+    assert "fit.json is being computed; allowed: wait, or another" in capsys.readouterr().err
+    os.close(descriptor)
+    assert cli.main(fit) == 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import sys
 import tomllib
 import warnings
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import require_number, require_own, require_words
+from thud.checks import lock, require_number, require_own, require_words
 from thud.columns import read_table
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.fitting.force_target import ForceTarget
@@ -28,7 +29,6 @@ from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
     import argparse
-    import os
     from collections.abc import Mapping
 
     from thud.fitting.answer import Fit
@@ -173,7 +173,15 @@ def run(options: argparse.Namespace) -> int:
     """Run the command ``thud-driver fit``: print the fit, save it, return the exit code."""
     study = read_study(options.study)
     folder = Path(options.output or Path("outputs", study.name))
-    _claim(folder, study)
+    descriptor = _claim(folder, study)
+    try:
+        return _run_there(folder, study, options)
+    finally:
+        os.close(descriptor)
+
+
+def _run_there(folder: Path, study: Study, options: argparse.Namespace) -> int:
+    """Find a fit, print it and save it in a directory that waits for it; return the exit code."""
     try:
         found = study.run(progress=not options.quiet)
     except ThudError as error:
@@ -183,27 +191,32 @@ def run(options: argparse.Namespace) -> int:
         tqdm.write(f"{study.name}\n\n{found.table(study.units)}")
     for sentence in found.warnings:
         tqdm.write(f"thud-driver: {options.study}: {sentence}", file=sys.stderr)
-    # Another fit may have come in between.
-    _claim(folder, study)
     found.save(folder, study.units, figures=not options.no_figures, **study.identity)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if found.converged else NumericalError.exit_code
 
 
-def _claim(folder: Path, study: Study) -> None:
-    """Make a directory for a fit, or complain about one that cannot take it, before it is found."""
+def _claim(folder: Path, study: Study) -> int:
+    """Make a directory for a fit, or complain about one that cannot take it, before it is found.
+
+    Returns the descriptor that keeps other fits away until it is closed.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with TemporaryFile(dir=folder):
         pass
     path = folder / "fit.json"
+    descriptor = lock(folder, path)
     if path.exists():
         try:
             before = json.loads(path.read_bytes())
             mine = all(before[name] == content for name, content in study.identity.items())
         except (ValueError, LookupError, TypeError):
             mine = False
+        if not mine:
+            os.close(descriptor)
         require_own(path, mine=mine)
+    return descriptor
 
 
 def _table(name: str, content: Mapping[str, Any], where: str = "") -> dict[str, Any]:

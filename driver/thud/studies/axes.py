@@ -63,7 +63,9 @@ def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
     if ratio < _HALF_DECADE:
         axis.set_major_locator(MaxNLocator(5))
     else:
-        axis.set_major_locator(LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,), numticks=12))
+        axis.set_major_locator(
+            LogLocator(subs=(1, 2, 5) if ratio < _DECADES else (1,), numticks=12)
+        )
     axis.set_major_formatter(FormatStrFormatter("%g"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 from contextlib import contextmanager
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import xarray as xr
 
-from thud.checks import replace_file, require_own, uninterrupted
+from thud.checks import lock, replace_file, require_own, uninterrupted
 from thud.errors import InputError
 from thud.studies import sets
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
@@ -67,24 +66,13 @@ class Store:
                     self._require_space()
                     self._partial.mkdir(exist_ok=True)
                     # Nothing is looked at or changed while another run may be writing.
-                    self._lock()
+                    self._descriptor = lock(self._partial, self.path)
                     self._require_own(self._partial)
                     replace_file(self._mark, self._identity.encode())
         except BaseException:
             self.__exit__()
             raise
         return self
-
-    def _lock(self) -> None:
-        """Keep other runs away; some disks have no locks."""
-        self._descriptor = os.open(self._partial, os.O_RDONLY)
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            message = f"{self.path} is being computed; allowed: wait, or another directory"
-            raise InputError(message) from error
-        except OSError:
-            pass
 
     def __exit__(self, *_: object) -> None:
         """Let others in again."""
