@@ -3,13 +3,14 @@ module thud_file
    use, intrinsic :: iso_c_binding, only: c_intptr_t
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
+   use thud_part_file, only: name_part, remove_parts, require_directory, write_whole_part
    use thud_posix, only: directory_exists, ignore_interrupts, is_empty_directory, lock_directory, lock_type, &
-      make_directory, remove_file, rename_file, unlock_directory
+      remove_file, unlock_directory
    use thud_text, only: newline, to_text
    implicit none (type, external)
    private
 
-   public :: check_owner, get_file_stem, get_part, read_text_file, remove_parts, text_file_type, write_files, writing_error
+   public :: check_owner, get_file_stem, read_text_file, text_file_type, write_files
 
    !> Size of the largest input file that is read, bytes.
    integer(int64), parameter :: largest_input = 65536_int64
@@ -131,23 +132,15 @@ contains
       character(len=*), intent(in), optional :: ready
       type(lock_type) :: lock
       integer(c_intptr_t) :: interrupt
-      logical :: done, was_there
+      logical :: was_there
       integer :: i
 
       was_there = directory_exists(directory)
-      call make_directory(directory, done)
-      if (.not. done) then
-         error = input_error('--output '//directory//' cannot be made; allowed: a directory that you may write to')
-         return
-      end if
+      call require_directory(directory, error)
+      if (allocated(error)) return
       if (.not. present(ready)) call lock_directory(directory, lock)
       do i = 1, size(files)
-         if (directory_exists(directory//'/'//trim(files(i)%name))) then
-            error = input_error('--output '//directory//': '//trim(files(i)%name) &
-               //' is a directory; allowed: a file of this name')
-         else
-            call write_text_file(get_part(directory, files(i)%name), files(i)%content, error)
-         end if
+         call write_whole_part(directory, trim(files(i)%name), files(i)%content, error)
          if (allocated(error)) exit
       end do
       ! Only renaming is left to do.
@@ -164,85 +157,5 @@ contains
       call unlock_directory(lock)
       if (allocated(error) .and. .not. was_there) call remove_file(directory)
    end subroutine write_files
-
-   !> Removes what a process that died while writing has left.
-   subroutine remove_parts(directory, names)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Names of the files: [n_file].
-      character(len=*), intent(in) :: names(:)
-      integer :: i
-
-      do i = 1, size(names)
-         call remove_file(get_part(directory, names(i)))
-      end do
-   end subroutine remove_parts
-
-   !> Path of a file while it is written.
-   pure function get_part(directory, name) result(path)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Name of the file.
-      character(len=*), intent(in) :: name
-      !> The path.
-      character(len=len(directory) + len_trim(name) + 7) :: path
-
-      path = directory//'/.'//trim(name)//'.part'
-   end function get_part
-
-   !> Error of a file that cannot be written.
-   pure function writing_error(path, message) result(error)
-      !> Path of the file.
-      character(len=*), intent(in) :: path
-      !> What the run-time library says.
-      character(len=*), intent(in) :: message
-      !> The error.
-      type(error_type) :: error
-
-      error = input_error('--output: '//path//' cannot be written ('//trim(message) &
-         //'); allowed: a directory that you may write to, with room on its disk')
-   end function writing_error
-
-   !> Gives a file that is written its name, unless something went wrong before.
-   subroutine name_part(directory, name, error)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Name of the file.
-      character(len=*), intent(in) :: name
-      !> What went wrong; there may be something else of that name.
-      type(error_type), allocatable, intent(inout) :: error
-      logical :: done
-
-      if (allocated(error)) return
-      call rename_file(get_part(directory, name), directory//'/'//trim(name), done)
-      if (.not. done) error = input_error('--output '//directory//': '//trim(name)//' cannot be replaced; allowed: a ' &
-         //'directory that you may write to')
-   end subroutine name_part
-
-   !> Writes one file.
-   subroutine write_text_file(path, content, error)
-      !> Path of the file.
-      character(len=*), intent(in) :: path
-      !> All of its text.
-      character(len=*), intent(in) :: content
-      !> It could not be written completely.
-      type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message, close_message
-      integer :: status, close_status, unit
-
-      message = ''
-      open (newunit=unit, file=path, status='replace', action='write', access='stream', form='unformatted', &
-         iostat=status, iomsg=message)
-      if (status == 0) then
-         write (unit, iostat=status, iomsg=message) content
-         if (status == 0) flush (unit, iostat=status, iomsg=message)
-         close (unit, iostat=close_status, iomsg=close_message)
-         if (status == 0 .and. close_status /= 0) then
-            status = close_status
-            message = close_message
-         end if
-      end if
-      if (status /= 0) error = writing_error(path, message)
-   end subroutine write_text_file
 
 end module thud_file

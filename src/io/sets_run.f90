@@ -10,8 +10,8 @@ module thud_sets_run
    use thud_file, only: check_owner, text_file_type, write_files
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
-   use thud_long_file, only: close_part, open_part, write_part
-   use thud_posix, only: directory_exists, lock_directory, lock_type, make_directory, remove_file, unlock_directory
+   use thud_part_file, only: close_part, open_part, require_directory, write_part
+   use thud_posix, only: directory_exists, lock_directory, lock_type, remove_file, unlock_directory
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type
    use thud_sampling, only: get_sample_count
@@ -60,7 +60,7 @@ contains
       type(set_table_type) :: table
       type(tally_type) :: tally
       type(lock_type) :: lock
-      logical :: done, was_there
+      logical :: was_there
 
       call load_case(path, case, error)
       if (allocated(error)) return
@@ -75,11 +75,8 @@ contains
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
       outcome%remark = ''
       was_there = directory_exists(outcome%directory)
-      call make_directory(outcome%directory, done)
-      if (.not. done) then
-         error = input_error('--output '//outcome%directory//' cannot be made; allowed: a directory that you may write to')
-         return
-      end if
+      call require_directory(outcome%directory, error)
+      if (allocated(error)) return
       ! All the time, so that no other run takes this one's unfinished file for its own.
       call lock_directory(outcome%directory, lock)
       call write_results(case, table, threads, outcome, tally, error)

@@ -13,7 +13,7 @@ import pytest
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -228,36 +228,32 @@ def test_results_of_single_drops_and_of_sets_are_kept_apart(
         assert "holds files of something else" in result.stderr
 
 
-def test_runs_in_one_directory_wait_for_each_other(
-    executable: str, run: Run, case: Path, tmp_path: Path
-) -> None:
+@pytest.fixture
+def at_work(executable: str, case: Path, tmp_path: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Return a long run that has begun to write into the directory o, beside a short table."""
     heights = np.linspace(0.5, 1.5, 60_000)
     (tmp_path / "long.csv").write_text("height\n" + "\n".join(map(str, heights)))
     (tmp_path / "short.csv").write_text("height\n1\n")
-    first = subprocess.Popen(
-        [executable, case, "--sets", "long.csv", "-q", "-o", "o"], cwd=tmp_path
-    )
-    part = tmp_path / "o/.sets.csv.part"
-    while not part.exists():
-        assert first.poll() is None
+    command = [executable, case, "--sets", "long.csv", "-q", "-o", "o"]
+    with subprocess.Popen(command, cwd=tmp_path) as process:
+        while not (tmp_path / "o/.sets.csv.part").exists():
+            assert process.poll() is None
+        yield process
+
+
+def test_runs_in_one_directory_wait_for_each_other(
+    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
+) -> None:
     assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0
-    assert first.wait() == 0
+    assert at_work.wait() == 0
     assert len(rows_of(tmp_path / "o/sets.csv")) == 1
-    assert not part.exists()
+    assert not (tmp_path / "o/.sets.csv.part").exists()
 
 
 def test_run_after_a_killed_one_clears_up(
-    executable: str, run: Run, case: Path, tmp_path: Path
+    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
 ) -> None:
-    heights = np.linspace(0.5, 1.5, 60_000)
-    (tmp_path / "long.csv").write_text("height\n" + "\n".join(map(str, heights)))
-    (tmp_path / "short.csv").write_text("height\n1\n")
-    killed = subprocess.Popen(
-        [executable, case, "--sets", "long.csv", "-q", "-o", "o"], cwd=tmp_path
-    )
-    while not (tmp_path / "o/.sets.csv.part").exists():
-        assert killed.poll() is None
-    killed.kill()
-    killed.wait()
+    at_work.kill()
+    at_work.wait()
     assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0
     assert sorted(path.name for path in (tmp_path / "o").iterdir()) == ["sets.csv", "sets.nml"]
