@@ -93,16 +93,19 @@ contains
       logical, intent(out) :: differs
       !> The directory belongs to something else.
       type(error_type), allocatable, intent(out) :: error
-      !> The caller holds the lock on the directory.
+      !> The caller holds the lock on the directory; otherwise, as without this, it is taken here.
       logical, intent(in), optional :: locked
       type(error_type), allocatable :: unreadable
       type(lock_type) :: lock
+      logical :: takes
       character(len=:), allocatable :: text
 
       differs = .false.
       if (.not. directory_exists(directory)) return
       ! Under the lock, so that nobody is writing the parts.
-      if (.not. present(locked)) call lock_directory(directory, lock)
+      takes = .true.
+      if (present(locked)) takes = .not. locked
+      if (takes) call lock_directory(directory, lock)
       call remove_parts(directory, names)
       call unlock_directory(lock)
       if (is_empty_directory(directory)) return
