@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 from typing import Any
 
-from thud._library import version
+from thud._api import version
 from thud.case import (
     Ball,
     Case,

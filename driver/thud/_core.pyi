@@ -1,6 +1,6 @@
-# The extension that f2py makes from the doors in src/python.
+# The extension that f2py makes from the procedures in src/api.
 from typing import Any
 
-thud_door: Any
-thud_level_door: Any
-thud_ensemble_door: Any
+thud_api: Any
+thud_level_api: Any
+thud_ensemble_api: Any

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import f90nml
 import numpy as np
 
-from thud._library import call, door, text
+from thud._api import call, api, text
 from thud.checks import LARGEST, replace_file, require_kind, shown
 from thud.errors import InputError
 from thud.models import LISTS, MODELS, FiniteElement, HollowSphere, ModelOptions, group_of
@@ -273,7 +273,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     InputError
         Names file, group, key, value and allowed range.
     """
-    (effective,) = call(door.effective_case, os.fsencode(path))
+    (effective,) = call(api.effective_case, os.fsencode(path))
     return Case.from_namelist(f90nml.reads(text(effective)))
 
 
@@ -295,5 +295,5 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
         Where the file cannot be written.
     """
     content = case_text(case)
-    call(door.get_sizes, content)
+    call(api.get_sizes, content)
     replace_file(path, content)

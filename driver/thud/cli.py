@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 import thud
-from thud._library import call, door, text
+from thud._api import call, api, text
 from thud.checks import require_output
 from thud.study_commands import FORMATS, add_study_commands
 from thud.tables import aligned
@@ -175,7 +175,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     options.done[case.name] = path
     with _interruptible():
         directory, table, remark, conforming = call(
-            door.run, os.fsencode(path), os.fsencode(output), not options.quiet
+            api.run, os.fsencode(path), os.fsencode(output), not options.quiet
         )
     if text(remark):
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._library import call, ensemble_door, text, words
+from thud._api import call, ensemble_api, text, words
 from thud.case import Ball, Drop, Limits, Sampling
 from thud.checks import require_number, require_whole
 from thud.errors import InputError
@@ -20,10 +20,10 @@ from thud.models import HollowSphere
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-_KEYS, _FLUX_CHOICES = (words(names) for names in ensemble_door.ensemble_keys())
+_KEYS, _FLUX_CHOICES = (words(names) for names in ensemble_api.ensemble_keys())
 _FLUX = "momentum_flux"
 _DEFAULTS: dict[str, Any] = vars(Ball()) | vars(Drop()) | vars(HollowSphere())
-MOST_THREADS = 1024
+MAX_THREADS = 1024
 
 # The library keeps matrices from call to call, and one call uses all threads anyway.
 _ONE_AT_A_TIME = threading.Lock()
@@ -85,7 +85,7 @@ class Ensemble:
 
     def reasons(self) -> dict[int, str]:
         """Return the codes that occur and what they mean."""
-        return {int(code): text(ensemble_door.status_text(code)) for code in np.unique(self.status)}
+        return {int(code): text(ensemble_api.status_text(code)) for code in np.unique(self.status)}
 
 
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three more
@@ -141,7 +141,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
     require_number("duration", duration)
     sampling = (float(sample_rate), float(duration))
     require_whole("substeps", substeps, 1, 10_000)
-    (n_sample,) = call(ensemble_door.ensemble_size, *sampling, int(substeps))
+    (n_sample,) = call(ensemble_api.ensemble_size, *sampling, int(substeps))
     # f2py knows no empty arrays; a set of zeros, which is out of range, stands in for none.
     n_set = len(flux)
     numbers = np.zeros((max(n_set, 1), len(_KEYS)))
@@ -149,7 +149,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three m
     try:
         with _ONE_AT_A_TIME:
             status, scalars, levels, met, force = call(
-                ensemble_door.solve_sets,
+                ensemble_api.solve_sets,
                 numbers.T,
                 np.resize(flux + 1, len(numbers)),
                 *sampling,
@@ -255,6 +255,6 @@ def _array(key: str, values: ArrayLike) -> NDArray[Any]:
 def _threads(threads: int | None) -> int:
     """Return the number of threads."""
     if threads is None:
-        return min(len(os.sched_getaffinity(0)), MOST_THREADS)
-    require_whole("threads", threads, 1, MOST_THREADS)
+        return min(len(os.sched_getaffinity(0)), MAX_THREADS)
+    require_whole("threads", threads, 1, MAX_THREADS)
     return int(threads)

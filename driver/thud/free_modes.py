@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._library import call, door
+from thud._api import call, api
 from thud.case import Ball, Case, Modes, case_text
 from thud.checks import require_kind
 from thud.errors import InputError
@@ -88,10 +88,10 @@ def free_modes(
         modes=Modes(count, radial_elements, polar_elements),
     )
     content = case_text(case)
-    call(door.get_sizes, content)
+    call(api.get_sizes, content)
     size = (2 * polar_elements + 1, 2 * radial_elements + 1)
     frequency, harmonic, participation, rigid_frequency, r, z, shape = call(
-        door.free_modes, content, count, *size
+        api.free_modes, content, count, *size
     )
     return FreeModes(
         case.ball,
@@ -127,6 +127,6 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
         message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
         raise InputError(message)
-    (factors,) = call(door.loss_factors, case_text(Case(model=model)), wanted)
+    (factors,) = call(api.loss_factors, case_text(Case(model=model)), wanted)
     result: NDArray[np.float64] = factors
     return result

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._library import call, door, words
+from thud._api import call, api, words
 from thud.case import Ball, Case, Drop, Sampling, case_text
 from thud.checks import require_kind
 from thud.errors import InputError
@@ -229,8 +229,8 @@ def solve_case(case: Case) -> Impact:
         raise InputError(message)
     # Modes beside the impact have their own function.
     content = case_text(replace(case, modes=None))
-    sizes = call(door.get_sizes, content)
-    found = call(door.solve, content, *sizes)
+    sizes = call(api.get_sizes, content)
+    found = call(api.solve, content, *sizes)
     deflection, velocity, part, channel, elastic, floor, fact = found[:7]
     part_names, channel_names, fact_names, scalars = found[7:11]
     sample_rate = float(scalars[0])

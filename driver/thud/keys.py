@@ -10,7 +10,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Literal
 
-from thud._library import door, text
+from thud._api import api, text
 from thud.errors import InputError
 from thud.models import LISTS, MODELS, group_of
 
@@ -75,7 +75,7 @@ def key_table() -> tuple[Key, ...]:
     """Return every key of the library."""
     found = []
     group = meaning = allowed = ""
-    for line in _LINE.finditer(text(door.keys())):
+    for line in _LINE.finditer(text(api.keys())):
         if line["group"]:
             group = line["group"]
         elif line["key"]:

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._library import call, level_door, words
+from thud._api import call, level_api, words
 from thud.errors import InputError
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 BANDWIDTHS = ("octave", "third")
-_MOST_PEAKS = 2**31
+_MAX_PEAKS = 2**31
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def get_bands(bands: str = "octave") -> Bands:
     if not isinstance(bands, str) or bands not in BANDWIDTHS:
         message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
         raise InputError(message)
-    n_band, *columns = level_door.get_bands(bands)
+    n_band, *columns = level_api.get_bands(bands)
     return Bands(*(column[:n_band].copy() for column in columns))
 
 
@@ -139,7 +139,7 @@ def force_exposure_levels(
     count = len(get_bands(bands).nominal)
     record = _record(force)
     rate = _number("sample_rate", sample_rate)
-    (levels,) = call(level_door.force_exposure, record, rate, bands, _word(method), count)
+    (levels,) = call(level_api.force_exposure, record, rate, bands, _word(method), count)
     result: NDArray[np.float64] = levels
     return result
 
@@ -159,7 +159,7 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
     ndarray, shape (n_sample,)
         The part, N.
     """
-    recorded: NDArray[np.float64] = level_door.record_force(force, sample_rate)
+    recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
     return recorded
 
 
@@ -177,7 +177,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     if not np.isfinite(record).all():
         message = "force holds a value that is not finite; allowed: real numbers, N"
         raise InputError(message)
-    return int(level_door.count_peaks(record, _number("sample_rate", sample_rate)))
+    return int(level_api.count_peaks(record, _number("sample_rate", sample_rate)))
 
 
 def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
@@ -217,8 +217,8 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     if octaves.shape != (5,):
         message = f"levels have the shape {octaves.shape}; allowed: (5,), the octaves 31.5 to 500"
         raise InputError(message)
-    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MOST_PEAKS:
-        message = f"peaks = {peaks!r} is not allowed; allowed: 0 <= peaks < {_MOST_PEAKS}, whole"
+    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
+        message = f"peaks = {peaks!r} is not allowed; allowed: 0 <= peaks < {_MAX_PEAKS}, whole"
         raise InputError(message)
     numbers = {
         "contact_time": contact_time,
@@ -228,7 +228,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     }
     time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
     names, units, value, lower, upper, met = call(
-        level_door.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height
+        level_api.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height
     )
     rows = zip(words(names), words(units), value, lower, upper, met, strict=True)
     return Conformity(

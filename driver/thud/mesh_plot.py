@@ -39,7 +39,7 @@ INSTANTS = 9
 ARROWS = (4, 4)
 FRAMES_PER_SECOND = 12
 # More would not be readable at column width.
-MOST_PANELS = 30
+MAX_PANELS = 30
 
 
 def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
@@ -186,8 +186,8 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
 
 def _require_count(name: str, value: object) -> None:
     """Complain about a number of panels that no figure has."""
-    if not isinstance(value, int) or not 1 <= value <= MOST_PANELS:
-        message = f"{name} = {value!r} is not allowed; allowed: 1 to {MOST_PANELS}"
+    if not isinstance(value, int) or not 1 <= value <= MAX_PANELS:
+        message = f"{name} = {value!r} is not allowed; allowed: 1 to {MAX_PANELS}"
         raise InputError(message)
 
 

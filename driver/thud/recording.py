@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Part of the largest force below which a recording counts as noise.
 NOISE = 0.01
 # Samples that a recording needs.
-LEAST_ROWS = 8
+MIN_ROWS = 8
 # Sampling intervals, s.
 STEPS = (1e-9, 1e3)
 # Parts of the sampling interval by which times may miss an even grid: any, and rounded ones.
@@ -66,9 +66,9 @@ class Recording:
     def from_arrays(cls, table: NDArray[np.float64], name: str = "recording") -> Recording:
         """Return the recording of a table with the columns time, s, and force, N."""
         rows, columns = table.shape
-        if rows < LEAST_ROWS or columns != len(("time", "force")):
+        if rows < MIN_ROWS or columns != len(("time", "force")):
             message = (
-                f"{name}: {rows} rows of {columns} numbers; allowed: {LEAST_ROWS} rows or more "
+                f"{name}: {rows} rows of {columns} numbers; allowed: {MIN_ROWS} rows or more "
                 "of time, s, and force, N"
             )
             raise InputError(message)

@@ -4,7 +4,7 @@ module thud_error
    implicit none (type, external)
    private
 
-   public :: error_type, bad_input, numerical_failure, input_error, numerical_error, tell
+   public :: error_type, bad_input, numerical_failure, input_error, numerical_error, get_status
 
    !> The input cannot be used; also the exit code of the executable.
    integer, parameter :: bad_input = 1
@@ -50,7 +50,7 @@ contains
    end function numerical_error
 
    !> An error as status and message.
-   pure subroutine tell(error, status, message)
+   pure subroutine get_status(error, status, message)
       !> The error, if any.
       type(error_type), allocatable, intent(in) :: error
       !> Its code, or 0.
@@ -63,6 +63,6 @@ contains
       if (.not. allocated(error)) return
       status = error%code
       message = error%message
-   end subroutine tell
+   end subroutine get_status
 
 end module thud_error

@@ -24,7 +24,7 @@ module thud_field
    integer, parameter :: name_length = 128
 
    !> Most allowed texts of one key.
-   integer, parameter :: most_choices = 12
+   integer, parameter :: max_choices = 12
 
    !> What no entry of a list can be.
    real(wp), parameter :: unset = -huge(1.0_wp)
@@ -60,8 +60,8 @@ module thud_field
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
       !> Allowed texts, the first `n_choice` hold; of fixed size, because compilers lose allocatable
-      !> components of array constructors: [most_choices].
-      character(len=24) :: choices(most_choices) = ''
+      !> components of array constructors: [max_choices].
+      character(len=24) :: choices(max_choices) = ''
    contains
       procedure :: set_from_text
       procedure :: check

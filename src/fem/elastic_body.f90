@@ -44,7 +44,7 @@ module thud_elastic_body
       !> Overpressure of the gas, Pa.
       real(wp) :: gas_pressure = 0.0_wp
       !> Smallest local ratio of volumes J.
-      real(wp) :: least_jacobian = 1.0_wp
+      real(wp) :: min_jacobian = 1.0_wp
       !> `no_failure`, or why there are no forces.
       integer :: failure = no_failure
    end type body_state_type
@@ -110,8 +110,8 @@ contains
          associate (row => body%row(i), material => body%material)
             call get_gradients(row, n, position(:, i - 1:i, 1), position(:, i - 1:i, 2), f)
             call get_volume_ratios(n, f, cofactor, jacobian)
-            state%least_jacobian = min(state%least_jacobian, minval(jacobian))
-            if (.not. state%least_jacobian > 0.0_wp) then
+            state%min_jacobian = min(state%min_jacobian, minval(jacobian))
+            if (.not. state%min_jacobian > 0.0_wp) then
                state%failure = element_inverted
                return
             end if

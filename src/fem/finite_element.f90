@@ -12,7 +12,7 @@ module thud_finite_element
    use thud_force_history, only: force_history_type
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
-      most_steps, new_impact_run
+      max_steps, new_impact_run
    use thud_kinds, only: wp
    use thud_material, only: material_type, new_material
    use thud_motion, only: motion_type, new_motion, take_snapshot
@@ -28,7 +28,7 @@ module thud_finite_element
    real(wp), parameter :: unstable_residual = 0.05_wp
 
    !> Most steps of elements in a run; they take about half an hour.
-   real(wp), parameter :: most_work = 2.0e10_wp
+   real(wp), parameter :: max_work = 2.0e10_wp
 
    !> Time between two looks at the step, s: the ball deforms little meanwhile.
    real(wp), parameter :: look_interval = 0.25e-3_wp
@@ -116,7 +116,7 @@ contains
          time = (i - 1)*interval
          if (mod(i - 1, look) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
          if (mod(i - 1, look) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
-         if (n_step > most_steps .or. real(n_step, wp)*n_sample*size(run%position)/2 > most_work) then
+         if (n_step > max_steps .or. real(n_step, wp)*n_sample*size(run%position)/2 > max_work) then
             error = numerical_error(trim(place(time))//' stability asks for steps below ' &
                //to_text(interval/n_step)//' s, too many for '//to_text(sampling%duration)//' s of ' &
                //to_text(size(run%position)/2)//' nodes; allowed: a shorter duration, fewer elements, ' &
@@ -230,7 +230,7 @@ contains
             //'allowed: a lower height, a stiffer ball')
       else if (run%state%failure /= no_failure) then
          error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
-            //to_text(run%state%least_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
+            //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
       else
          residual = abs(get_energy(run) - first_energy)/(sum(run%mass(:, :, 2))/2*history%impact_velocity**2)
          if (.not. residual < unstable_residual) then

@@ -17,13 +17,13 @@ module thud_finite_element_options
    public :: get_frame_count, get_stride
 
    !> Most memory for snapshots, bytes.
-   real(wp), parameter :: most_motion_bytes = 4.0e8_wp
+   real(wp), parameter :: max_motion_bytes = 4.0e8_wp
 
    !> Least sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
-   real(wp), parameter :: least_rate = 16000.0_wp
+   real(wp), parameter :: min_rate = 16000.0_wp
 
    !> Least number of elements through the wall that bend as the wall does.
-   integer, parameter :: least_radial = 2
+   integer, parameter :: min_radial = 2
 
    !> Groups of the options.
    character(len=*), parameter :: finite_element_groups(*) = [character(len=16) :: &
@@ -88,19 +88,19 @@ contains
 
       call check_material(options%material, ball, error)
       if (allocated(error)) return
-      if (options%mesh%radial_elements < least_radial) then
+      if (options%mesh%radial_elements < min_radial) then
          error = input_error('&mesh: radial_elements = '//to_text(options%mesh%radial_elements) &
-            //' is not allowed with finite_element; allowed: from '//to_text(least_radial))
+            //' is not allowed with finite_element; allowed: from '//to_text(min_radial))
          return
       end if
-      if (sampling%sample_rate < least_rate) then
+      if (sampling%sample_rate < min_rate) then
          error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate) &
-            //' Hz is not allowed with finite_element; allowed: from '//to_text(least_rate)//' Hz')
+            //' Hz is not allowed with finite_element; allowed: from '//to_text(min_rate)//' Hz')
          return
       end if
       ! Positions and velocities of each node.
       bytes = 32.0_wp*(options%mesh%radial_elements + 1)*(options%mesh%polar_elements + 1)*get_frame_count(options, sampling)
-      if (bytes > most_motion_bytes) error = input_error('&output: snapshot_interval = ' &
+      if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
          //to_text(options%snapshot_interval)//' s makes '//to_text(get_frame_count(options, sampling)) &
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
    end subroutine check_finite_element

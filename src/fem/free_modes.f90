@@ -21,13 +21,13 @@ module thud_free_modes
    real(wp), parameter :: eigenvalue_tolerance = 1.0e-11_wp
 
    !> Most restarts of the Lanczos method; a few are needed.
-   integer, parameter :: most_restarts = 300
+   integer, parameter :: max_restarts = 300
 
    !> Stands for a failure of the operator where ARPACK tells its own.
    integer, parameter :: volume_lost = -1000
 
    !> Highest harmonic that a mode is looked for in.
-   integer, parameter :: most_harmonic = 64
+   integer, parameter :: max_harmonic = 64
 
    !> What is asked for.
    type :: modes_options_type
@@ -138,7 +138,7 @@ contains
       resid = [(1.0_wp + modulo(0.618_wp*i, 1.0_wp), i=1, n)]
       ipntr = 1
       iparam = 0
-      iparam([1, 3, 7]) = [1, most_restarts, 3]
+      iparam([1, 3, 7]) = [1, max_restarts, 3]
       ido = 0
       info = 1
       failed = .false.
@@ -218,7 +218,7 @@ contains
       !> The order.
       integer :: harmonic
       ! Higher orders look like lower ones on so few points.
-      real(wp), dimension(0:min(most_harmonic, (size(normal) - 1)/2)) :: value, first, second, coefficient
+      real(wp), dimension(0:min(max_harmonic, (size(normal) - 1)/2)) :: value, first, second, coefficient
       integer :: i
 
       coefficient = 0.0_wp

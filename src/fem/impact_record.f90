@@ -14,13 +14,13 @@ module thud_impact_record
    public :: continue_flight, finish_record, new_impact_record, record_sample
 
    !> Part of the energy at first touch by which the balance may miss.
-   real(wp), parameter :: most_energy_residual = 0.005_wp
+   real(wp), parameter :: max_energy_residual = 0.005_wp
 
    !> Part of the change of momentum by which the impulse of the record may miss.
-   real(wp), parameter :: most_impulse_residual = 1.0e-8_wp
+   real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
    !> Part of the wall that the surface may sink into the floor.
-   real(wp), parameter :: most_sink = 0.01_wp
+   real(wp), parameter :: max_sink = 0.01_wp
 
    !> Columns of the channels that are told apart here.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
@@ -40,7 +40,7 @@ contains
       history%impact_velocity = impact_velocity
       history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
          'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'dissipated_energy_J', &
-         'least_volume_ratio']
+         'minimum_volume_ratio']
       allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
    end function new_impact_record
 
@@ -62,7 +62,7 @@ contains
          if (.not. any(run%floor_force > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
       end associate
       history%channel(i, at_pressure:) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
-         run%state%gas_energy, run%potential, run%spring + run%stopped, run%dissipated, run%state%least_jacobian]
+         run%state%gas_energy, run%potential, run%spring + run%stopped, run%dissipated, run%state%min_jacobian]
    end subroutine record_sample
 
    !> Goes on after the computation as free flight without further vibration, up to the next touch.
@@ -126,16 +126,16 @@ contains
       history%impulse_residual = abs(sum(history%floor_force)/history%sample_rate - gain)/gain
       call check_contact_samples(sampling, history%contact_time, error)
       if (allocated(error)) return
-      if (.not. history%impulse_residual <= most_impulse_residual) then
+      if (.not. history%impulse_residual <= max_impulse_residual) then
          error = numerical_error('&finite_element: the balance of momentum misses by ' &
-            //to_text(history%impulse_residual)//'; allowed: up to '//to_text(most_impulse_residual))
-      else if (.not. history%energy_residual <= most_energy_residual) then
+            //to_text(history%impulse_residual)//'; allowed: up to '//to_text(max_impulse_residual))
+      else if (.not. history%energy_residual <= max_energy_residual) then
          error = numerical_error('&finite_element: the balance of energy misses by ' &
             //to_text(history%energy_residual)//' of the energy at first touch; allowed: up to ' &
-            //to_text(most_energy_residual)//', a smaller step_safety helps')
-      else if (run%sink > most_sink*ball%wall_thickness) then
+            //to_text(max_energy_residual)//', a smaller step_safety helps')
+      else if (run%sink > max_sink*ball%wall_thickness) then
          error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink) &
-            //' mm into the floor; allowed: up to '//to_text(most_sink)//' of the wall, a higher penalty_ratio helps')
+            //' mm into the floor; allowed: up to '//to_text(max_sink)//' of the wall, a higher penalty_ratio helps')
       end if
    end subroutine finish_record
 

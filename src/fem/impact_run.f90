@@ -9,18 +9,18 @@ module thud_impact_run
    use thud_kinds, only: wp
    use thud_material, only: material_type
    use thud_mesh, only: new_mesh
-   use thud_stable_step, only: find_growth, get_first_direction, most_growth
+   use thud_stable_step, only: find_growth, get_first_direction, max_growth
    implicit none (type, external)
    private
 
-   public :: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, most_steps
+   public :: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, max_steps
    public :: new_impact_run
 
    !> Turns of the power iteration at the start, and in each later look at the step.
    integer, parameter :: first_turns = 80, next_turns = 3
 
    !> Most steps in a sampling interval.
-   integer, parameter :: most_steps = 100000
+   integer, parameter :: max_steps = 100000
 
    !> What is known between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: impact_run_type
@@ -106,7 +106,7 @@ contains
       real(wp), intent(in) :: safety
       !> Least number of steps.
       integer, intent(in) :: least
-      !> The number so far, 0 at the start; the number to go on with, `most_steps` or more where there
+      !> The number so far, 0 at the start; the number to go on with, `max_steps` or more where there
       !> would have to be too many.
       integer, intent(inout) :: n_step
       real(wp) :: growth, ratio, wave, width
@@ -121,14 +121,14 @@ contains
                width = min(next - inner, pi/real(mesh%n_polar, wp)*inner)
             end associate
          end associate
-         n_step = max(least, ceiling(min(interval*wave/width, 2.0_wp*most_steps)))
+         n_step = max(least, ceiling(min(interval*wave/width, 2.0_wp*max_steps)))
       end if
       do turn = 1, 20
-         if (n_step > most_steps) exit
+         if (n_step > max_steps) exit
          call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_turn, run%direction, growth)
          ! The next step will tell why there are no forces.
          if (growth >= huge(growth)) exit
-         ratio = growth/(safety*most_growth)
+         ratio = growth/(safety*max_growth)
          ! Growth rises with the first to the second power of the step: take the worse.
          if (ratio <= 1.0_wp) then
             n_step = max(least, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))

@@ -13,10 +13,10 @@ module thud_material
    private
 
    public :: check_material, get_material_fields, get_material_loss_factor, material_options_type, material_type, &
-      most_branches, new_material
+      max_branches, new_material
 
    !> Most Maxwell branches.
-   integer, parameter :: most_branches = 16
+   integer, parameter :: max_branches = 16
 
    !> What the group asks for.
    type :: material_options_type
@@ -97,9 +97,9 @@ contains
 
       n_share = options%prony_share%count
       n_time = options%prony_time%count
-      if (options%viscosity == 'prony' .and. (n_share == 0 .or. n_share /= n_time .or. n_share > most_branches)) then
+      if (options%viscosity == 'prony' .and. (n_share == 0 .or. n_share /= n_time .or. n_share > max_branches)) then
          error = input_error('&material: prony_share has '//to_text(n_share)//' entries and prony_time '//to_text(n_time) &
-            //'; allowed: the same number of both, 1 to '//to_text(most_branches))
+            //'; allowed: the same number of both, 1 to '//to_text(max_branches))
       else if (options%viscosity /= 'prony' .and. n_share + n_time > 0) then
          error = input_error("&material: prony_share and prony_time do nothing with viscosity = '" &
             //trim(options%viscosity)//"'; allowed: viscosity = 'prony'")

@@ -24,7 +24,7 @@ module thud_mode_matrices
    real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
 
    !> Most turns of the augmented Lagrangian; two are needed.
-   integer, parameter :: most_turns = 30
+   integer, parameter :: max_turns = 30
 
    !> Matrices over the free displacements.
    type :: mode_matrices_type
@@ -189,7 +189,7 @@ contains
       call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, x, matrices%n, info)
       if (.not. matrices%incompressible) return
       pressure = 0.0_wp
-      do turn = 1, most_turns
+      do turn = 1, max_turns
          padded(:matrices%n) = x
          padded(matrices%n + 1) = 0.0_wp
          do element = 1, size(matrices%place, 2)

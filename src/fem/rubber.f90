@@ -22,7 +22,7 @@ module thud_rubber
    real(wp), parameter :: start_from = 0.4_wp, start_to = 2.5_wp
 
    !> Steps over the relaxation time beyond which a branch has no memory left.
-   real(wp), parameter :: most_steps_over_time = 100.0_wp
+   real(wp), parameter :: max_steps_over_time = 100.0_wp
 
 contains
 
@@ -255,7 +255,7 @@ contains
       real(wp) :: inverse(n_symmetric)
       integer :: g, j, k
 
-      ratio = min(interval/time, most_steps_over_time)
+      ratio = min(interval/time, max_steps_over_time)
       do g = 1, n_point
          call get_inverse_cube_root(n, jacobian(:, g), root)
          shrink = root**2

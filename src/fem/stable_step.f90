@@ -11,10 +11,10 @@ module thud_stable_step
    implicit none (type, external)
    private
 
-   public :: find_growth, get_first_direction, most_growth
+   public :: find_growth, get_first_direction, max_growth
 
    !> Growth at the limit of stability.
-   real(wp), parameter :: most_growth = 4.0_wp
+   real(wp), parameter :: max_growth = 4.0_wp
 
    !> Largest displacement that the forces are tried with, over the thickness of an element.
    real(wp), parameter :: trial = 1.0e-6_wp

@@ -3,7 +3,7 @@ module thud_file
    use, intrinsic :: iso_c_binding, only: c_intptr_t
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
-   use thud_part_file, only: name_part, remove_parts, require_directory, write_whole_part
+   use thud_atomic_write, only: name_part, remove_parts, require_directory, write_whole_part
    use thud_posix, only: directory_exists, ignore_interrupts, is_empty_directory, lock_directory, lock_type, &
       remove_file, unlock_directory
    use thud_text, only: newline, to_text

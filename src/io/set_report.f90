@@ -1,8 +1,8 @@
 !> Results of many sets as rows of a table.
 module thud_set_report
    use thud_band, only: band_type
-   use thud_ensemble, only: get_set_fields, parameter_count, set_outcome_type, set_type
-   use thud_ensemble_run, only: force_count, verdict_type
+   use thud_shell_sets, only: get_set_fields, parameter_count, set_outcome_type, set_type
+   use thud_ensemble, only: force_count, verdict_type
    use thud_field, only: field_type
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp

@@ -1,7 +1,7 @@
 !> Tables of parameter sets: comma-separated text with the keys in its first line and one set in each of the
 !> others. Empty lines and lines that begin with `#` are skipped.
 module thud_set_table
-   use thud_ensemble, only: get_set_fields, parameter_count, set_type
+   use thud_shell_sets, only: get_set_fields, parameter_count, set_type
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_hollow_sphere, only: flux_choices

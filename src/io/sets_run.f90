@@ -4,13 +4,13 @@ module thud_sets_run
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count
    use thud_case, only: case_type, get_case_text
    use thud_constants, only: version
-   use thud_ensemble, only: set_outcome_type, set_type
-   use thud_ensemble_run, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
+   use thud_shell_sets, only: set_outcome_type, set_type
+   use thud_ensemble, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
    use thud_error, only: error_type, input_error
    use thud_file, only: check_owner, text_file_type, write_files
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
-   use thud_part_file, only: close_part, open_part, require_directory, write_part
+   use thud_atomic_write, only: close_part, open_part, require_directory, write_part
    use thud_posix, only: directory_exists, lock_directory, lock_type, remove_file, unlock_directory
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type

@@ -17,10 +17,10 @@ module thud_force_exposure
    character(len=24), parameter :: level_methods(2) = [character(len=24) :: 'exact', 'fft']
 
    !> Most samples of a record: its transform still fits into memory and its length into an integer.
-   integer, parameter :: most_samples = 100000000
+   integer, parameter :: max_samples = 100000000
 
    !> Sum of squares below which a record is taken for zero, N^2: its rounding would underflow.
-   real(wp), parameter :: least_energy = 1.0e-280_wp
+   real(wp), parameter :: min_energy = 1.0e-280_wp
 
    !> Highest sampling rate, Hz: one second of it still fits into memory.
    real(wp), parameter :: highest_rate = 1.0e7_wp
@@ -80,14 +80,14 @@ contains
       if (.not. (sample_rate >= lowest_rate .and. sample_rate <= highest_rate)) then
          error = input_error('sample_rate = '//to_text(sample_rate)//' Hz is not allowed; allowed: from ' &
             //to_text(lowest_rate)//' Hz, twice the highest band edge, to '//to_text(highest_rate)//' Hz')
-      else if (size(force) == 0 .or. size(force) > most_samples) then
-         error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(most_samples))
+      else if (size(force) == 0 .or. size(force) > max_samples) then
+         error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
       else if (.not. all(ieee_is_finite(force))) then
          error = input_error('the force holds a value that is not finite, first at sample ' &
             //to_text(findloc(ieee_is_finite(force), .false., dim=1)))
       else if (.not. maxval(abs(force)) < sqrt(huge(1.0_wp)/real(size(force), wp))/sample_rate) then
          error = input_error('the force is too large for its energy to be computed')
-      else if (.not. sum(force**2) > least_energy) then
+      else if (.not. sum(force**2) > min_energy) then
          error = input_error('the force is zero throughout, or next to it, and has no level')
       end if
    end subroutine check_record

@@ -5,11 +5,11 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: force_history_type, most_residual, new_force_history, part_name_length
+   public :: force_history_type, max_residual, new_force_history, part_name_length
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
-   real(wp), parameter :: most_residual = 1.0e-6_wp
+   real(wp), parameter :: max_residual = 1.0e-6_wp
 
    !> Length of the name of a part of the force.
    integer, parameter :: part_name_length = 24

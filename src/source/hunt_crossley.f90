@@ -202,7 +202,7 @@ contains
       !> k, N/m^exponent; 0 where the damping is too high for a rebound.
       real(wp) :: stiffness
       real(wp), parameter :: step = 1.0e-3_wp
-      integer, parameter :: most_steps = 1000000
+      integer, parameter :: max_steps = 1000000
       type(spring_type) :: spring
       real(wp) :: state(4)
       real(wp) :: next(4)
@@ -213,7 +213,7 @@ contains
       spring = spring_type(mass=1.0_wp, exponent=exponent, damping=damping*impact_velocity)
       state = [0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
       time = 0.0_wp
-      do i = 1, most_steps
+      do i = 1, max_steps
          call rk4_step(spring, time, state, step, next, valid)
          ! Asked so that NaN ends the march too.
          if (.not. next(at_deflection) > 0.0_wp) exit

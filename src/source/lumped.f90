@@ -3,7 +3,7 @@
 module thud_lumped
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: force_history_type, most_residual, new_force_history
+   use thud_force_history, only: force_history_type, max_residual, new_force_history
    use thud_kinds, only: wp
    use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -197,9 +197,9 @@ contains
       history%peak_force = max(history%peak_force, maxval(history%elastic_force))
       history%peak_floor_force = max(history%peak_force, history%peak_floor_force)
       ! Asked so that NaN fails too.
-      if (.not. max(history%impulse_residual, history%energy_residual) <= most_residual) then
+      if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
          error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
-            //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(most_residual))
+            //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(max_residual))
       end if
    end subroutine finish
 

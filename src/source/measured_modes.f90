@@ -7,7 +7,7 @@ module thud_measured_modes
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
-   use thud_force_history, only: force_history_type, most_residual, new_force_history
+   use thud_force_history, only: force_history_type, max_residual, new_force_history
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -142,10 +142,10 @@ contains
       if (history%restitution < 0.0_wp) then
          error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
             //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
-      else if (.not. max(history%impulse_residual, history%energy_residual) <= most_residual) then
+      else if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
          error = numerical_error('&measured_modes: the balance of impulse misses by ' &
             //to_text(history%impulse_residual)//' and that of energy by '//to_text(history%energy_residual) &
-            //'; allowed: up to '//to_text(most_residual))
+            //'; allowed: up to '//to_text(max_residual))
       else
          call check_contact_samples(sampling, history%contact_time, error)
       end if

@@ -8,17 +8,17 @@ module thud_sampling
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, least_contact_samples
+   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, min_contact_samples
    public :: sampling_type
 
    !> Samples of one record; more would fill the memory and no drop needs them.
-   real(wp), parameter :: most_samples = 5.0e6_wp
+   real(wp), parameter :: max_samples = 5.0e6_wp
 
    !> Integration steps of one record; more would run for minutes.
-   real(wp), parameter :: most_steps = 1.0e8_wp
+   real(wp), parameter :: max_steps = 1.0e8_wp
 
    !> Samples that a contact needs to be more than a few spikes.
-   real(wp), parameter :: least_contact_samples = 8.0_wp
+   real(wp), parameter :: min_contact_samples = 8.0_wp
 
    !> The sampled record; the default rate is the paper's.
    type :: sampling_type
@@ -56,14 +56,14 @@ contains
       real(wp) :: samples
 
       samples = sampling%duration*sampling%sample_rate
-      if (samples > most_samples) then
+      if (samples > max_samples) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s at sample_rate = ' &
             //to_text(sampling%sample_rate)//' Hz makes '//to_text(samples)//' samples; allowed: up to ' &
-            //to_text(most_samples))
-      else if (samples*real(sampling%substeps, wp) > most_steps) then
+            //to_text(max_samples))
+      else if (samples*real(sampling%substeps, wp) > max_steps) then
          error = input_error('&sampling: substeps = '//to_text(sampling%substeps)//' with '//to_text(samples) &
             //' samples makes '//to_text(samples*real(sampling%substeps, wp))//' steps; allowed: up to ' &
-            //to_text(most_steps))
+            //to_text(max_steps))
       end if
    end subroutine check_sampling
 
@@ -76,9 +76,9 @@ contains
       !> Names the rate that would do.
       type(error_type), allocatable, intent(out) :: error
 
-      if (contact_time*sampling%sample_rate >= least_contact_samples) return
+      if (contact_time*sampling%sample_rate >= min_contact_samples) return
       error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the contact of ' &
-         //to_text(contact_time)//' s too few samples; allowed: from '//to_text(least_contact_samples/contact_time)//' Hz')
+         //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
    end subroutine check_contact_samples
 
    !> Number of samples of the record.

@@ -155,7 +155,7 @@ def test_record_goes_on_as_free_flight(impact: thud.Impact) -> None:
     np.testing.assert_allclose(np.diff(impact.velocity[end:]) * impact.sample_rate, 9.81, rtol=0.02)
     fall = np.diff(impact.deflection[end:]) * impact.sample_rate
     np.testing.assert_allclose(fall, impact.velocity[end:-1], atol=9.81 / impact.sample_rate)
-    assert (impact.channels["least_volume_ratio"] > 0).all()
+    assert (impact.channels["minimum_volume_ratio"] > 0).all()
     long = thud.solve(
         model="finite_element", duration=1.0, sample_rate=16000, snapshot_interval=0, **COARSE
     )

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from thud.fitting.result import Estimates
 
 # More parameters than that are drawn as a table of correlations.
-MOST_PANELS = 5
+MAX_PANELS = 5
 BAND = "0.85"
 # Letters of a label along all panels.
 LINE = 44
@@ -132,7 +132,7 @@ def _draw_levels(fit: Estimates, above: Axes, below: Axes) -> None:
     below.set_xticks(place, [BROKEN.get(name, name) for name in names])
     below.xaxis.set_minor_locator(NullLocator())
     below.set_xlim(-0.6, len(names) - 0.4)
-    if count > MOST_PANELS:
+    if count > MAX_PANELS:
         below.tick_params(axis="x", labelrotation=90)
     below.set_xlabel("Band, Hz", fontsize=SIZE)
     above.set_ylabel("Force exposure level, dB", fontsize=SIZE)
@@ -157,7 +157,7 @@ def confidence(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> Figure
     """
     count = len(fit.names)
     known = np.isfinite(np.diag(fit.covariance)).all()
-    if count > MOST_PANELS or not known:
+    if count > MAX_PANELS or not known:
         return _draw_correlation(fit)
     side = max(2.6, 0.95 * count + 0.6) if count > 2 else 2.6  # noqa: PLR2004 - a single pair
     figure = Figure(figsize=(WIDTH, side), dpi=300, layout="constrained")

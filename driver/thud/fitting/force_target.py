@@ -13,7 +13,7 @@ from thud.checks import shown
 from thud.errors import InputError
 from thud.fitting.misfit import require_choice, require_positive
 from thud.impact import FORCES, Impact
-from thud.recording import LEAST_ROWS, Recording
+from thud.recording import MIN_ROWS, Recording
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -27,7 +27,7 @@ OPEN_END = 0.1
 END = 1e-3
 # A doubt needs this many independent values during contact and otherwise, this probability of
 # Fisher's F, and a residual above this part of the largest force: less comes from sampling.
-LEAST_FREEDOM = 5
+MIN_FREEDOM = 5
 SURE = 0.999
 NUMERICAL = 1e-4
 
@@ -118,7 +118,7 @@ def _cut(
     except (TypeError, ValueError, OverflowError):
         begin = end = np.nan
     inside = (time >= begin) & (time <= end)
-    if np.count_nonzero(inside) < LEAST_ROWS or not force[inside].max() > 0:
+    if np.count_nonzero(inside) < MIN_ROWS or not force[inside].max() > 0:
         message = (
             f"target: window = {shown(window)} is not allowed; allowed: begin and end, s, of an "
             f"impact between {time[0]:g} and {time[-1]:g}"
@@ -214,7 +214,7 @@ class ForceMisfit:
         inside = (self.time >= shift) & (self.time <= shift + impact.contact_time)
         rate = 2 * self.frequency[-1] / self.sample_rate
         during, else_ = rate * inside.sum() - count, rate * (~inside).sum()
-        if min(during, else_) < LEAST_FREEDOM:
+        if min(during, else_) < MIN_FREEDOM:
             return ""
         square = (residual[inside] ** 2).sum() / during
         other = (residual[~inside] ** 2).sum() / else_

@@ -22,7 +22,7 @@ NO_EFFECT = 1e-9
 UNRESOLVED = 0.5
 # Singular values of the Jacobian below this part of the largest, or below this many of its own
 # errors, are taken for zero.
-LEAST_RATIO = 1e-6
+MIN_RATIO = 1e-6
 ERRORS = 3.0
 # Part of a unit vector below which a parameter does not belong to it.
 NEGLIGIBLE = 1e-3
@@ -74,7 +74,7 @@ def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float
     error = np.max(change / length, where=~dead, initial=0.0)
     _, values, turned = np.linalg.svd(np.where(dead, 0.0, jacobian / length), full_matrices=True)
     values = np.concatenate([values, np.zeros(count - len(values))])
-    lost = values <= max(LEAST_RATIO, ERRORS * error) * values[0]
+    lost = values <= max(MIN_RATIO, ERRORS * error) * values[0]
     known = turned[~lost] / values[~lost, np.newaxis]
     covariance = known.T @ known / np.outer(length, length)
     unknown = (np.abs(turned[lost]) > NEGLIGIBLE).any(axis=0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._library import version
+from thud._api import version
 from thud.fitting.inference import coverage_factor
 from thud.tables import aligned
 from thud.units import handy_unit

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from thud.recording import Recording
 
 # More starts, or steps of a search, than this come to no end.
-MOST = 100_000
+MAXIMUM = 100_000
 # Where steps and gains are this small, relative, the search ends.
 TOLERANCE = 1e-8
 # A parameter this close to a limit, relative, lies at it.
@@ -106,8 +106,8 @@ def fit(  # noqa: PLR0913 - what there is to choose
     case = Case() if base is None else base
     require_kind("base", case, Case)
     require_level(level)
-    require_whole("starts", starts, 1, MOST)
-    require_whole("max_steps", max_steps, 1, MOST)
+    require_whole("starts", starts, 1, MAXIMUM)
+    require_whole("max_steps", max_steps, 1, MAXIMUM)
     require_whole("seed", seed, 0, LARGEST_SEED)
     ranges = get_ranges(case, parameters)
     misfit = (

@@ -19,7 +19,7 @@ from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole, shown
-from thud.ensemble import MOST_THREADS
+from thud.ensemble import MAX_THREADS
 from thud.errors import InputError, NumericalError, ThudError
 from thud.studies.evaluation import Block, evaluate
 
@@ -107,7 +107,7 @@ def checked_backend(
         if scheduler:
             message = f"workers = {shown(workers)} is not allowed for dask; allowed: those it has"
             raise InputError(message)
-        require_whole("workers", workers, 1, MOST_THREADS)
+        require_whole("workers", workers, 1, MAX_THREADS)
     return backend, workers, scheduler
 
 
@@ -140,7 +140,7 @@ def _open(
         with _dask(scheduler) as opened:
             yield opened
         return
-    width = workers or min(len(os.sched_getaffinity(0)), MOST_THREADS)
+    width = workers or min(len(os.sched_getaffinity(0)), MAX_THREADS)
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             yield threads, width

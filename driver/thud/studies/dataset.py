@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 import thud
-from thud._library import compiler
+from thud._api import compiler
 from thud.levels import BANDWIDTHS, get_bands
 from thud.studies import sets
 from thud.studies.designs import makers

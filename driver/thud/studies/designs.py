@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from thud.checks import LARGEST_SEED, require_whole, require_words
 from thud.errors import InputError
-from thud.studies.parameters import MOST_VALUES, Normal, Parameter, Uniform
+from thud.studies.parameters import MAX_VALUES, Normal, Parameter, Uniform
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -22,9 +22,9 @@ DESIGNS = {
 }
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
-LEAST_SAMPLES = 4
+MIN_SAMPLES = 4
 # NumPy counts no further.
-_MOST_SETS = 2**63 - 1
+_MAX_SETS = 2**63 - 1
 
 
 def makers(design: str) -> dict[str, str]:
@@ -77,14 +77,14 @@ def read_design(
     if design == "list" and len({p.spread.size for p in parameters}) > 1:
         message = "[parameters] differ in their number of values; allowed: the same for all"
         raise InputError(message)
-    if design == "grid" and math.prod(p.spread.size for p in parameters) > _MOST_SETS:
+    if design == "grid" and math.prod(p.spread.size for p in parameters) > _MAX_SETS:
         message = "[parameters] make too many sets; allowed: up to 2^63 - 1 in a grid"
         raise InputError(message)
     if design not in DRAWN:
         return design, 0, 0
     size, seed = given.get("size", 0), given.get("seed", 0)
-    least = LEAST_SAMPLES if design == "saltelli" else 1
-    require_whole("[design] size", size, least, MOST_VALUES)
+    least = MIN_SAMPLES if design == "saltelli" else 1
+    require_whole("[design] size", size, least, MAX_VALUES)
     require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
         near = 1 << size.bit_length() - 1

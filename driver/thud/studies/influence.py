@@ -11,7 +11,7 @@ import xarray as xr
 from thud.errors import InputError
 from thud.levels import get_bands
 from thud.studies.dataset import coordinate
-from thud.studies.designs import LEAST_SAMPLES
+from thud.studies.designs import MIN_SAMPLES
 from thud.studies.run import sweep
 from thud.studies.study import read_study
 
@@ -105,7 +105,7 @@ def sensitivity(
     }
     dimension = len(plan.parameters)
     usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
-    if usable.sum() < LEAST_SAMPLES:
+    if usable.sum() < MIN_SAMPLES:
         reason = next(text for text in dataset["reason"].values if text)
         message = f"only {usable.sum()} of {plan.size} base samples have results ({reason})"
         message += "; allowed: ranges in which sets have some"

@@ -120,7 +120,7 @@ class Parameter:
 
 
 # More values of a parameter, or base samples, than this do not fit into memory.
-MOST_VALUES = 2**30
+MAX_VALUES = 2**30
 # What a parameter may be given by; `unit` may stand with each of them.
 _FORMS = {
     "values": {"values"},
@@ -260,7 +260,7 @@ def _uniform(place: str, key: Key, given: Mapping[str, Any], power: int) -> Unif
         message = f"{place}: low = {given['low']!r} is not allowed; allowed: low < high"
         raise InputError(message + (", 0 < low" if scale == "log" else ""))
     if "count" in given:
-        require_whole(f"{place}: count", count, 2, int(high - low) + 1 if whole else MOST_VALUES)
+        require_whole(f"{place}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
     return Uniform(low, high, count, scale == "log", whole)
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from thud.studies.study import Source
 
 # More sets than this have to be confirmed.
-MOST_SETS = 100_000
+MAX_SETS = 100_000
 
 
 class How(TypedDict, total=False):
@@ -94,8 +94,8 @@ def sweep(  # noqa: PLR0913 - a study has a place, a backend and a face
     # A study of another kind is a sweep too.
     plan = study if isinstance(study, Study) else read_study(study)
     total = sets.count(plan)
-    if total > MOST_SETS and not yes:
-        message = f"{describe(plan)}; allowed: up to {MOST_SETS} sets, more with yes=True (--yes)"
+    if total > MAX_SETS and not yes:
+        message = f"{describe(plan)}; allowed: up to {MAX_SETS} sets, more with yes=True (--yes)"
         raise InputError(message)
     checked_backend(backend, workers, scheduler)
     size = block_size(plan.base)

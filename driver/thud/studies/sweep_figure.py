@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     Columns = dict[str, NDArray[Any]]
 
 # More values of a parameter than this are put into as many classes.
-_MOST_VALUES = 32
+_MAX_VALUES = 32
 _CLASSES = 16
 # More points of a line than this have no markers, half as many in half the width.
-_MOST_MARKS = 16
+_MAX_MARKS = 16
 # Texts of a parameter up to this many have a panel each.
-_MOST_PANELS = 6
+_MAX_PANELS = 6
 _TINY = 0.05
 
 
@@ -58,7 +58,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
-    split = next((n for n in texts if len(np.unique(columns[n])) <= _MOST_PANELS), None)
+    split = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
     judged = _judge(dataset, columns)
     parts = {"": np.ones(len(columns[name]), dtype=bool)}
     if split:
@@ -71,7 +71,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
         _draw_tolerance(dress(axes), judged.tolerance)
         levels = np.where(panel[:, np.newaxis], judged.excess, np.nan)
-        most = _MOST_MARKS // across
+        most = _MAX_MARKS // across
         _draw_octaves(axes, dataset[name], columns[name], levels, most)
         axes.set_title(title.replace("_", " "), fontsize=SIZE - 1)
         lowest = i + across >= len(parts)
@@ -153,7 +153,7 @@ def _classes(
     if values.dtype.kind not in "iuf":
         members = [values == value for value in found]
         return np.arange(len(found), dtype=float), members, [str(value) for value in found]
-    if len(found) <= _MOST_VALUES:
+    if len(found) <= _MAX_VALUES:
         return found.astype(float), [values == value for value in found], None
     edges = np.quantile(values, np.linspace(0, 1, _CLASSES + 1))
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)

@@ -3,13 +3,13 @@
 !>
 !> Every number of a set comes from its own lane of matrices and vectors of fixed shape: it does not
 !> depend on the number of threads, on the other sets or on the place among them.
-module thud_ensemble_run
-   use thud_aligned, only: get_aligned_start, line_length
+module thud_ensemble
+   use thud_cache_line, only: get_aligned_start, line_length
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
       new_band_projection
    use thud_constants, only: reference_force, reference_time
-   use thud_ensemble, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
+   use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_error, only: error_type, input_error, numerical_error
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
@@ -43,7 +43,7 @@ module thud_ensemble_run
    end type verdict_type
 
    !> Arrays of one thread.
-   type :: room_type
+   type :: workspace_type
       !> Room for the forces: [2 block_size n_row + line_length].
       real(wp), allocatable :: force(:)
       !> Room for folded forces: [2 block_size n_row].
@@ -54,7 +54,7 @@ module thud_ensemble_run
       type(criterion_type) :: criteria(criterion_count)
       !> What keeps the thread from going on.
       type(error_type), allocatable :: error
-   end type room_type
+   end type workspace_type
 
 contains
 
@@ -115,26 +115,26 @@ contains
 
    contains
 
-      !> The blocks of one thread, in its own room.
+      !> The blocks of one thread, in its own workspace.
       subroutine run_blocks()
-         type(room_type) :: room
+         type(workspace_type) :: workspace
          integer :: block
 
-         call set_room(room, sampling, limits, get_class_window(size(projections%window)))
+         call set_workspace(workspace, sampling, limits, get_class_window(size(projections%window)))
          !$omp do schedule(dynamic)
          do block = 1, size(first) - 1
-            if (.not. allocated(room%error)) call run_block(room, order(first(block):first(block + 1) - 1))
+            if (.not. allocated(workspace%error)) call run_block(workspace, order(first(block):first(block + 1) - 1))
          end do
          !$omp end do
          !$omp critical (thud_ensemble_error)
-         if (allocated(room%error)) error = room%error
+         if (allocated(workspace%error)) error = workspace%error
          !$omp end critical (thud_ensemble_error)
       end subroutine run_blocks
 
       !> One block, from its sets to its verdicts.
-      subroutine run_block(room, members)
+      subroutine run_block(workspace, members)
          !> Arrays of the thread.
-         type(room_type), intent(inout) :: room
+         type(workspace_type), intent(inout) :: workspace
          !> Numbers of the sets: [n_member].
          integer, intent(in) :: members(:)
          type(set_outcome_type) :: found(size(members))
@@ -142,21 +142,21 @@ contains
          logical :: met(force_count, size(members))
          integer :: i
 
-         call solve_room(room, sets(members), sampling, judged, projections, found, found_levels, met)
+         call solve_workspace(workspace, sets(members), sampling, judged, projections, found, found_levels, met)
          do i = 1, size(members)
             outcomes(members(i)) = found(i)
             levels(:, :, members(i)) = found_levels(:, :, i)
             verdicts(members(i))%conforms = met(:, i)
-            if (size(forces) > 0 .and. found(i)%status == set_is_fine) call copy_forces(room, i, forces(:, :, members(i)))
+            if (size(forces) > 0 .and. found(i)%status == set_is_fine) call copy_forces(workspace, i, forces(:, :, members(i)))
          end do
       end subroutine run_block
 
    end subroutine solve_ensemble
 
    !> Arrays of a thread. Memory that no contact comes to is never touched.
-   subroutine set_room(room, sampling, limits, n_row)
+   subroutine set_workspace(workspace, sampling, limits, n_row)
       !> The arrays, or an error where there is no memory for them.
-      type(room_type), intent(out) :: room
+      type(workspace_type), intent(out) :: workspace
       !> The sampling, for the error.
       type(sampling_type), intent(in) :: sampling
       !> Limits of the source.
@@ -167,19 +167,19 @@ contains
       real(wp) :: nothing(octave_count)
       integer :: status
 
-      allocate (room%force(force_count*block_size*n_row + line_length), stat=status, errmsg=message)
-      if (status == 0) allocate (room%folded(force_count*block_size*n_row), stat=status, errmsg=message)
-      if (status /= 0) room%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
+      allocate (workspace%force(force_count*block_size*n_row + line_length), stat=status, errmsg=message)
+      if (status == 0) allocate (workspace%folded(force_count*block_size*n_row), stat=status, errmsg=message)
+      if (status /= 0) workspace%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
          //' sets no room in memory; allowed: shorter records, or fewer threads')
       nothing = 0.0_wp
-      room%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
-   end subroutine set_room
+      workspace%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
+   end subroutine set_workspace
 
    !> Outcomes, levels and verdicts of one block.
-   subroutine solve_room(room, sets, sampling, judged, projections, outcomes, levels, met)
+   subroutine solve_workspace(workspace, sets, sampling, judged, projections, outcomes, levels, met)
       !> Arrays of the thread.
-      type(room_type), intent(inout), target :: room
+      type(workspace_type), intent(inout), target :: workspace
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> The sampling.
@@ -199,11 +199,11 @@ contains
       integer :: class(size(sets))
       integer :: i, j, row, last_sample, window
 
-      force => get_force(room)
+      force => get_force(workspace)
       call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
       levels = not_a_number
       met = .false.
-      room%last_sample = last_sample
+      workspace%last_sample = last_sample
       if (.not. judged) return
       class = 0
       do i = 1, size(sets)
@@ -214,33 +214,33 @@ contains
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
-         call require_window(projections, window, room%error)
-         if (allocated(room%error)) return
-         call get_band_energies(projections%window(window), force_count*block_size, force, room%folded, energy, square_sum)
+         call require_window(projections, window, workspace%error)
+         if (allocated(workspace%error)) return
+         call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, square_sum)
          do i = 1, size(sets)
             if (class(i) /= window) cycle
             do j = 1, force_count
                row = i + (j - 1)*block_size
                levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
                   /(reference_force**2*reference_time))
-               met(j, i) = is_conforming(room%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), row, &
+               met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), row, &
                   sampling)
             end do
          end do
       end do
-   end subroutine solve_room
+   end subroutine solve_workspace
 
    !> The forces of the block in a room: [force_count block_size, n_row].
-   function get_force(room) result(force)
+   function get_force(workspace) result(force)
       !> Arrays of the thread.
-      type(room_type), intent(in), target :: room
+      type(workspace_type), intent(in), target :: workspace
       !> Elastic forces, then floor forces, N.
       real(wp), pointer, contiguous :: force(:, :)
       integer :: first
 
-      first = get_aligned_start(room%force)
-      force(1:force_count*block_size, 1:size(room%folded)/(force_count*block_size)) => &
-         room%force(first:first + size(room%folded) - 1)
+      first = get_aligned_start(workspace%force)
+      force(1:force_count*block_size, 1:size(workspace%folded)/(force_count*block_size)) => &
+         workspace%force(first:first + size(workspace%folded) - 1)
    end function get_force
 
    !> Makes the matrices of a window unless they are there.
@@ -293,9 +293,9 @@ contains
    end function is_conforming
 
    !> Copies the forces of one set.
-   subroutine copy_forces(room, i, forces)
+   subroutine copy_forces(workspace, i, forces)
       !> Arrays of the thread.
-      type(room_type), intent(in), target :: room
+      type(workspace_type), intent(in), target :: workspace
       !> Number of the set in the block.
       integer, intent(in) :: i
       !> Its forces, N: [n_sample, force_count].
@@ -303,11 +303,11 @@ contains
       real(wp), pointer, contiguous :: force(:, :)
       integer :: j
 
-      force => get_force(room)
+      force => get_force(workspace)
       do j = 1, force_count
          forces(:, j) = 0.0_wp
-         forces(:room%last_sample, j) = force(i + (j - 1)*block_size, :room%last_sample)
+         forces(:workspace%last_sample, j) = force(i + (j - 1)*block_size, :workspace%last_sample)
       end do
    end subroutine copy_forces
 
-end module thud_ensemble_run
+end module thud_ensemble

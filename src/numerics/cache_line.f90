@@ -1,7 +1,7 @@
 !> Arrays that begin where the lines of the cache do: the processor takes twice as long for a vector
 !> that lies across two lines (all of an ensemble's march takes 1.3 times as long), and `allocate`
 !> promises less.
-module thud_aligned
+module thud_cache_line
    use, intrinsic :: iso_c_binding, only: c_intptr_t, c_loc
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -26,4 +26,4 @@ contains
       first = 1 + int(modulo(-address, int(8*line_length, c_intptr_t))/8)
    end function get_aligned_start
 
-end module thud_aligned
+end module thud_cache_line

@@ -1,13 +1,13 @@
-!> The flat door for Python: plain arguments, explicit shapes, a status and a message.
+!> The flat API for Python: plain arguments, explicit shapes, a status and a message.
 !> f2py wraps these procedures and nothing else; they pass on and decide nothing.
 !>
 !> `status` is 0, or the code of the error whose sentence is in `message`. Procedures marked
 !> `threadsafe` let other Python threads run meanwhile; those that make long texts are not, see
 !> `thud_text`.
-module thud_door
+module thud_api
    use thud_case, only: case_type, describe_keys, get_case_text, read_case
    use thud_constants, only: program_compiler => compiler, program_version => version
-   use thud_error, only: error_type, tell
+   use thud_error, only: error_type, get_status
    use thud_finite_element_options, only: get_frame_count
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
@@ -63,7 +63,7 @@ contains
       text = ''
       call load_case(path, case, error)
       if (.not. allocated(error)) text = get_case_text(case)
-      call tell(error, status, message)
+      call get_status(error, status, message)
    end subroutine effective_case
 
    !> Sizes of the results of a case.
@@ -101,7 +101,7 @@ contains
             end associate
          end if
       end if
-      call tell(error, status, message)
+      call get_status(error, status, message)
    end subroutine get_sizes
 
    !> Results of a case: the force history and the snapshots.
@@ -184,7 +184,7 @@ contains
       cavity_pressure = 0.0_wp
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
-      call tell(error, status, message)
+      call get_status(error, status, message)
       if (status /= 0 .or. .not. case%has_impact) return
       associate (history => results%history)
          deflection = history%deflection
@@ -272,7 +272,7 @@ contains
       call read_case(text, 'python', case, error)
       case%has_impact = .false.
       if (.not. allocated(error)) call compute_case(case, results, error)
-      call tell(error, status, message)
+      call get_status(error, status, message)
       if (status /= 0) return
       frequency = results%modes%frequency
       harmonic = results%modes%harmonic
@@ -307,7 +307,7 @@ contains
       loss_factor = 0.0_wp
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call new_material(case%options%finite_element%material, case%ball, material, error)
-      call tell(error, status, message)
+      call get_status(error, status, message)
       if (status /= 0) return
       do i = 1, n
          loss_factor(i) = get_material_loss_factor(material, frequency(i))
@@ -344,7 +344,7 @@ contains
       if (progress == 1) call begin_progress()
       call run_case(path, output, outcome, error)
       call end_progress()
-      call tell(error, status, message)
+      call get_status(error, status, message)
       if (status /= 0) return
       directory = outcome%directory
       table = outcome%table
@@ -352,4 +352,4 @@ contains
       conforming = merge(1, 0, outcome%conforms)
    end subroutine run
 
-end module thud_door
+end module thud_api

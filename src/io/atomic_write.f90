@@ -1,5 +1,5 @@
 !> Files while they are written: they have other names, so that nobody takes half a file for a whole one.
-module thud_part_file
+module thud_atomic_write
    use thud_error, only: error_type, input_error
    use thud_posix, only: directory_exists, make_directory, remove_file, rename_file
    implicit none (type, external)
@@ -154,4 +154,4 @@ contains
          //'); allowed: a directory that you may write to, with room on its disk')
    end function writing_error
 
-end module thud_part_file
+end module thud_atomic_write

@@ -1,11 +1,11 @@
-!> The flat door for Python to ensembles; see `thud_door`.
-module thud_ensemble_door
+!> The flat API for Python to ensembles; see `thud_api`.
+module thud_ensemble_api
    use thud_ball, only: ball_type
    use thud_band, only: band_type, get_thirds
    use thud_drop, only: drop_type
-   use thud_ensemble, only: get_set_fields, parameter_count, set_outcome_type, set_type
-   use thud_ensemble_run, only: new_projections, projections_type, solve_ensemble, verdict_type
-   use thud_error, only: error_type, tell
+   use thud_shell_sets, only: get_set_fields, parameter_count, set_outcome_type, set_type
+   use thud_ensemble, only: new_projections, projections_type, solve_ensemble, verdict_type
+   use thud_error, only: error_type, get_status
    use thud_field, only: check_fields, field_type
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
@@ -80,7 +80,7 @@ contains
       call check_fields(get_sampling_fields(sampling), error)
       if (.not. allocated(error)) call check_sampling(sampling, error)
       if (.not. allocated(error)) n_sample = get_sample_count(sampling)
-      call tell(error, status, message)
+      call get_status(error, status, message)
    end subroutine ensemble_size
 
    !> Outcomes of all sets; `ensemble_size` has checked the sampling.
@@ -149,7 +149,7 @@ contains
             outcomes(i)%max_deflection, outcomes(i)%restitution, outcomes(i)%impulse]
          met(:, i) = merge(1, 0, verdicts(i)%conforms)
       end do
-      call tell(error, status, message)
+      call get_status(error, status, message)
    end subroutine solve_sets
 
    !> Keeps the matrices of the last call where they serve this one.
@@ -171,4 +171,4 @@ contains
       projections = wanted
    end subroutine require_projections
 
-end module thud_ensemble_door
+end module thud_ensemble_api

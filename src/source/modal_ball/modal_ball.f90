@@ -27,10 +27,10 @@ module thud_modal_ball
    public :: solve_modal_ball
 
    !> Angle that a mode may turn through in a step; faster ones answer statically.
-   real(wp), parameter :: most_phase = pi/2
+   real(wp), parameter :: max_phase = pi/2
 
    !> Part of the energy at first touch that the steps may lose in contact.
-   real(wp), parameter :: most_energy_residual = 0.02_wp
+   real(wp), parameter :: max_energy_residual = 0.02_wp
 
    !> Families whose energy is told apart in the output, from n = 0 on.
    integer, parameter :: n_told = 6
@@ -108,7 +108,7 @@ contains
             associate (static => options%static_families)
                if (any(nint(static%values(:static%count)) == n)) kept = 0
             end associate
-            call get_family(basis, n, kept, most_phase/interval, family, failed)
+            call get_family(basis, n, kept, max_phase/interval, family, failed)
          else
             call get_static_family(basis, n, family, failed)
          end if
@@ -257,9 +257,9 @@ contains
          history%impulse_residual = abs(history%impulse - momentum)/momentum
          history%energy_residual = abs(mass/2*speed**2 + energy - initial)/initial
       end associate
-      if (.not. history%energy_residual <= most_energy_residual) then
+      if (.not. history%energy_residual <= max_energy_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
-            //to_text(history%energy_residual)//'; allowed: up to '//to_text(most_energy_residual))
+            //to_text(history%energy_residual)//'; allowed: up to '//to_text(max_energy_residual))
       end if
    end subroutine finish
 

@@ -1,50 +1,50 @@
 !> Impacts of many balls side by side: their state, steps and parts of a step, and where in a step a phase ends.
-module thud_impact_lanes
+module thud_impact_batch
    use thud_constants, only: pi
    use thud_hollow_sphere, only: shell_type
    use thud_kinds, only: wp
    use thud_lumped, only: at_deflection, at_velocity
    use thud_rk4, only: rk4_step
-   use thud_shell_lanes, only: lane_count, shell_lanes_type, state_lanes_type
-   use thud_shell_series, only: get_flows, place_series, series_lanes_type, take_step
+   use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
+   use thud_shell_series, only: get_flows, place_series, series_batch_type, take_step
    implicit none (type, external)
    private
 
-   public :: add_end, advance, finish_step, get_single, get_watched, impact_lanes_type, is_finite, locate
+   public :: add_end, advance, finish_step, get_single, get_watched, impact_batch_type, is_finite, locate
 
-   !> Impacts, in the units of `thud_shell_lanes` unless said otherwise. Fastest where it begins with a
-   !> line of the cache, see `thud_aligned`.
-   type :: impact_lanes_type
+   !> Impacts, in the units of `thud_shell_batch` unless said otherwise. Fastest where it begins with a
+   !> line of the cache, see `thud_cache_line`.
+   type :: impact_batch_type
       !> Series of the equations.
-      type(series_lanes_type) :: series
-      !> Velocity at first touch: [lane_count].
-      real(wp) :: impact_velocity(lane_count)
+      type(series_batch_type) :: series
+      !> Velocity at first touch: [batch_size].
+      real(wp) :: impact_velocity(batch_size)
       !> The present state and, in the other place, that at the end of the step under way.
-      type(state_lanes_type) :: states(2)
-      !> Ones, the length of whole steps: [lane_count].
-      real(wp) :: whole_step(lane_count)
-      !> Largest deflection: [lane_count].
-      real(wp) :: max_deflection(lane_count)
-      !> Largest elastic force, at samples and turning point, N: [lane_count].
-      real(wp) :: peak_force(lane_count)
-      !> Largest force on the floor, likewise, N: [lane_count].
-      real(wp) :: peak_floor_force(lane_count)
-      !> Steps from first touch to release: [lane_count].
-      real(wp) :: contact(lane_count)
+      type(state_batch_type) :: states(2)
+      !> Ones, the length of whole steps: [batch_size].
+      real(wp) :: whole_step(batch_size)
+      !> Largest deflection: [batch_size].
+      real(wp) :: max_deflection(batch_size)
+      !> Largest elastic force, at samples and turning point, N: [batch_size].
+      real(wp) :: peak_force(batch_size)
+      !> Largest force on the floor, likewise, N: [batch_size].
+      real(wp) :: peak_floor_force(batch_size)
+      !> Steps from first touch to release: [batch_size].
+      real(wp) :: contact(batch_size)
       !> The equations.
-      type(shell_lanes_type) :: shell
+      type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight
       !> Place of the present state: that at release or, where a lane did not get there, at the beginning of
       !> its last step.
       integer :: now
-      !> The ball was released: [lane_count].
-      logical :: released(lane_count)
-      !> A stage has left the domain of the equation: [lane_count].
-      logical :: left(lane_count)
-      !> The last step led beyond the reach of the series: [lane_count].
-      logical :: strayed(lane_count)
-   end type impact_lanes_type
+      !> The ball was released: [batch_size].
+      logical :: released(batch_size)
+      !> A stage has left the domain of the equation: [batch_size].
+      logical :: left(batch_size)
+      !> The last step led beyond the reach of the series: [batch_size].
+      logical :: strayed(batch_size)
+   end type impact_batch_type
 
 contains
 
@@ -52,15 +52,15 @@ contains
    !> reach of their series take it one by one as the single solver does, powers and all.
    pure subroutine advance(impacts, goes, length, elastic_force, floor_force, missed)
       !> The impacts; the new velocity is NaN where a stage has left the domain of the equation.
-      type(impact_lanes_type), intent(inout) :: impacts
-      !> The result for the lane matters: [lane_count].
-      logical, intent(in) :: goes(lane_count)
-      !> Length of the step: [lane_count].
-      real(wp), intent(in) :: length(lane_count)
-      !> Elastic force at the beginning, N: [lane_count].
-      real(wp), intent(out) :: elastic_force(lane_count)
-      !> Force on the floor, likewise, N: [lane_count].
-      real(wp), intent(out) :: floor_force(lane_count)
+      type(impact_batch_type), intent(inout) :: impacts
+      !> The result for the lane matters: [batch_size].
+      logical, intent(in) :: goes(batch_size)
+      !> Length of the step: [batch_size].
+      real(wp), intent(in) :: length(batch_size)
+      !> Elastic force at the beginning, N: [batch_size].
+      real(wp), intent(out) :: elastic_force(batch_size)
+      !> Force on the floor, likewise, N: [batch_size].
+      real(wp), intent(out) :: floor_force(batch_size)
       !> There are such lanes.
       logical, intent(out) :: missed
       integer :: i, then
@@ -69,7 +69,7 @@ contains
       call take_step(impacts%shell, impacts%series, impacts%states(impacts%now), length, impacts%states(then), &
          elastic_force, floor_force, missed)
       if (.not. missed) return
-      do i = 1, lane_count
+      do i = 1, batch_size
          impacts%strayed(i) = goes(i) .and. .not. is_finite(impacts%states(then)%velocity(i))
          if (impacts%strayed(i)) call take_single_step(impacts, i, length(i))
       end do
@@ -78,7 +78,7 @@ contains
    !> The step of one lane by the single solver.
    pure subroutine take_single_step(impacts, i, length)
       !> The impacts; the new velocity stays NaN where a stage leaves the domain of the equation.
-      type(impact_lanes_type), intent(inout) :: impacts
+      type(impact_batch_type), intent(inout) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
       !> Length of the step.
@@ -98,7 +98,7 @@ contains
    !> The equation of one lane as the single solver has it, in the units of the lanes.
    pure function get_single(shell, i) result(single)
       !> The equations.
-      type(shell_lanes_type), intent(in) :: shell
+      type(shell_batch_type), intent(in) :: shell
       !> Number of the lane.
       integer, intent(in) :: i
       !> A ball of unit diameter and mass in the present phase.
@@ -129,16 +129,16 @@ contains
    !> lanes at once. Lanes without such an end get the whole step.
    subroutine locate(impacts, compressing, ends, length)
       !> The impacts, at the beginning of the step.
-      type(impact_lanes_type), intent(inout) :: impacts
+      type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> The phase of the lane ends in this step: [lane_count].
-      logical, intent(in) :: ends(lane_count)
-      !> The parts: [lane_count].
-      real(wp), intent(out) :: length(lane_count)
-      integer, parameter :: most_iterations = 200
-      real(wp), dimension(lane_count) :: left, right, left_value, right_value, value, rounding
-      logical, dimension(lane_count) :: open, left_moved, right_moved
+      !> The phase of the lane ends in this step: [batch_size].
+      logical, intent(in) :: ends(batch_size)
+      !> The parts: [batch_size].
+      real(wp), intent(out) :: length(batch_size)
+      integer, parameter :: max_iterations = 200
+      real(wp), dimension(batch_size) :: left, right, left_value, right_value, value, rounding
+      logical, dimension(batch_size) :: open, left_moved, right_moved
       integer :: iteration
 
       call place_series(impacts%shell, impacts%states(impacts%now), ends, impacts%series)
@@ -149,7 +149,7 @@ contains
       rounding = epsilon(1.0_wp)*abs(right_value - left_value)
       left_moved = .false.
       right_moved = .false.
-      do iteration = 1, most_iterations
+      do iteration = 1, max_iterations
          open = ends .and. right - left > 2*epsilon(1.0_wp)*right
          if (.not. any(open)) exit
          length = right - right_value*(right - left)/(right_value - left_value)
@@ -179,11 +179,11 @@ contains
 
       !> Where a part of the step would lead.
       subroutine try_length(part, part_value)
-         !> The part: [lane_count].
-         real(wp), intent(in) :: part(lane_count)
-         !> What the end of the phase brings to zero: [lane_count].
-         real(wp), intent(out) :: part_value(lane_count)
-         real(wp), dimension(lane_count) :: elastic_force, floor_force
+         !> The part: [batch_size].
+         real(wp), intent(in) :: part(batch_size)
+         !> What the end of the phase brings to zero: [batch_size].
+         real(wp), intent(out) :: part_value(batch_size)
+         real(wp), dimension(batch_size) :: elastic_force, floor_force
          logical :: missed
 
          call advance(impacts, ends, part, elastic_force, floor_force, missed)
@@ -195,11 +195,11 @@ contains
    !> What the end of the phase brings to zero: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)
       !> The states.
-      type(state_lanes_type), intent(in) :: state
+      type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity.
       logical, intent(in) :: compressing
-      !> Velocity or deflection: [lane_count].
-      real(wp) :: watched(lane_count)
+      !> Velocity or deflection: [batch_size].
+      real(wp) :: watched(batch_size)
 
       watched = state%deflection
       if (compressing) watched = state%velocity
@@ -208,15 +208,15 @@ contains
    !> Takes a part of a step in some of the lanes.
    subroutine finish_step(impacts, goes, length, elastic_force, floor_force)
       !> The impacts; their series are placed at the end.
-      type(impact_lanes_type), intent(inout) :: impacts
-      !> The lane takes the step: [lane_count].
-      logical, intent(in) :: goes(lane_count)
-      !> Its length: [lane_count].
-      real(wp), intent(in) :: length(lane_count)
-      !> Elastic force at its beginning, N: [lane_count].
-      real(wp), intent(out) :: elastic_force(lane_count)
-      !> Force on the floor, likewise, N: [lane_count].
-      real(wp), intent(out) :: floor_force(lane_count)
+      type(impact_batch_type), intent(inout) :: impacts
+      !> The lane takes the step: [batch_size].
+      logical, intent(in) :: goes(batch_size)
+      !> Its length: [batch_size].
+      real(wp), intent(in) :: length(batch_size)
+      !> Elastic force at its beginning, N: [batch_size].
+      real(wp), intent(out) :: elastic_force(batch_size)
+      !> Force on the floor, likewise, N: [batch_size].
+      real(wp), intent(out) :: floor_force(batch_size)
       logical :: missed
 
       associate (state => impacts%states(impacts%now), new => impacts%states(3 - impacts%now))
@@ -237,14 +237,14 @@ contains
    !> (Euler and Maclaurin), of fourth order as the steps are.
    pure subroutine add_end(impacts, goes, value_factor, rate_factor)
       !> The impacts, in reach of their series.
-      type(impact_lanes_type), intent(inout) :: impacts
-      !> The lane takes part: [lane_count].
-      logical, intent(in) :: goes(lane_count)
-      !> Factor of the values at the end: [lane_count].
-      real(wp), intent(in) :: value_factor(lane_count)
-      !> Factor of their rates of change: [lane_count].
-      real(wp), intent(in) :: rate_factor(lane_count)
-      real(wp), dimension(lane_count) :: force, force_rate, power, power_rate
+      type(impact_batch_type), intent(inout) :: impacts
+      !> The lane takes part: [batch_size].
+      logical, intent(in) :: goes(batch_size)
+      !> Factor of the values at the end: [batch_size].
+      real(wp), intent(in) :: value_factor(batch_size)
+      !> Factor of their rates of change: [batch_size].
+      real(wp), intent(in) :: rate_factor(batch_size)
+      real(wp), dimension(batch_size) :: force, force_rate, power, power_rate
 
       associate (state => impacts%states(impacts%now))
          call get_flows(impacts%shell, impacts%series, state, force, force_rate, power, power_rate)
@@ -255,4 +255,4 @@ contains
       end associate
    end subroutine add_end
 
-end module thud_impact_lanes
+end module thud_impact_batch

@@ -2,26 +2,26 @@
 !> as `solve_hollow_sphere`, and the same numbers to 1e-10; the impulse to the residual of its balance.
 !>
 !> Sets that cannot be computed have a status and NaN; they leave the others as they are.
-module thud_ensemble
+module thud_shell_sets
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
-   use thud_aligned, only: get_aligned_start, line_length
+   use thud_cache_line, only: get_aligned_start, line_length
    use thud_ball, only: ball_type, get_ball_fields
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_history, only: force_history_type, most_residual
+   use thud_force_history, only: force_history_type, max_residual
    use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, is_wild, &
       restitution_weights, shell_type, solve_hollow_sphere
-   use thud_impact_lanes, only: get_single, impact_lanes_type
+   use thud_impact_batch, only: get_single, impact_batch_type
    use thud_kinds, only: wp
    use thud_lumped, only: at_deflection, at_velocity
    use thud_power, only: not_a_number
    use thud_rk4, only: longest_valid, rk4_step
-   use thud_sampling, only: get_sample_count, least_contact_samples, sampling_type
+   use thud_sampling, only: get_sample_count, min_contact_samples, sampling_type
    use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_flux, set_is_fine, set_outlasts, set_range
    use thud_shell_impacts, only: solve_impacts
-   use thud_shell_lanes, only: lane_count
+   use thud_shell_batch, only: batch_size
    implicit none (type, external)
    private
 
@@ -29,7 +29,7 @@ module thud_ensemble
    public :: solve_block
 
    !> Sets of one block.
-   integer, parameter :: block_size = lane_count
+   integer, parameter :: block_size = batch_size
 
    !> Keys of a set that are numbers: those of ball and drop.
    integer, parameter :: parameter_count = 10
@@ -64,7 +64,7 @@ module thud_ensemble
 
    !> Residual of the balances of impulse and energy from which on the single solver is asked: the sums that
    !> are taken here err by up to some twenty times as much as the single solver's.
-   real(wp), parameter :: doubtful = 0.1_wp*most_residual
+   real(wp), parameter :: doubtful = 0.1_wp*max_residual
 
    !> Numbers of an outcome.
    integer, parameter :: outcome_count = 6
@@ -175,7 +175,7 @@ contains
       integer, intent(out) :: last_sample
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
-      type(impact_lanes_type), pointer :: impacts
+      type(impact_batch_type), pointer :: impacts
       real(wp), target :: room(storage_size(impacts)/storage_size(1.0_wp) + line_length)
       real(wp) :: step
       integer :: i
@@ -204,10 +204,10 @@ contains
       end do
    end subroutine solve_block
 
-   !> Equation and beginning of one lane; see `thud_shell_lanes` for the units.
+   !> Equation and beginning of one lane; see `thud_shell_batch` for the units.
    pure subroutine set_lane(impacts, i, set, step)
       !> The impacts.
-      type(impact_lanes_type), intent(inout) :: impacts
+      type(impact_batch_type), intent(inout) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
       !> The set.
@@ -231,7 +231,7 @@ contains
    !> What became of one lane, asked in the order of `solve_lumped`.
    function get_lane_status(impacts, i, set, sampling) result(status)
       !> The impacts.
-      type(impact_lanes_type), intent(in) :: impacts
+      type(impact_batch_type), intent(in) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
       !> Its set.
@@ -247,7 +247,7 @@ contains
             status = get_reason(impacts, i, set)
          else if (.not. impacts%released(i)) then
             status = set_outlasts
-         else if (impacts%contact(i) < least_contact_samples*sampling%substeps) then
+         else if (impacts%contact(i) < min_contact_samples*sampling%substeps) then
             status = set_few_samples
          else
             change = abs(impacts%states(impacts%now)%impulse(i) - (z0 - z))/(z0 - z)
@@ -278,7 +278,7 @@ contains
    !> last state inside.
    function get_reason(impacts, i, set) result(status)
       !> The impacts.
-      type(impact_lanes_type), intent(in) :: impacts
+      type(impact_batch_type), intent(in) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
       !> Its set.
@@ -299,4 +299,4 @@ contains
       status = merge(set_coarse, set_closes, is_wild(shell, last))
    end function get_reason
 
-end module thud_ensemble
+end module thud_shell_sets

@@ -5,9 +5,9 @@
 !> turning point waits until all others have, or closed; then the turning points are located
 !> together, and each lane goes on at its own time.
 module thud_shell_impacts
-   use thud_impact_lanes, only: add_end, advance, finish_step, get_watched, impact_lanes_type, is_finite, locate
+   use thud_impact_batch, only: add_end, advance, finish_step, get_watched, impact_batch_type, is_finite, locate
    use thud_kinds, only: wp
-   use thud_shell_lanes, only: lane_count, state_lanes_type
+   use thud_shell_batch, only: batch_size, state_batch_type
    use thud_shell_series, only: place_series, series_steps, will_last
    implicit none (type, external)
    private
@@ -22,17 +22,17 @@ contains
    !> Impacts from first touch to release, and their forces.
    subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
       !> The impacts.
-      type(impact_lanes_type), intent(inout) :: impacts
+      type(impact_batch_type), intent(inout) :: impacts
       !> Samples of the record.
       integer, intent(in) :: n_sample
       !> Steps per sampling interval.
       integer, intent(in) :: substeps
-      !> Elastic forces, then floor forces, N, up to the last contact: [2 lane_count, n_sample].
-      real(wp), intent(inout) :: force(2*lane_count, n_sample)
+      !> Elastic forces, then floor forces, N, up to the last contact: [2 batch_size, n_sample].
+      real(wp), intent(inout) :: force(2*batch_size, n_sample)
       !> Number of the last sample that was written.
       integer, intent(out) :: last_sample
-      real(wp), dimension(lane_count) :: start, last, length, elastic_force, floor_force
-      logical :: turns(lane_count)
+      real(wp), dimension(batch_size) :: start, last, length, elastic_force, floor_force
+      logical :: turns(batch_size)
       integer :: n_step, last_step
 
       n_step = (n_sample - 1)*substeps
@@ -64,28 +64,28 @@ contains
    !> Marches until every lane has come to the end of its phase, or to that of the record.
    subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
       !> The impacts.
-      type(impact_lanes_type), intent(inout) :: impacts
+      type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> Step with which each lane begins: [lane_count].
-      real(wp), intent(in) :: start(lane_count)
-      !> Step in which its phase ends, or in which it fails; `never` if neither: [lane_count].
-      real(wp), intent(out) :: last(lane_count)
+      !> Step with which each lane begins: [batch_size].
+      real(wp), intent(in) :: start(batch_size)
+      !> Step in which its phase ends, or in which it fails; `never` if neither: [batch_size].
+      real(wp), intent(out) :: last(batch_size)
       !> Steps of the record.
       integer, intent(in) :: n_step
       !> Steps per sampling interval.
       integer, intent(in) :: substeps
       !> Samples of the record.
       integer, intent(in) :: n_sample
-      !> Forces, N: [2 lane_count, n_sample].
-      real(wp), intent(inout) :: force(2*lane_count, n_sample)
+      !> Forces, N: [2 batch_size, n_sample].
+      real(wp), intent(inout) :: force(2*batch_size, n_sample)
       !> Last step of any lane; unchanged where none began.
       integer, intent(inout) :: last_step
-      real(wp), dimension(lane_count) :: elastic_force, floor_force
+      real(wp), dimension(batch_size) :: elastic_force, floor_force
       real(wp) :: latest
       integer :: n, first, sample
       logical :: done, undisturbed, strayed
-      logical, dimension(lane_count) :: wanted, goes
+      logical, dimension(batch_size) :: wanted, goes
 
       undisturbed = .false.
       strayed = .false.
@@ -110,7 +110,7 @@ contains
          if (.not. undisturbed) goes = start <= n .and. last > n
          sample = n/substeps + 1
          if (undisturbed .and. mod(n, substeps) == 0) then
-            call advance(impacts, goes, impacts%whole_step, force(:lane_count, sample), force(lane_count + 1:, sample), &
+            call advance(impacts, goes, impacts%whole_step, force(:batch_size, sample), force(batch_size + 1:, sample), &
                strayed)
          else
             call advance(impacts, goes, impacts%whole_step, elastic_force, floor_force, strayed)
@@ -129,18 +129,18 @@ contains
    !> Forces of one sample: those of moving lanes, none after the contact; lanes whose turn is still to
    !> come keep what they have.
    pure subroutine record(elastic_force, floor_force, n, start, last, force)
-      !> Elastic forces, N: [lane_count].
-      real(wp), intent(in) :: elastic_force(lane_count)
-      !> Forces on the floor, N: [lane_count].
-      real(wp), intent(in) :: floor_force(lane_count)
+      !> Elastic forces, N: [batch_size].
+      real(wp), intent(in) :: elastic_force(batch_size)
+      !> Forces on the floor, N: [batch_size].
+      real(wp), intent(in) :: floor_force(batch_size)
       !> Number of the step.
       real(wp), intent(in) :: n
-      !> Step with which each lane begins: [lane_count].
-      real(wp), intent(in) :: start(lane_count)
-      !> Step in which it has ended: [lane_count].
-      real(wp), intent(in) :: last(lane_count)
-      !> The sample, N: [2 lane_count].
-      real(wp), intent(inout) :: force(2*lane_count)
+      !> Step with which each lane begins: [batch_size].
+      real(wp), intent(in) :: start(batch_size)
+      !> Step in which it has ended: [batch_size].
+      real(wp), intent(in) :: last(batch_size)
+      !> The sample, N: [2 batch_size].
+      real(wp), intent(inout) :: force(2*batch_size)
 
       where ([start, start] <= n) force = merge([elastic_force, floor_force], 0.0_wp, [last, last] >= n)
    end subroutine record
@@ -148,20 +148,20 @@ contains
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
    pure subroutine settle(impacts, compressing, n, start, last, undisturbed, done)
       !> The impacts.
-      type(impact_lanes_type), intent(inout) :: impacts
+      type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       !> Number of the step.
       real(wp), intent(in) :: n
-      !> Step with which each lane begins: [lane_count].
-      real(wp), intent(in) :: start(lane_count)
-      !> Step in which it ends: [lane_count].
-      real(wp), intent(inout) :: last(lane_count)
+      !> Step with which each lane begins: [batch_size].
+      real(wp), intent(in) :: start(batch_size)
+      !> Step in which it ends: [batch_size].
+      real(wp), intent(inout) :: last(batch_size)
       !> All lanes are under way; false from the first that stops on.
       logical, intent(inout) :: undisturbed
       !> All lanes have stopped.
       logical, intent(out) :: done
-      logical, dimension(lane_count) :: on, stays
+      logical, dimension(batch_size) :: on, stays
 
       associate (state => impacts%states(impacts%now), next => impacts%states(3 - impacts%now))
          done = .false.
@@ -186,7 +186,7 @@ contains
    !> Whether all lanes stay inside the phase.
    pure function all_stay(state, compressing) result(all_do)
       !> The states.
-      type(state_lanes_type), intent(in) :: state
+      type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
       !> They do.
@@ -198,12 +198,12 @@ contains
       lost = 0.0_wp
       if (compressing) then
          !$omp simd reduction(+: lost)
-         do i = 1, lane_count
+         do i = 1, batch_size
             lost = lost + merge(0.0_wp, 1.0_wp, state%velocity(i) > 0.0_wp)
          end do
       else
          !$omp simd reduction(+: lost)
-         do i = 1, lane_count
+         do i = 1, batch_size
             lost = lost + merge(0.0_wp, 1.0_wp, state%deflection(i) > 0.0_wp) + 0*state%velocity(i)
          end do
       end if
@@ -213,10 +213,10 @@ contains
    !> To the turning point and on to the end of its step, with the flux term of restitution.
    subroutine turn(impacts, turns)
       !> The impacts.
-      type(impact_lanes_type), intent(inout) :: impacts
-      !> The lane has a turning point: [lane_count].
-      logical, intent(in) :: turns(lane_count)
-      real(wp), dimension(lane_count) :: length, elastic_force, floor_force
+      type(impact_batch_type), intent(inout) :: impacts
+      !> The lane has a turning point: [batch_size].
+      logical, intent(in) :: turns(batch_size)
+      real(wp), dimension(batch_size) :: length, elastic_force, floor_force
 
       call locate(impacts, .true., turns, length)
       call finish_step(impacts, turns, length, elastic_force, floor_force)
@@ -231,19 +231,19 @@ contains
 
    !> Raises the forces at the turning point to the largest of all samples.
    pure subroutine get_peaks(force, peak_force, peak_floor_force)
-      !> Elastic forces, then floor forces, N: [2 lane_count, n_sample].
+      !> Elastic forces, then floor forces, N: [2 batch_size, n_sample].
       real(wp), intent(in) :: force(:, :)
-      !> Largest elastic force, N: [lane_count].
-      real(wp), intent(inout) :: peak_force(lane_count)
-      !> Largest force on the floor, N: [lane_count].
-      real(wp), intent(inout) :: peak_floor_force(lane_count)
+      !> Largest elastic force, N: [batch_size].
+      real(wp), intent(inout) :: peak_force(batch_size)
+      !> Largest force on the floor, N: [batch_size].
+      real(wp), intent(inout) :: peak_floor_force(batch_size)
       integer :: i, n
 
       do n = 1, size(force, 2)
          !$omp simd
-         do i = 1, lane_count
+         do i = 1, batch_size
             peak_force(i) = max(peak_force(i), force(i, n))
-            peak_floor_force(i) = max(peak_floor_force(i), force(lane_count + i, n))
+            peak_floor_force(i) = max(peak_floor_force(i), force(batch_size + i, n))
          end do
       end do
    end subroutine get_peaks

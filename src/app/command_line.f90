@@ -17,7 +17,7 @@ module thud_command_line
    integer, parameter :: not_conforming = 3
 
    !> Most threads, and how that is said.
-   integer, parameter :: most_threads = 1024
+   integer, parameter :: max_threads = 1024
    character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
 
    !> What the command line asks for.
@@ -174,7 +174,7 @@ contains
 
       threads = 0
       if (verify(text, '0123456789') == 0 .and. len(text) <= 4) read (text, *) threads
-      if (threads < 1 .or. threads > most_threads) error = input_error('--threads = '//quoted(text) &
+      if (threads < 1 .or. threads > max_threads) error = input_error('--threads = '//quoted(text) &
          //' is not allowed; allowed: '//threads_allowed)
    end subroutine take_threads
 

@@ -186,13 +186,13 @@ contains
    end function get_degree
 
    !> The lowest modes of one harmonic, and the flexibility of all others.
-   subroutine get_family(basis, harmonic, most_modes, highest_omega, family, failed)
+   subroutine get_family(basis, harmonic, max_modes, highest_omega, family, failed)
       !> The basis.
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
       !> Number of modes to keep; fewer where the basis has fewer.
-      integer, intent(in) :: most_modes
+      integer, intent(in) :: max_modes
       !> Highest angular frequency to keep, rad/s.
       real(wp), intent(in) :: highest_omega
       !> The modes.
@@ -213,7 +213,7 @@ contains
       first = merge(2, 1, harmonic == 1)
       failed = .not. all(square(first:) > 0.0_wp)
       if (failed) return
-      last = min(first - 1 + min(most_modes, count(square(first:) <= highest_omega**2)), n)
+      last = min(first - 1 + min(max_modes, count(square(first:) <= highest_omega**2)), n)
       family%omega = sqrt(square(first:last))
       surface = matmul(surface, stiffness)
       family%surface = surface(:, first:last)

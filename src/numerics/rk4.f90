@@ -80,7 +80,7 @@ contains
       integer, intent(in) :: component
       !> Length of the step that ends at the zero.
       real(wp) :: length
-      integer, parameter :: most_iterations = 200
+      integer, parameter :: max_iterations = 200
       real(wp) :: left, right, left_value, right_value, value
       logical :: left_moved_last, right_moved_last
       integer :: iteration
@@ -91,7 +91,7 @@ contains
       right_value = component_after(step)
       left_moved_last = .false.
       right_moved_last = .false.
-      do iteration = 1, most_iterations
+      do iteration = 1, max_iterations
          if (right - left <= 2*spacing(right)) exit
          length = right - right_value*(right - left)/(right_value - left_value)
          if (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2

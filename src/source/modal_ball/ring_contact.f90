@@ -14,7 +14,7 @@ module thud_ring_contact
    real(wp), parameter :: closed = 1.0e-12_wp
 
    !> Rounds of the search for the touching rings.
-   integer, parameter :: most_rounds = 200
+   integer, parameter :: max_rounds = 200
 
    !> Rings, ordered from the lowest point outwards.
    type :: ring_contact_type
@@ -66,7 +66,7 @@ contains
       logical :: failed
 
       if (.not. any(contact%touches)) contact%touches = gap < 0.0_wp
-      do round = 1, most_rounds
+      do round = 1, max_rounds
          call close_gaps(contact, gap, failed)
          if (failed) exit
          if (contact%last == 0) then
@@ -76,7 +76,7 @@ contains
          end if
          wrong = merge(contact%impulse < 0.0_wp, after < -closed, contact%touches)
          if (.not. any(wrong)) return
-         if (round < most_rounds/2) then
+         if (round < max_rounds/2) then
             contact%touches = contact%touches .neqv. wrong
          else
             ! One ring at a time cannot go round in circles (Murty's rule).
@@ -84,7 +84,7 @@ contains
             contact%touches(first_wrong) = .not. contact%touches(first_wrong)
          end if
       end do
-      error = numerical_error('&modal_ball: rings: the rings that touch were not found in '//to_text(most_rounds) &
+      error = numerical_error('&modal_ball: rings: the rings that touch were not found in '//to_text(max_rounds) &
          //' rounds; allowed: fewer rings, or more substeps')
    end subroutine solve_contact
 

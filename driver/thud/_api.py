@@ -11,9 +11,9 @@ from thud.errors import InputError, NumericalError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-door = _core.thud_door
-level_door = _core.thud_level_door
-ensemble_door = _core.thud_ensemble_door
+api = _core.thud_api
+level_api = _core.thud_level_api
+ensemble_api = _core.thud_ensemble_api
 
 
 def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
@@ -22,7 +22,7 @@ def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[A
     Parameters
     ----------
     routine
-        Procedure of `door` whose last two results are a status and a message.
+        Procedure of `api` whose last two results are a status and a message.
     *arguments
         Its arguments.
 
@@ -56,10 +56,10 @@ def words(value: bytes) -> list[str]:
 
 def version() -> str:
     """Version of the library."""
-    return text(door.get_version())
+    return text(api.get_version())
 
 
 def compiler() -> str:
     """Compiler of the library, with its options but for the places of files."""
     # Options that name places say nothing.
-    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(door.get_compiler()))
+    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(api.get_compiler()))

@@ -1,4 +1,4 @@
-!> The Runge-Kutta step of `thud_shell_lanes`, its forces taken from Taylor series.
+!> The Runge-Kutta step of `thud_shell_batch`, its forces taken from Taylor series.
 !>
 !> Powers and quotients are slow and a ball moves little from step to step: each lane has a place, a
 !> deflection about which c and 1/(1 - y) are expanded, and needs nothing but multiplications and
@@ -15,11 +15,11 @@
 module thud_shell_series
    use thud_kinds, only: wp
    use thud_power, only: not_a_number, raise
-   use thud_shell_lanes, only: lane_count, shell_lanes_type, state_lanes_type
+   use thud_shell_batch, only: batch_size, shell_batch_type, state_batch_type
    implicit none (type, external)
    private
 
-   public :: get_flows, place_series, series_lanes_type, series_steps, take_step, will_last
+   public :: get_flows, place_series, series_batch_type, series_steps, take_step, will_last
 
    !> Highest power of the series.
    integer, parameter :: degree = 7
@@ -35,16 +35,16 @@ module thud_shell_series
    integer, parameter :: series_steps = 16
 
    !> The series.
-   type :: series_lanes_type
-      !> Deflection about which a lane is expanded: [lane_count].
-      real(wp) :: place(lane_count)
-      !> Distance up to which the series is used: [lane_count].
-      real(wp) :: reach(lane_count)
-      !> 1/(1 - y) there: [lane_count].
-      real(wp) :: inverse(lane_count)
-      !> Coefficients of c: [lane_count, 0:degree].
-      real(wp) :: term(lane_count, 0:degree)
-   end type series_lanes_type
+   type :: series_batch_type
+      !> Deflection about which a lane is expanded: [batch_size].
+      real(wp) :: place(batch_size)
+      !> Distance up to which the series is used: [batch_size].
+      real(wp) :: reach(batch_size)
+      !> 1/(1 - y) there: [batch_size].
+      real(wp) :: inverse(batch_size)
+      !> Coefficients of c: [batch_size, 0:degree].
+      real(wp) :: term(batch_size, 0:degree)
+   end type series_batch_type
 
 contains
 
@@ -67,29 +67,29 @@ contains
    !> Expands lanes about the middle of the way that lies before them; the present deflection is in reach.
    pure subroutine place_series(shell, state, wanted, series)
       !> The equations.
-      type(shell_lanes_type), intent(in) :: shell
+      type(shell_batch_type), intent(in) :: shell
       !> The states.
-      type(state_lanes_type), intent(in) :: state
-      !> The lane is expanded anew: [lane_count].
-      logical, intent(in) :: wanted(lane_count)
+      type(state_batch_type), intent(in) :: state
+      !> The lane is expanded anew: [batch_size].
+      logical, intent(in) :: wanted(batch_size)
       !> The series.
-      type(series_lanes_type), intent(inout) :: series
-      real(wp), dimension(lane_count) :: place, inverse, power
-      real(wp) :: term(lane_count, 0:degree)
+      type(series_batch_type), intent(inout) :: series
+      real(wp), dimension(batch_size) :: place, inverse, power
+      real(wp) :: term(batch_size, 0:degree)
       real(wp) :: x1, x2, x3, lead, p0, p1, p2, p3, p4, p5, p6, p7
       integer :: i
 
       !$omp simd private(lead)
-      do i = 1, lane_count
+      do i = 1, batch_size
          associate (y => state%deflection(i), z => state%velocity(i))
             lead = min(max(0.5_wp*series_steps*abs(z), 0.5_wp*get_reach(y)), 0.9_wp*get_reach(y), &
                0.4_wp*(shell%closing(i) - y))
             place(i) = y + sign(lead, z)
          end associate
       end do
-      call raise(lane_count, get_ratio(place), shell%exponent, power)
+      call raise(batch_size, get_ratio(place), shell%exponent, power)
       !$omp simd private(x1, x2, x3, p0, p1, p2, p3, p4, p5, p6, p7)
-      do i = 1, lane_count
+      do i = 1, batch_size
          inverse(i) = 1/(1 - place(i))
          associate (e => shell%exponent(i), r => inverse(i), k => shell%stiffness(i))
             ! Taylor coefficients of x over x itself.
@@ -171,20 +171,20 @@ contains
    !> Force on the floor and power lost, and their rates of change.
    pure subroutine get_flows(shell, series, state, force, force_rate, power, power_rate)
       !> The equations.
-      type(shell_lanes_type), intent(in) :: shell
+      type(shell_batch_type), intent(in) :: shell
       !> The series, in whose reach the states are.
-      type(series_lanes_type), intent(in) :: series
+      type(series_batch_type), intent(in) :: series
       !> The states.
-      type(state_lanes_type), intent(in) :: state
-      !> Force on the floor: [lane_count].
-      real(wp), intent(out) :: force(lane_count)
-      !> Its rate: [lane_count].
-      real(wp), intent(out) :: force_rate(lane_count)
-      !> Power lost: [lane_count].
-      real(wp), intent(out) :: power(lane_count)
-      !> Its rate: [lane_count].
-      real(wp), intent(out) :: power_rate(lane_count)
-      real(wp), dimension(lane_count) :: d, c, c_rate, a
+      type(state_batch_type), intent(in) :: state
+      !> Force on the floor: [batch_size].
+      real(wp), intent(out) :: force(batch_size)
+      !> Its rate: [batch_size].
+      real(wp), intent(out) :: force_rate(batch_size)
+      !> Power lost: [batch_size].
+      real(wp), intent(out) :: power(batch_size)
+      !> Its rate: [batch_size].
+      real(wp), intent(out) :: power_rate(batch_size)
+      real(wp), dimension(batch_size) :: d, c, c_rate, a
       integer :: n
 
       associate (y => state%deflection, z => state%velocity, s => shell%weight)
@@ -206,19 +206,19 @@ contains
    !> One classical step, or part of one, as `rk4_step`; the forces at its beginning, and their sums.
    pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force, missed)
       !> The equations.
-      type(shell_lanes_type), intent(in) :: shell
+      type(shell_batch_type), intent(in) :: shell
       !> The series.
-      type(series_lanes_type), intent(in) :: series
+      type(series_batch_type), intent(in) :: series
       !> State at the beginning.
-      type(state_lanes_type), intent(in) :: state
-      !> Length, in whole steps: [lane_count].
-      real(wp), intent(in) :: length(lane_count)
+      type(state_batch_type), intent(in) :: state
+      !> Length, in whole steps: [batch_size].
+      real(wp), intent(in) :: length(batch_size)
       !> State at the end; its velocity is NaN where a stage was out of reach.
-      type(state_lanes_type), intent(inout) :: new
-      !> Force of shell and gas, N: [lane_count].
-      real(wp), intent(out) :: elastic_force(lane_count)
-      !> Force on the floor, N: [lane_count].
-      real(wp), intent(out) :: floor_force(lane_count)
+      type(state_batch_type), intent(inout) :: new
+      !> Force of shell and gas, N: [batch_size].
+      real(wp), intent(out) :: elastic_force(batch_size)
+      !> Force on the floor, N: [batch_size].
+      real(wp), intent(out) :: floor_force(batch_size)
       !> A lane was out of reach.
       logical, intent(out) :: missed
       real(wp) :: half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside, outsides
@@ -228,7 +228,7 @@ contains
       if (abs(shell%weight) > 0.0_wp) then
          !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside) &
          !$omp& reduction(+: outsides)
-         do i = 1, lane_count
+         do i = 1, batch_size
             associate (y => state%deflection(i), z => state%velocity(i), s => shell%weight, h => length(i), &
                place => series%place(i), inverse => series%inverse(i), c0 => series%term(i, 0), c1 => series%term(i, 1), &
                c2 => series%term(i, 2), c3 => series%term(i, 3), c4 => series%term(i, 4), c5 => series%term(i, 5), &
@@ -267,7 +267,7 @@ contains
          ! The same without the flux.
          !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside) &
          !$omp& reduction(+: outsides)
-         do i = 1, lane_count
+         do i = 1, batch_size
             associate (y => state%deflection(i), z => state%velocity(i), h => length(i), &
                place => series%place(i), c0 => series%term(i, 0), c1 => series%term(i, 1), &
                c2 => series%term(i, 2), c3 => series%term(i, 3), c4 => series%term(i, 4), c5 => series%term(i, 5), &

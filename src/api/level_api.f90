@@ -1,7 +1,7 @@
-!> The flat door for Python to levels and verdicts; see `thud_door`.
-module thud_level_door
+!> The flat API for Python to levels and verdicts; see `thud_api`.
+module thud_level_api
    use thud_band, only: band_type, get_octaves, get_thirds, octave_count, third_count
-   use thud_error, only: error_type, tell
+   use thud_error, only: error_type, get_status
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -69,7 +69,7 @@ contains
 
       levels = 0.0_wp
       call get_force_exposure_levels(force, sample_rate, bands_of(bandwidth), method, levels, error)
-      call tell(error, status, message)
+      call get_status(error, status, message)
    end subroutine force_exposure
 
    !> Number of peaks of a force.
@@ -150,7 +150,7 @@ contains
       upper = 0.0_wp
       met = 0
       call get_source_limits(source, limits, error)
-      call tell(error, status, message)
+      call get_status(error, status, message)
       if (status /= 0) return
       criteria = get_criteria(limits, levels, contact_time, restitution, n_peak, mass, drop_height)
       do i = 1, criterion_count
@@ -179,4 +179,4 @@ contains
       end if
    end function bands_of
 
-end module thud_level_door
+end module thud_level_api
