@@ -12,23 +12,25 @@ import importlib
 from typing import Any
 
 from thud._api import version
-from thud.case import (
+from thud._schema import (
     Ball,
-    Case,
     Drop,
+    FiniteElement,
+    HollowSphere,
+    HuntCrossley,
     Levels,
     Limits,
+    MeasuredModes,
+    ModalBall,
     Modes,
     Sampling,
-    read_case,
-    write_case,
 )
+from thud.case import Case, read_case, write_case
 from thud.ensemble import Ensemble, solve_many
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
 from thud.impact import Impact, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
-from thud.models import FiniteElement, HollowSphere, HuntCrossley, MeasuredModes, ModalBall
 from thud.motion import Motion
 from thud.recording import Recording
 from thud.results import read_results

@@ -1,8 +1,9 @@
-"""The one place where Python meets the Fortran library: status codes become exceptions."""
+"""The one place where Python meets the Fortran library: bundles become dictionaries, status codes exceptions."""
 
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from thud import _core
@@ -11,18 +12,51 @@ from thud.errors import InputError, NumericalError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import numpy as np
+    from numpy.typing import NDArray
+
+    # By name: text, number, array, or more of them.
+    Bundle = dict[str, Any]
+
 api = _core.thud_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
 
 
-def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
-    """Call a procedure of the library and return what it gives besides status and message.
+_ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
+
+
+def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
+    """Call a procedure of the library and return what it gives by name.
 
     Parameters
     ----------
     routine
-        Procedure of `api` whose last two results are a status and a message.
+        Procedure of `api` whose results are a status, a handle and sizes.
+    *arguments
+        Its arguments.
+
+    Returns
+    -------
+    dict
+        Texts, numbers and arrays; those with a dot in their name stand in dictionaries of what is
+        before the dot.
+
+    Raises
+    ------
+    InputError, NumericalError
+        With the sentence of the library.
+    """
+    return collect(*routine(*arguments))
+
+
+def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
+    """Call a procedure that gives its results directly, and return them.
+
+    Parameters
+    ----------
+    routine
+        Procedure whose last two results are a status and a message.
     *arguments
         Its arguments.
 
@@ -37,29 +71,74 @@ def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[A
         With the sentence of the library.
     """
     *results, status, message = routine(*arguments)
-    if status == InputError.exit_code:
-        raise InputError(text(message))
-    if status != 0:
-        raise NumericalError(text(message))
+    if status:
+        raise _ERRORS.get(status, NumericalError)(text(message).rstrip())
     return tuple(results)
 
 
+def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
+    """Return what the library has left under a handle; see `call`."""
+    data, values = api.collect(handle, n_byte, n_value)
+    header, _, texts = data.tobytes().partition(b"\0")
+    found: Bundle = {}
+    at = {"text": 0, "values": 0}
+    for group, name, extents, length in _items(header):
+        place = found.setdefault(group, {}) if group else found
+        if extents is None:
+            place[name] = texts[at["text"] : at["text"] + length]
+            at["text"] += length
+        else:
+            place[name] = _shaped(values, at["values"], extents, length)
+            at["values"] += length
+    if status:
+        raise _ERRORS.get(status, NumericalError)(text(found["message"]))
+    return found
+
+
+def _shaped(
+    values: NDArray[np.float64], start: int, extents: tuple[int, ...], length: int
+) -> float | NDArray[np.float64]:
+    """Return a number, or an array of the library."""
+    if not extents:
+        return float(values[start])
+    return values[start : start + length].reshape(extents, order="F")
+
+
+@lru_cache(maxsize=64)
+def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
+    """Return group, name, extents and length of what a header names; texts have no extents."""
+    items: list[tuple[str, str, tuple[int, ...] | None, int]] = []
+    for line in header.decode().splitlines():
+        full, _, form = line.partition("\t")
+        group, _, name = full.rpartition(".")
+        if form.startswith("t"):
+            items.append((group, name, None, int(form[1:])))
+            continue
+        extents = tuple(int(extent) for extent in form.split(",") if extent)
+        length = 1
+        for extent in extents:
+            length *= extent
+        items.append((group, name, extents, length))
+    return items
+
+
 def text(value: bytes) -> str:
-    """Text of the library without the blanks behind it."""
-    return value.decode(errors="surrogateescape").rstrip()
+    """Return a text of the library; bytes that are no UTF-8 stay what they are."""
+    return value.decode(errors="surrogateescape")
 
 
 def words(value: bytes) -> list[str]:
     """Words of a list with commas between."""
-    return [word.strip() for word in text(value).split(",")] if text(value) else []
+    listed = text(value).rstrip()
+    return [word.strip() for word in listed.split(",")] if listed else []
 
 
 def version() -> str:
     """Version of the library."""
-    return text(api.get_version())
+    return text(call(api.describe_library)["version"])
 
 
 def compiler() -> str:
     """Compiler of the library, with its options but for the places of files."""
     # Options that name places say nothing.
-    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(api.get_compiler()))
+    return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))

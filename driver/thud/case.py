@@ -1,139 +1,70 @@
-"""Input of a run: dataclasses that mirror the namelist groups, read and written with f90nml."""
+"""Input of a run: the groups of a namelist file, read and written with f90nml."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import f90nml
 import numpy as np
 
-from thud._api import call, api, text
+from thud._api import api, call, text
+from thud._schema import (
+    GROUPS,
+    KEYS,
+    MODELS,
+    Ball,
+    Drop,
+    HollowSphere,
+    Levels,
+    Limits,
+    ModelOptions,
+    Modes,
+    Sampling,
+)
 from thud.checks import LARGEST, replace_file, require_kind, shown
 from thud.errors import InputError
-from thud.models import LISTS, MODELS, FiniteElement, HollowSphere, ModelOptions, group_of
 
 if TYPE_CHECKING:
-    from typing import Self
+    from collections.abc import Iterable
+    from dataclasses import Field
+    from typing import Any, Self
+
+# The keys that take lists of numbers.
+LISTS = {key.name for key in KEYS if key.kind == "list"}
+# Keys of the mesh, which free modes and finite elements share.
+_MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
 
-@dataclass(frozen=True)
-class Ball:
-    """A hollow ball; the default is the rubber ball of Schoenwald and Zeitler (2011).
+def group_of(model: str, option: Field[Any]) -> str:
+    """Return the namelist group of an option of a model."""
+    group: str = option.metadata.get("group", model)
+    return group
 
-    Attributes
-    ----------
-    outer_radius : float
-        Outer radius R, m.
-    wall_thickness : float
-        Wall thickness h, m.
-    mass : float
-        Mass M, kg.
-    youngs_modulus : float
-        Modulus of elasticity E, Pa.
-    poisson_ratio : float
-        Poisson's ratio.
-    gauge_pressure : float
-        Overpressure of the gas in the undeformed ball, Pa; 0 for a ball with a hole.
-    ambient_pressure : float
-        Pressure of the air around the ball, Pa.
-    heat_capacity_ratio : float
-        Ratio of specific heats of the enclosed gas.
+
+def new_model(name: str, options: dict[str, object]) -> ModelOptions:
+    """Return the options of a model by its name.
+
+    Raises
+    ------
+    InputError
+        Where the model or an option is not known; lists those that are.
     """
-
-    outer_radius: float = 0.089
-    wall_thickness: float = 0.032
-    mass: float = 2.5
-    youngs_modulus: float = 1.6e6
-    poisson_ratio: float = 0.5
-    gauge_pressure: float = 0.0
-    ambient_pressure: float = 101325.0
-    heat_capacity_ratio: float = 1.4
-
-
-@dataclass(frozen=True)
-class Drop:
-    """A free fall onto the floor; the default is the standards' drop.
-
-    Attributes
-    ----------
-    height : float
-        Height of the ball's lowest point over the floor, m.
-    gravity : float
-        Acceleration of free fall, m/s2.
-    """
-
-    height: float = 1.0
-    gravity: float = 9.81
+    if name not in MODELS:
+        message = f"&model: name = {name!r} is not allowed; allowed: {_listed(MODELS)}"
+        raise InputError(message)
+    known = [option.name for option in fields(MODELS[name])]
+    for option in options:
+        if option not in known:
+            message = f"&{name}: {option} is not a known key; allowed: {_listed(known)}"
+            raise InputError(message)
+    return MODELS[name](**options)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
-class Sampling:
-    """Sampling of the force.
-
-    Attributes
-    ----------
-    sample_rate : float
-        Samples per second, Hz.
-    duration : float
-        Length of the record from first touch, s.
-    substeps : int
-        Integration steps per sampling interval.
-    """
-
-    sample_rate: float = 44100.0
-    duration: float = 0.05
-    substeps: int = 1
-
-
-@dataclass(frozen=True)
-class Levels:
-    """How levels are computed and which force is judged.
-
-    Attributes
-    ----------
-    method : str
-        ``"exact"`` (band energy of the record) or ``"fft"`` (1 Hz bins of a 1 s record).
-    bands : str
-        ``"octave"``, ``"third"`` or ``"both"``: the bands of ``levels.csv``.
-    force : str
-        ``"elastic"`` or ``"floor"``.
-    """
-
-    method: str = "exact"
-    bands: str = "octave"
-    force: str = "elastic"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The standards' limits that apply.
-
-    Attributes
-    ----------
-    source : str
-        ``"rubber_ball"`` or ``"tyre"``.
-    """
-
-    source: str = "rubber_ball"
-
-
-@dataclass(frozen=True)
-class Modes:
-    """Free modes that are asked for.
-
-    Attributes
-    ----------
-    count : int
-        Number of elastic modes.
-    radial_elements, polar_elements : int
-        Elements through the wall and from pole to pole (group ``&mesh``).
-    """
-
-    count: int = 6
-    radial_elements: int = FiniteElement.radial_elements
-    polar_elements: int = FiniteElement.polar_elements
+def _listed(words: Iterable[str]) -> str:
+    """Return words in quotes with commas between."""
+    return ", ".join(map(repr, words))
 
 
 @dataclass(frozen=True)
@@ -169,7 +100,7 @@ class Case:
         InputError
             Where a value is neither a number nor text, nor a list of numbers where one is due.
         """
-        for group, kind in _GROUPS.items():
+        for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
         require_kind("modes", self.modes, Modes | None)
@@ -182,7 +113,7 @@ class Case:
             groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
         if self.model:
             groups["model"] = {"name": self.model.name}
-            groups |= {group: vars(getattr(self, group)) for group in _GROUPS}
+            groups |= {group: vars(getattr(self, group)) for group in GROUPS}
             for option in fields(self.model):
                 values = groups.setdefault(group_of(self.model.name, option), {})
                 value = getattr(self.model, option.name)
@@ -200,16 +131,21 @@ class Case:
         return namelist
 
     @classmethod
+    def from_text(cls, content: str) -> Self:
+        """Return the case of the text of a namelist file; keys that it lacks have their default."""
+        return cls.from_namelist(f90nml.reads(content))
+
+    @classmethod
     def from_namelist(cls, namelist: f90nml.Namelist) -> Self:
         """Return the case of a namelist; keys that it lacks have their default value."""
         groups = {
-            group: kind(**namelist[group]) for group, kind in _GROUPS.items() if group in namelist
+            group: kind(**namelist[group]) for group, kind in GROUPS.items() if group in namelist
         }
         model = modes = None
         if "modes" in namelist:
             modes = Modes(**namelist["modes"], **namelist.get("mesh", {}))
         if "model" in namelist or not modes:
-            name = namelist.get("model", {}).get("name", HollowSphere.name)
+            name = namelist.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
             for option in fields(MODELS[name]):
                 given = namelist.get(group_of(name, option), {})
@@ -221,18 +157,6 @@ class Case:
             model = MODELS[name](**options)
         title = namelist.get("case", {}).get("name", cls.name)
         return cls(name=title, model=model, modes=modes, **groups)
-
-
-_GROUPS: dict[str, type[Any]] = {
-    "ball": Ball,
-    "drop": Drop,
-    "sampling": Sampling,
-    "levels": Levels,
-    "limits": Limits,
-}
-
-# Keys of the mesh, which free modes and finite elements share.
-_MESH = ("radial_elements", "polar_elements")
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
@@ -273,8 +197,12 @@ def read_case(path: str | os.PathLike[str]) -> Case:
     InputError
         Names file, group, key, value and allowed range.
     """
-    (effective,) = call(api.effective_case, os.fsencode(path))
-    return Case.from_namelist(f90nml.reads(text(effective)))
+    return Case.from_text(text(call(api.effective_case, os.fsencode(path))["case"]))
+
+
+def check_case(case: Case) -> None:
+    """Raise InputError with the sentence of the library where a case cannot be computed."""
+    call(api.check_text, case_text(case))
 
 
 def write_case(case: Case, path: str | os.PathLike[str]) -> None:
@@ -294,6 +222,5 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
     OSError
         Where the file cannot be written.
     """
-    content = case_text(case)
-    call(api.get_sizes, content)
-    replace_file(path, content)
+    check_case(case)
+    replace_file(path, case_text(case))

@@ -1,29 +1,35 @@
-"""Many drops of the shell model at once, with levels and verdicts."""
+"""Many drops at once, with levels and verdicts, by any source model."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from tqdm import tqdm
 
-from thud._api import call, ensemble_api, text, words
-from thud.case import Ball, Drop, Limits, Sampling
-from thud.checks import require_number, require_whole
+from thud._api import call, collect, ensemble_api, text
+from thud._schema import HollowSphere, Levels, Limits
+from thud.case import Case, case_text, new_model
+from thud.checks import require_kind, require_whole
 from thud.errors import InputError
+from thud.keys import find_key
 from thud.levels import get_bands
-from thud.models import HollowSphere
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-_KEYS, _FLUX_CHOICES = (words(names) for names in ensemble_api.ensemble_keys())
-_FLUX = "momentum_flux"
-_DEFAULTS: dict[str, Any] = vars(Ball()) | vars(Drop()) | vars(HollowSphere())
+    from thud._api import Bundle
+    from thud.key import Key
+
 MAX_THREADS = 1024
+# About the work of one call of the library on each thread, s: between two calls it can be stopped.
+_CALL_TIME = 1.0
+# Most sets of one call, whose results the library holds.
+_MAX_CALL = 2**17
 
 # The library keeps matrices from call to call, and one call uses all threads anyway.
 _ONE_AT_A_TIME = threading.Lock()
@@ -31,14 +37,16 @@ _ONE_AT_A_TIME = threading.Lock()
 
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """Outcomes of many drops; NaN where a set could not be computed.
+    """Outcomes of many drops; NaN where a drop could not be computed.
 
     Attributes
     ----------
     parameters : dict of str to ndarray, shape (n_set,)
-        The parameters of the sets, defaults included.
+        What the drops differ in.
     status : ndarray of int, shape (n_set,)
-        0, or the code of the reason why the set was not computed; see `reasons`.
+        0, or the exit code of the error: 1 bad input, 2 numerical failure.
+    reason : ndarray of str, shape (n_set,)
+        The sentence of the error.
     contact_time : ndarray, shape (n_set,)
         Time from first touch to release, s.
     peak_force, peak_floor_force : ndarray, shape (n_set,)
@@ -63,6 +71,7 @@ class Ensemble:
 
     parameters: dict[str, NDArray[Any]]
     status: NDArray[np.int32]
+    reason: NDArray[np.object_]
     contact_time: NDArray[np.float64]
     peak_force: NDArray[np.float64]
     peak_floor_force: NDArray[np.float64]
@@ -83,157 +92,202 @@ class Ensemble:
         """Return the number of sets."""
         return len(self.status)
 
-    def reasons(self) -> dict[int, str]:
-        """Return the codes that occur and what they mean."""
-        return {int(code): text(ensemble_api.status_text(code)) for code in np.unique(self.status)}
 
-
-def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and three more
+def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
     parameters: Mapping[str, ArrayLike],
+    case: Case | None = None,
     *,
+    model: str | None = None,
     threads: int | None = None,
     bands: str | None = "octave",
     forces: bool = False,
-    sample_rate: float = Sampling.sample_rate,
-    duration: float = Sampling.duration,
-    substeps: int = Sampling.substeps,
-    source: str = Limits.source,
+    sample_rate: float | None = None,
+    duration: float | None = None,
+    substeps: int | None = None,
+    source: str | None = None,
+    progress: bool = False,
 ) -> Ensemble:
-    """Drop many balls on a rigid floor: the model ``hollow_sphere`` for many sets of parameters.
+    """Drop many balls on a rigid floor.
 
-    The numbers are those of `solve`, to 1e-10 in forces and 1e-6 dB in levels, and have the same
-    bits for any number of threads and any order of the sets.
+    The numbers are those of `solve`: of the shell model, whose drops are computed in batches, to
+    1e-10 in forces and 1e-6 dB in levels; of the others bit by bit. They do not depend on the
+    number of threads or on the order of the sets.
 
     Parameters
     ----------
     parameters
-        Arrays of one dimension, or scalars, by the keys of `Ball`, `Drop` and `HollowSphere`; they
-        are broadcast against each other. Keys that are missing have their default.
+        Arrays of one dimension, or scalars, by the names of keys (entries of lists as
+        ``"frequency(2)"``); they are broadcast against each other.
+    case
+        Everything else; by default the paper's ball and drop.
+    model
+        Source model, with its default options where it is not that of the case.
     threads
         Threads to use; all processors by default.
     bands
         ``"octave"`` or ``"third"``: the bands of the levels; None: neither levels nor verdicts,
-        which takes half the time.
+        which takes less time.
     forces
         Keep the force histories: 16 bytes per sample and set.
     sample_rate, duration, substeps
-        As in `solve`, shared by all sets.
+        As in `solve`, shared by all sets; by default those of the case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: the limits that apply.
+        ``"rubber_ball"`` or ``"tyre"``: the limits that apply; by default those of the case.
+    progress
+        Show how many sets are computed.
 
     Returns
     -------
     Ensemble
-        Outcomes, levels and verdicts. Sets that cannot be computed (out of range, closed, longer
-        than the record, too coarse) have a status and NaN, and leave the others as they are.
+        Outcomes, levels and verdicts. Sets that cannot be computed have a status, a reason and
+        NaN, and leave the others as they are.
 
     Raises
     ------
     InputError
-        Where a key is not known, arrays do not broadcast or hold no numbers, the sampling, the
-        bands or the number of threads cannot be used, or the results have no room in memory.
+        Where a key is not known, arrays do not broadcast or hold no numbers, the case, the bands
+        or the number of threads cannot be used, or the results have no space in memory.
     """
-    columns, flux = _columns(parameters)
-    octaves = len(get_bands().nominal)
-    count = 0 if bands is None else len(get_bands(bands).nominal)
-    more = count if bands == "third" else 0
-    require_number("sample_rate", sample_rate)
-    require_number("duration", duration)
-    sampling = (float(sample_rate), float(duration))
-    require_whole("substeps", substeps, 1, 10_000)
-    (n_sample,) = call(ensemble_api.ensemble_size, *sampling, int(substeps))
-    # f2py knows no empty arrays; a set of zeros, which is out of range, stands in for none.
-    n_set = len(flux)
-    numbers = np.zeros((max(n_set, 1), len(_KEYS)))
-    numbers[:n_set] = np.stack([columns[key] for key in _KEYS], axis=1)
-    try:
-        with _ONE_AT_A_TIME:
-            status, scalars, levels, met, force = call(
-                ensemble_api.solve_sets,
-                numbers.T,
-                np.resize(flux + 1, len(numbers)),
-                *sampling,
-                int(substeps),
-                str(source).encode("ascii", "replace"),
-                _threads(threads),
-                int(bands is not None),
-                more,
-                len(numbers) if forces else 0,
-                n_sample if forces else 0,
-            )
-    except MemoryError as error:
-        size = f"{n_set} sets of {n_sample} samples" if forces else f"{n_set} sets"
-        message = f"forces = {forces} for {size} has no room in memory; allowed: fewer sets"
-        raise InputError(message) from error
-    levels = np.moveaxis(levels, 2, 0)[:n_set]
-    wanted = levels[:, octaves:] if more else levels[:, :count]
-    contact_time, peak_force, peak_floor_force, max_deflection, restitution, impulse = scalars
+    base = Case() if case is None else case
+    require_kind("case", base, Case)
+    if bands is not None:
+        get_bands(bands)
+    given = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
+    base = replace(
+        base,
+        modes=None,
+        sampling=replace(
+            base.sampling, **{key: value for key, value in given.items() if value is not None}
+        ),
+        levels=replace(base.levels, bands=bands or Levels.bands),
+        limits=Limits(str(source)) if source is not None else base.limits,
+    )
+    if base.model is None or (model is not None and model != base.model.name):
+        base = replace(base, model=new_model(model or HollowSphere.name, {}))
+    content = case_text(base)
+    columns, numbers = _columns(parameters, base)
+    sizes = call(ensemble_api.size_many, content)
+    width = _threads(threads)
+    results = _allocate(len(numbers), sizes, forces=forces)
+    work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
+    with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
+        for start in range(0, len(numbers), work):
+            place = slice(start, min(start + work, len(numbers)))
+            _compute(content, columns, numbers[place], width, bands, results, place)
+            bar.update(place.stop - place.start)
+    levels, octaves = results["level"], len(get_bands().nominal)
+    wanted = levels[:, :, int(sizes["first_band"]) - 1 :] if bands else levels[:, :, :0]
+    force = results["force"]
     return Ensemble(
-        columns | {_FLUX: np.array(_FLUX_CHOICES)[flux]},
-        status[:n_set],
-        contact_time[:n_set],
-        peak_force[:n_set],
-        peak_floor_force[:n_set],
-        max_deflection[:n_set],
-        restitution[:n_set],
-        impulse[:n_set],
-        elastic_levels=wanted[:, :, 0],
-        floor_levels=wanted[:, :, 1],
-        elastic_octaves=levels[:, :octaves, 0],
-        floor_octaves=levels[:, :octaves, 1],
-        conforms=met[0, :n_set] != 0,
-        floor_conforms=met[1, :n_set] != 0,
-        elastic_force=force[:, 0, :n_set].T if forces else None,
-        floor_force=force[:, 1, :n_set].T if forces else None,
-        sample_rate=sampling[0],
+        columns,
+        results["status"],
+        results["reason"],
+        *results["outcome"].T,
+        elastic_levels=wanted[:, 0],
+        floor_levels=wanted[:, 1],
+        elastic_octaves=levels[:, 0, :octaves],
+        floor_octaves=levels[:, 1, :octaves],
+        conforms=results["conforms"][:, 0],
+        floor_conforms=results["conforms"][:, 1],
+        elastic_force=force[:, 0] if forces else None,
+        floor_force=force[:, 1] if forces else None,
+        sample_rate=base.sampling.sample_rate,
     )
 
 
+def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[Any]]:
+    """Return arrays for the results of sets."""
+    outcome, band, force, sample = (
+        int(sizes[name]) for name in ("outcome", "band", "force", "sample")
+    )
+    try:
+        return {
+            "status": np.zeros(count, dtype=np.int32),
+            "reason": np.full(count, "", dtype=object),
+            "outcome": np.empty((count, outcome)),
+            "level": np.empty((count, force, band)),
+            "conforms": np.zeros((count, force), dtype=bool),
+            "force": np.empty((count if forces else 1, force, sample if forces else 1)),
+        }
+    except MemoryError as error:
+        size = f"{count} sets of {sample} samples" if forces else f"{count} sets"
+        message = f"forces = {forces} for {size} has no space in memory; allowed: fewer sets"
+        raise InputError(message) from error
+
+
+def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
+    content: bytes,
+    columns: Mapping[str, Any],
+    numbers: NDArray[np.float64],
+    threads: int,
+    bands: str | None,
+    results: dict[str, NDArray[Any]],
+    place: slice,
+) -> None:
+    """Compute some sets and put their results in their place."""
+    _, force_count, band = results["level"].shape
+    kept, _, sample = results["force"].shape
+    forces = sample > 1
+    with _ONE_AT_A_TIME:
+        status, outcome, level, conforms, force, *left = ensemble_api.drop_many(
+            content,
+            ",".join(columns).encode("ascii", "replace"),
+            numbers.T,
+            threads,
+            int(bands is not None),
+            results["outcome"].shape[1],
+            band,
+            force_count,
+            sample,
+            len(numbers) if forces else 1,
+        )
+    reasons = collect(*left)
+    results["status"][place] = status
+    results["outcome"][place] = outcome.T
+    results["level"][place] = np.moveaxis(level, -1, 0).swapaxes(1, 2)
+    results["conforms"][place] = conforms.T != 0
+    if forces:
+        results["force"][place] = np.moveaxis(force, -1, 0).swapaxes(1, 2)
+    for number, reason in reasons.items():
+        results["reason"][place.start + int(number) - 1] = text(reason)
+
+
 def _columns(
-    parameters: Mapping[str, ArrayLike],
-) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.int32]]:
-    """Return one array per key, all of one length, and the numbers of the flux choices."""
-    if not isinstance(parameters, Mapping):
+    parameters: Mapping[str, ArrayLike], case: Case
+) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
+    """Return one array per key, all of one length, and their numbers for the library."""
+    if not isinstance(parameters, Mapping) or not parameters:
         message = f"parameters = {parameters!r} is not allowed; allowed: arrays by their keys"
         raise InputError(message)
-    known = [*_KEYS, _FLUX]
-    for key in parameters:
-        if key not in known:
-            message = f"{key!r} is not a known key; allowed: {', '.join(known)}"
-            raise InputError(message)
-    given = {key: _flux(values) if key == _FLUX else _numbers(key, values)
-             for key, values in (_DEFAULTS | dict(parameters)).items()}  # fmt: skip
+    assert case.model is not None  # noqa: S101 - `solve_many` has seen to it
+    keys = [find_key(name, case.model.name)[0] for name in parameters]
+    given = [_array(name, values) for name, values in parameters.items()]
+    numbers = [_numbers(key, array) for key, array in zip(keys, given, strict=True)]
     try:
-        arrays = np.broadcast_arrays(*(np.atleast_1d(values) for values in given.values()))
+        arrays = np.broadcast_arrays(*map(np.atleast_1d, given))
+        found = np.stack(np.broadcast_arrays(*map(np.atleast_1d, numbers)), axis=1)
     except ValueError as error:
-        shapes = ", ".join(f"{key} {given[key].shape}" for key in parameters)
+        shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(parameters, given, strict=True))
         message = f"the arrays do not fit each other: {shapes}; allowed: one length, or scalars"
         raise InputError(message) from error
-    columns = {key: array.copy() for key, array in zip(given, arrays, strict=True)}
-    flux: NDArray[np.int32] = columns.pop(_FLUX).astype(np.int32)
-    return columns, flux
+    return {name: a.copy() for name, a in zip(parameters, arrays, strict=True)}, found
 
 
-def _numbers(key: str, values: ArrayLike) -> NDArray[np.float64]:
-    """Return the numbers of one parameter."""
-    array = _array(key, values)
-    if array.size and array.dtype.kind not in "iuf":
-        message = f"{key} is not an array of real numbers; allowed: one dimension of them"
+def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the numbers of one parameter; of choices their places, from 1."""
+    if key.kind == "choice":
+        words, index = np.unique(array.astype(str), return_inverse=True)
+        for word in words:
+            if word not in key.choices:
+                allowed = ", ".join(map(repr, key.choices))
+                message = f"{key.name} = {str(word)!r} is not allowed; allowed: {allowed}"
+                raise InputError(message)
+        places = np.array([key.choices.index(word) + 1.0 for word in words])
+        return places[index].reshape(array.shape)
+    if array.size and array.dtype.kind not in ("b" if key.kind == "flag" else "iuf"):
+        message = f"{key.name} is not an array of real numbers; allowed: one dimension of them"
         raise InputError(message)
     return array.astype(np.float64)
-
-
-def _flux(values: ArrayLike) -> NDArray[np.int32]:
-    """Return the numbers of the choices of the flux term, from 0."""
-    array = _array(_FLUX, values)
-    names, index = np.unique(array.astype(str), return_inverse=True)
-    for name in names:
-        if name not in _FLUX_CHOICES:
-            allowed = ", ".join(map(repr, _FLUX_CHOICES))
-            message = f"{_FLUX} = {str(name)!r} is not allowed; allowed: {allowed}"
-            raise InputError(message)
-    numbers = np.array([_FLUX_CHOICES.index(name) for name in names], dtype=np.int32)
-    return numbers[index].reshape(array.shape)
 
 
 def _array(key: str, values: ArrayLike) -> NDArray[Any]:

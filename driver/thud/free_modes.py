@@ -7,14 +7,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call, api
-from thud.case import Ball, Case, Modes, case_text
+from thud._api import api, call
+from thud._schema import Ball, FiniteElement, Modes
+from thud.case import Case, case_text
 from thud.checks import require_kind
 from thud.errors import InputError
-from thud.models import FiniteElement
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from thud._api import Bundle
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,20 +89,20 @@ def free_modes(
         model=None,
         modes=Modes(count, radial_elements, polar_elements),
     )
-    content = case_text(case)
-    call(api.get_sizes, content)
-    size = (2 * polar_elements + 1, 2 * radial_elements + 1)
-    frequency, harmonic, participation, rigid_frequency, r, z, shape = call(
-        api.free_modes, content, count, *size
-    )
+    return new_modes(case.ball, call(api.free_modes, case_text(case)))
+
+
+def new_modes(ball: Ball, found: Bundle) -> FreeModes:
+    """Return the free modes that the library has left in a bundle."""
+    modes = found["modes"]
     return FreeModes(
-        case.ball,
-        frequency,
-        harmonic,
-        participation,
-        float(rigid_frequency),
-        np.stack((r, z), axis=-1),
-        np.moveaxis(shape, (-1, 0), (0, -1)),
+        ball,
+        modes["frequency"],
+        modes["harmonic"].astype(np.int32),
+        modes["participation"],
+        modes["rigid_frequency"],
+        np.stack((modes["r"], modes["z"]), axis=-1),
+        np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
     )
 
 
@@ -127,6 +129,7 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
         message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
         raise InputError(message)
-    (factors,) = call(api.loss_factors, case_text(Case(model=model)), wanted)
-    result: NDArray[np.float64] = factors
+    result: NDArray[np.float64] = call(api.loss_factors, case_text(Case(model=model)), wanted)[
+        "loss_factors"
+    ]
     return result

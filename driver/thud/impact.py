@@ -7,16 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call, api, words
-from thud.case import Ball, Case, Drop, Sampling, case_text
+from thud._api import api, call
+from thud._schema import Ball, Drop, Sampling
+from thud.case import Case, case_text, new_model
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
-from thud.models import new_model
 from thud.motion import Motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from thud._api import Bundle
 
 FORCES = ("elastic", "floor")
 
@@ -61,6 +63,8 @@ class Impact:
         Velocity at release over velocity at first touch.
     impulse : float
         Time integral of the force on the floor, N s.
+    touch_time : float
+        Time of first touch in the record, s.
     impulse_residual, energy_residual : float
         How far the balances of impulse and energy miss, relative.
     """
@@ -83,6 +87,7 @@ class Impact:
     max_deflection: float
     restitution: float
     impulse: float
+    touch_time: float
     impulse_residual: float
     energy_residual: float
 
@@ -93,11 +98,6 @@ class Impact:
             f"<Impact, {model}: contact {1e3 * self.contact_time:.2f} ms, "
             f"e {self.restitution:.3f}, peak {self.peak_floor_force:.0f} N>"
         )
-
-    @property
-    def touch_time(self) -> float:
-        """Time of first touch in the record, s: the flight before it, where a model computes it."""
-        return float(getattr(self.case.model, "flight_before", 0.0))
 
     @property
     def shell_force(self) -> NDArray[np.float64]:
@@ -228,38 +228,29 @@ def solve_case(case: Case) -> Impact:
         message = "&model is missing; allowed: a case with a source model"
         raise InputError(message)
     # Modes beside the impact have their own function.
-    content = case_text(replace(case, modes=None))
-    sizes = call(api.get_sizes, content)
-    found = call(api.solve, content, *sizes)
-    deflection, velocity, part, channel, elastic, floor, fact = found[:7]
-    part_names, channel_names, fact_names, scalars = found[7:11]
-    sample_rate = float(scalars[0])
+    return new_impact(case, call(api.solve, case_text(replace(case, modes=None))))
+
+
+def new_impact(case: Case, found: Bundle) -> Impact:
+    """Return the impact that the library has left in a bundle."""
+    samples, scalars = found["samples"], found["scalars"]
     return Impact(
         case,
-        np.arange(sizes[0]) / sample_rate,
-        deflection,
-        velocity,
-        elastic,
-        floor,
-        dict(zip(words(part_names), part.T, strict=False)),
-        dict(zip(words(channel_names), channel.T, strict=False)),
-        dict(zip(words(fact_names), map(float, fact), strict=False)),
-        _motion(*found[11:]),
-        *map(float, scalars),
+        np.arange(len(samples["deflection"])) / scalars["sample_rate"],
+        **samples,
+        parts=found["parts"],
+        channels=found.get("channels", {}),
+        facts=found.get("facts", {}),
+        motion=_motion(**found["motion"]) if "motion" in found else None,
+        **scalars,
     )
 
 
-def _motion(count: int, time: NDArray[np.float64], *fields: NDArray[np.float64]) -> Motion | None:
-    """Return the snapshots of the library, which have room for more."""
-    if not count:
-        return None
-    start, position, velocity, contact_pressure, cavity_pressure = fields
-    # Snapshots first, then nodes from pole to pole, nodes through the wall, r and z.
+def _motion(**fields: NDArray[np.float64]) -> Motion:
+    """Return snapshots: their number first, then nodes from pole to pole and through the wall."""
     return Motion(
-        time[:count],
-        start,
-        np.moveaxis(position, -1, 0)[:count],
-        np.moveaxis(velocity, -1, 0)[:count],
-        contact_pressure.T[:count],
-        cavity_pressure[:count],
+        **{
+            name: values if name == "start" else np.moveaxis(values, -1, 0)
+            for name, values in fields.items()
+        }
     )

@@ -1,113 +1,39 @@
-"""Keys that studies vary and fits search for, read from the library's own table of them."""
+"""Keys that studies vary and fits search for."""
 
 from __future__ import annotations
 
 import dataclasses
-import math
 import re
-from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from thud._api import api, text
+from thud._schema import GROUPS, KEYS
 from thud.errors import InputError
-from thud.models import LISTS, MODELS, group_of
+from thud.key import Key
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from thud.case import Case
 
-Kind = Literal["real", "whole", "choice", "flag", "list"]
 Value = float | int | str | bool
 
-# What every model shares; and what says which files a run writes, which does nothing for a set.
-SHARED = ("ball", "drop", "sampling", "levels", "limits")
-_OF_FILES = {"snapshot_interval"}
-
-_LINE = re.compile(
-    r"^(?:! )?&(?P<group>\w+)$"
-    r"|^!? +! (?P<meaning>.*); allowed: (?P<allowed>.*)$"
-    r"|^!? +(?P<key>\w+) =",
-    re.MULTILINE,
-)
-_RANGE = re.compile(
-    r"(?P<lower>\S+) <=? \w+ <=? (?P<upper>[^\s,]+)(?: (?P<unit>[^\s,]+))?(?P<whole>, whole)?$"
-)
-
-
-@dataclass(frozen=True)
-class Key:
-    """One key of the input.
-
-    Attributes
-    ----------
-    group, name : str
-        Namelist group and name; studies have two more, `density` and `temperature`.
-    meaning, unit : str
-        What it means, and its unit; the unit is empty for a pure number.
-    kind : str
-        ``"real"``, ``"whole"``, ``"choice"``, ``"flag"`` or ``"list"`` (of numbers).
-    choices : tuple of str
-        What a choice may be.
-    lower, upper : float
-        Ends of the allowed range of numbers.
-    """
-
-    group: str
-    name: str
-    meaning: str
-    unit: str = ""
-    kind: Kind = "real"
-    choices: tuple[str, ...] = ()
-    lower: float = -math.inf
-    upper: float = math.inf
-
+# What says which files a run writes does nothing for a set.
+_OF_FILES = "output"
 
 # Keys of studies alone: they act on the mass and on the modulus of elasticity of the ball.
-DENSITY = Key("ball", "density", "density of the wall", "kg/m3")
-TEMPERATURE = Key("ball", "temperature", "temperature of the ball", "degC")
-
-
-@cache
-def key_table() -> tuple[Key, ...]:
-    """Return every key of the library."""
-    found = []
-    group = meaning = allowed = ""
-    for line in _LINE.finditer(text(api.keys())):
-        if line["group"]:
-            group = line["group"]
-        elif line["key"]:
-            found.append(_key(group, line["key"], meaning, allowed))
-        else:
-            meaning, allowed = line["meaning"], line["allowed"]
-    return tuple(found)
-
-
-def _key(group: str, name: str, meaning: str, allowed: str) -> Key:
-    """Return a key by what the library says of it."""
-    limits = _RANGE.match(allowed)
-    unit = (limits["unit"] or "") if limits else ""
-    kind: Kind = "real"
-    if name in LISTS:
-        kind = "list"
-    elif allowed.startswith("'"):
-        kind = "choice"
-    elif allowed.startswith("."):
-        kind = "flag"
-    elif limits and limits["whole"]:
-        kind = "whole"
-    ends = (float(limits["lower"]), float(limits["upper"])) if limits else ()
-    return Key(group, name, meaning, unit, kind, tuple(re.findall(r"'(\w+)'", allowed)), *ends)
+DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
+TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
 @cache
 def known_keys(model: str) -> Mapping[str, Key]:
     """Return the keys that sets of a model may differ in, by their names."""
-    groups = {*SHARED, *(group_of(model, option) for option in dataclasses.fields(MODELS[model]))}
     known = {
-        key.name: key for key in key_table() if key.group in groups and key.name not in _OF_FILES
+        key.name: key
+        for key in KEYS
+        if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != _OF_FILES
     }
     return MappingProxyType(known | {key.name: key for key in (DENSITY, TEMPERATURE)})
 
@@ -148,7 +74,7 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
         key, entry = find_key(name, case.model.name)
-        group = key.group if key.group in SHARED else "model"
+        group = key.group if key.group in GROUPS else "model"
         place = groups.setdefault(group, {})
         if entry is None:
             place[key.name] = value
@@ -176,3 +102,23 @@ def plain_words(name: str) -> str:
     """
     persons = {"youngs": "Young's", "poisson": "Poisson's"}
     return " ".join(persons.get(word, word) for word in name.split("_"))
+
+
+def limits(key: Key, case: Case) -> tuple[float, float]:
+    """Return the ends of the allowed range of a key, those that depend on other keys for a case."""
+    group = getattr(case, key.group if key.group in GROUPS else "model")
+    return _end(key.lower, group), _end(key.upper, group)
+
+
+def _end(end: float | str, group: object) -> float:
+    """Return the end of a range; as text it is a product or quotient of numbers and keys."""
+    if not isinstance(end, str):
+        return end
+    value, operator = 1.0, "*"
+    for word in re.split(r"([*/])", end):
+        if word in "*/":
+            operator = word
+            continue
+        factor = float(getattr(group, word) if hasattr(group, word) else word)
+        value = value * factor if operator == "*" else value / factor
+    return value

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call, level_api, words
+from thud._api import call_direct as call, level_api, words
 from thud.errors import InputError
 
 if TYPE_CHECKING:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import base64
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import f90nml
 import numpy as np
 
+from thud._schema import SCALARS
 from thud.case import Case
 from thud.errors import InputError
 from thud.impact import Impact
@@ -19,11 +20,6 @@ if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
-
-SCALARS = (
-    *("impact_velocity", "contact_time", "peak_force", "peak_floor_force", "max_deflection"),
-    *("restitution", "impulse"),
-)
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -51,7 +47,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         force = _table(folder / "force.csv")
         channels = folder / "channels.csv"
         found = _table(channels) if channels.exists() else {}
-        motion = _read_motion(folder, case) if (folder / "motion.pvd").exists() else None
+        motion = _read_motion(folder) if (folder / "motion.pvd").exists() else None
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"{directory}: cannot be read ({error}); allowed: the results of an impact"
         raise InputError(message) from error
@@ -68,9 +64,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         {name: values for name, values in found.items() if name != "time_s"},
         dict(numbers.get("facts", {})),
         motion,
-        sample_rate=case.sampling.sample_rate,
         **{name: numbers["summary"][name] for name in SCALARS},
-        **numbers["checks"],
     )
 
 
@@ -81,11 +75,13 @@ def _table(path: Path) -> dict[str, NDArray[np.float64]]:
         return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
 
 
-def _read_motion(folder: Path, case: Case) -> Motion:
+def _read_motion(folder: Path) -> Motion:
     """Return the snapshots that a list of VTU files names."""
     entries = re.findall(r'timestep="(.*?)" file="(.*?)"', (folder / "motion.pvd").read_text())
-    size = (case.model.radial_elements + 1, case.model.polar_elements + 1)  # type: ignore[union-attr]
     shots = [_read_vtu(folder / name) for _, name in entries]
+    # The first element has its first two nodes on neighbouring rings.
+    line = int(shots[0]["connectivity"][1])
+    size = (len(shots[0]["cavity_pressure"]) // line, line)
     plane = {
         name: np.stack([shot[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for shot in shots])
         for name in ("Points", "displacement", "velocity")
@@ -100,11 +96,14 @@ def _read_motion(folder: Path, case: Case) -> Motion:
     )
 
 
-def _read_vtu(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Return the arrays of real numbers of a VTU file as thud writes it."""
+def _read_vtu(path: Path) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a VTU file as thud writes it."""
     arrays = re.findall(
-        r'<DataArray type="Float64" Name="(.*?)".*?>(.*?)</DataArray>',
+        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>',
         path.read_text(encoding="ascii"),
     )
     # The length of the data stands before them, in eight bytes.
-    return {name: np.frombuffer(base64.b64decode(data), "<f8", offset=8) for name, data in arrays}
+    return {
+        name: np.frombuffer(base64.b64decode(data), f"<{kind[0].lower()}8", offset=8)
+        for kind, name, data in arrays
+    }

@@ -1,6 +1,6 @@
 !> The flat API for Python to levels and verdicts; see `thud_api`.
 module thud_level_api
-   use thud_band, only: band_type, get_octaves, get_thirds, octave_count, third_count
+   use thud_band, only: band_type, get_bands_of => get_bands
    use thud_error, only: error_type, get_status
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
@@ -31,7 +31,7 @@ contains
       real(wp), intent(out) :: upper(15)
       type(band_type), allocatable :: bands(:)
 
-      bands = bands_of(bandwidth)
+      bands = get_bands_of(bandwidth)
       n_band = size(bands)
       nominal(:n_band) = bands%nominal
       centre(:n_band) = bands%centre
@@ -68,7 +68,7 @@ contains
       type(error_type), allocatable :: error
 
       levels = 0.0_wp
-      call get_force_exposure_levels(force, sample_rate, bands_of(bandwidth), method, levels, error)
+      call get_force_exposure_levels(force, sample_rate, get_bands_of(bandwidth), method, levels, error)
       call get_status(error, status, message)
    end subroutine force_exposure
 
@@ -164,19 +164,5 @@ contains
       upper = criteria%upper
       met = merge(1, 0, conforms(criteria))
    end subroutine judge
-
-   !> The bands of a width.
-   pure function bands_of(bandwidth) result(bands)
-      !> `third`, or anything else for octaves; Python has checked it.
-      character(len=*), intent(in) :: bandwidth
-      !> The bands: [n_band].
-      type(band_type), allocatable :: bands(:)
-
-      if (bandwidth == 'third') then
-         allocate (bands(third_count), source=get_thirds())
-      else
-         allocate (bands(octave_count), source=get_octaves())
-      end if
-   end function bands_of
 
 end module thud_level_api

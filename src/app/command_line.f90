@@ -1,11 +1,14 @@
 !> The command line of the executable.
 module thud_command_line
-   use thud_case, only: describe_keys
+   use thud_case, only: case_type
+   use thud_case_text, only: describe_keys
+   use thud_compute, only: results_type
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
    use thud_posix, only: ignore_signals, print_text, standard_error, standard_output
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
+   use thud_schema, only: get_schema
    use thud_sets_run, only: run_sets
    use thud_text, only: newline, quoted
    implicit none (type, external)
@@ -45,6 +48,8 @@ contains
       !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming.
       integer, intent(out) :: exit_code
       type(request_type) :: request
+      type(case_type), target :: case
+      type(results_type) :: results
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
 
@@ -59,7 +64,7 @@ contains
       else
          if (.not. request%quiet) call begin_progress()
          if (request%sets == '') then
-            call run_case(request%case_file, request%output, outcome, error)
+            call run_case(request%case_file, request%output, case, results, outcome, error)
          else
             call run_sets(request%case_file, request%sets, request%threads, request%output, outcome, error)
          end if
@@ -111,7 +116,10 @@ contains
             request%information = 'thud '//version
             return
          case ('--keys')
-            request%information = describe_keys()
+            call describe_keys(request%information)
+            return
+         case ('--schema')
+            call get_schema(request%information)
             return
          case ('--check')
             request%check = .true.
@@ -127,7 +135,7 @@ contains
          case default
             if (index(argument, '-') == 1) then
                error = input_error(quoted(argument)//' is not a known option; allowed: --output DIR, --sets TABLE, ' &
-                  //'--threads N, --check, --quiet, --keys, --help, --version')
+                  //'--threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -196,8 +204,8 @@ contains
       !> The line.
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--check] [--quiet] | --keys | --help | ' &
-         //'--version'
+      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--check] [--quiet] | --keys | --schema | ' &
+         //'--help | --version'
    end function usage
 
    !> The help text.
@@ -209,12 +217,13 @@ contains
          //newline//'Usage: '//usage()//newline//newline &
          //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR   directory for the results (default: outputs/<case>, of sets <case>_sets)'//newline &
-         //'  --sets TABLE.csv   many drops of hollow_sphere: keys of &ball, &drop and &hollow_sphere in the'//newline &
-         //'                     first line, one set in each other; the rest is as in CASE.nml'//newline &
+         //'  --sets TABLE.csv   many drops: keys in the first line, one drop in each other; the rest is as in'//newline &
+         //'                     CASE.nml'//newline &
          //'  --threads N        threads for them (default: 1)'//newline &
          //'  --check            exit with 3 where the source does not conform to the limits'//newline &
          //'  -q, --quiet        show nothing but errors and remarks'//newline &
          //'  --keys             show every key with default, range and meaning'//newline &
+         //'  --schema           the same and more as JSON, for programs'//newline &
          //'  -h, --help         show this text'//newline &
          //'  --version          show the version'//newline//newline &
          //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check).'

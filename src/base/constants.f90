@@ -5,7 +5,7 @@ module thud_constants
    implicit none (type, external)
    private
 
-   public :: compiler, pi, reference_force, reference_time, version
+   public :: compiler, pi, recorded_band, reference_force, reference_time, version
 
    !> Ratio of a circle's circumference to its diameter.
    real(wp), parameter :: pi = acos(-1.0_wp)
@@ -15,6 +15,10 @@ module thud_constants
 
    !> Reference time of the force exposure level, s (JIS A 1418-2).
    real(wp), parameter :: reference_time = 1.0_wp
+
+   !> Upper edge of the band that force plates are read in, Hz (paper section 3); the standards' limits
+   !> end at 707 Hz.
+   real(wp), parameter :: recorded_band = 1250.0_wp
 
    !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.
    character(len=*), parameter :: version = '0.1.0'

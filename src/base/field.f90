@@ -2,12 +2,13 @@
 !> sets. Reading, checking, writing and describing the input all use this one description.
 module thud_field
    use thud_error, only: error_type, input_error
+   use thud_interval, only: get_range_text, interval_type, new_interval
    use thud_kinds, only: wp
    use thud_text, only: join_quoted, lower_case, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: check_fields, field_type, list_type, name_length
+   public :: check_fields, field_type, key_length, list_type, name_length
 
    !> Most entries of a list.
    integer, parameter :: list_length = 64
@@ -23,6 +24,9 @@ module thud_field
    !> Length of text values such as the name of a model or a case.
    integer, parameter :: name_length = 128
 
+   !> Length of the name of a key or a group.
+   integer, parameter :: key_length = 24
+
    !> Most allowed texts of one key.
    integer, parameter :: max_choices = 12
 
@@ -32,9 +36,11 @@ module thud_field
    !> Description of one key and a pointer to the variable behind it.
    type :: field_type
       !> Namelist group.
-      character(len=24) :: group = ''
+      character(len=key_length) :: group = ''
       !> Key within the group.
-      character(len=24) :: key = ''
+      character(len=key_length) :: key = ''
+      !> What uses it: a source model, `modes` for the free modes, blank for every impact.
+      character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''
       !> What the value is, in a few words.
@@ -49,44 +55,77 @@ module thud_field
       type(list_type), pointer :: list_value => null()
       !> The text variable that is described, else null.
       character(len=name_length), pointer :: text_value => null()
-      !> Lower bound of the allowed range.
-      real(wp) :: lower = -huge(1.0_wp)
-      !> Upper bound of the allowed range.
-      real(wp) :: upper = huge(1.0_wp)
-      !> The lower bound itself is not allowed.
-      logical :: lower_open = .false.
-      !> The upper bound itself is not allowed.
-      logical :: upper_open = .false.
+      !> Allowed range of numbers, see `thud_interval`.
+      character(len=72) :: range = ''
+      !> The entries of a list are whole numbers.
+      logical :: whole_entries = .false.
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
       !> Allowed texts, the first `n_choice` hold; of fixed size, because compilers lose allocatable
       !> components of array constructors: [max_choices].
-      character(len=24) :: choices(max_choices) = ''
+      character(len=key_length) :: choices(max_choices) = ''
    contains
       procedure :: set_from_text
-      procedure :: check
+      procedure :: set_number
+      procedure :: get_number
+      procedure :: get_kind
       procedure :: get_text
       procedure :: get_allowed
       procedure :: is_empty
-      procedure, private :: complain
-      procedure :: contains => contains_value
+      procedure, private :: get_error
    end type field_type
 
 contains
 
-   !> First complaint of a list of fields, if any.
+   !> Refuses the first value outside its range, NaN included.
    subroutine check_fields(fields, error)
       !> The fields: [n_field].
       type(field_type), intent(in) :: fields(:)
       !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
+      type(interval_type) :: interval
+      character(len=:), allocatable :: text
+      logical :: inside
       integer :: i
 
       do i = 1, size(fields)
-         call fields(i)%check(error)
-         if (allocated(error)) return
+         associate (field => fields(i))
+            inside = .true.
+            if (field%range /= '') interval = get_interval(fields, i)
+            if (field%n_choice > 0) then
+               inside = any(field%choices(:field%n_choice) == field%text_value)
+            else if (associated(field%list_value)) then
+               associate (entries => field%list_value%values(:field%list_value%count))
+                  inside = all(interval%contains(entries))
+                  if (field%whole_entries) inside = inside .and. .not. any(abs(entries - anint(entries)) > 0.0_wp)
+               end associate
+            else if (field%range /= '') then
+               inside = interval%contains(field%get_number())
+            end if
+            if (inside) cycle
+            call field%get_text(text)
+            error = field%get_error(text, 'is not allowed', interval)
+            return
+         end associate
       end do
    end subroutine check_fields
+
+   !> Allowed range of a number, its ends resolved by the keys of the same group.
+   function get_interval(fields, i) result(interval)
+      !> All fields: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> Number of the field.
+      integer, intent(in) :: i
+      !> The range.
+      type(interval_type) :: interval
+      integer, allocatable :: group(:)
+      integer :: j
+
+      interval = new_interval(fields(i)%range)
+      if (interval%lower_expression == '' .and. interval%upper_expression == '') return
+      group = pack([(j, j=1, size(fields))], fields%group == fields(i)%group)
+      call interval%resolve(fields(group)%key, [(fields(group(j))%get_number(), j=1, size(group))])
+   end function get_interval
 
    !> Sets the variable from the text of a namelist assignment.
    subroutine set_from_text(self, text, error)
@@ -141,7 +180,7 @@ contains
          if (status == 0) self%text_value = word(:name_length)
          if (status == 0 .and. self%n_choice > 0) self%text_value = lower_case(self%text_value)
       end if
-      if (status /= 0) error = self%complain(text, 'is not '//wanted)
+      if (status /= 0) error = self%get_error(text, 'is not '//wanted, new_interval(self%range))
    end subroutine set_from_text
 
    !> Whether numbers are written in the usual way. A namelist may also hold null values (`1*`) and
@@ -179,59 +218,84 @@ contains
       list%values(:list%count) = entries(:list%count)
    end subroutine set_list
 
-   !> Complains about a value outside the allowed range, NaN included.
-   subroutine check(self, error)
+   !> Value as a number: of a choice its place among the choices, of a flag 0 or 1.
+   function get_number(self) result(number)
       !> The field.
       class(field_type), intent(in) :: self
-      !> Names group, key, value and allowed range.
+      !> The number; 0 for free text and lists.
+      real(wp) :: number
+
+      number = 0.0_wp
+      if (associated(self%real_value)) number = self%real_value
+      if (associated(self%integer_value)) number = real(self%integer_value, wp)
+      if (associated(self%logical_value)) number = merge(1.0_wp, 0.0_wp, self%logical_value)
+      if (self%n_choice > 0) number = real(findloc(self%choices(:self%n_choice) == self%text_value, .true., dim=1), wp)
+   end function get_number
+
+   !> Sets the variable from such a number.
+   subroutine set_number(self, number, entry, error)
+      !> The field.
+      class(field_type), intent(in) :: self
+      !> The number.
+      real(wp), intent(in) :: number
+      !> Which entry of a list is set; 0 for keys that are no lists.
+      integer, intent(in) :: entry
+      !> The key takes no such number.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: text
-      logical :: inside
+      logical :: whole
 
-      inside = .true.
-      if (self%n_choice > 0) then
-         inside = any(self%choices(:self%n_choice) == self%text_value)
-      else if (associated(self%real_value)) then
-         inside = self%contains(self%real_value)
+      whole = abs(number) <= real(huge(1), wp)
+      if (whole) whole = .not. abs(number - anint(number)) > 0.0_wp
+      if (associated(self%real_value)) then
+         self%real_value = number
       else if (associated(self%list_value)) then
-         inside = all(self%contains(self%list_value%values(:self%list_value%count)))
+         self%list_value%values(entry) = number
+      else if (.not. whole) then
+         error = self%get_error(to_text(number), 'is not a whole number', new_interval(self%range))
       else if (associated(self%integer_value)) then
-         inside = self%contains(real(self%integer_value, wp))
+         self%integer_value = nint(number)
+      else if (associated(self%logical_value)) then
+         self%logical_value = nint(number) /= 0
+      else if (nint(number) >= 1 .and. nint(number) <= self%n_choice) then
+         self%text_value = self%choices(nint(number))
+      else
+         error = self%get_error(to_text(number), 'is not the number of a choice', new_interval(self%range))
       end if
-      if (inside) return
-      call self%get_text(text)
-      error = self%complain(text, 'is not allowed')
-   end subroutine check
+   end subroutine set_number
 
-   !> Whether a value lies in the allowed range; NaN never does.
-   elemental function contains_value(self, value) result(inside)
+   !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`.
+   pure function get_kind(self) result(kind)
       !> The field.
       class(field_type), intent(in) :: self
-      !> The value.
-      real(wp), intent(in) :: value
-      !> It lies in the range.
-      logical :: inside
+      !> The kind.
+      character(len=6) :: kind
 
-      inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
-         .and. (value < self%upper .or. (.not. self%upper_open .and. value <= self%upper))
-   end function contains_value
+      kind = 'text'
+      if (associated(self%real_value)) kind = 'real'
+      if (associated(self%integer_value)) kind = 'whole'
+      if (associated(self%logical_value)) kind = 'flag'
+      if (associated(self%list_value)) kind = 'list'
+      if (self%n_choice > 0) kind = 'choice'
+   end function get_kind
 
    !> Error that names group, key, value and allowed range.
-   function complain(self, value, what) result(error)
+   function get_error(self, value, what, interval) result(error)
       !> The field.
       class(field_type), intent(in) :: self
       !> The value as text.
       character(len=*), intent(in) :: value
       !> What is wrong with it.
       character(len=*), intent(in) :: what
+      !> Allowed range of numbers.
+      type(interval_type), intent(in) :: interval
       !> The error.
       type(error_type) :: error
       character(len=:), allocatable :: allowed
 
-      call self%get_allowed(allowed)
+      call self%get_allowed(allowed, interval)
       error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//value//' '//what &
          //'; allowed: '//allowed)
-   end function complain
+   end function get_error
 
    !> The value as it stands in a namelist.
    subroutine get_text(self, text)
@@ -259,11 +323,13 @@ contains
    end subroutine get_text
 
    !> The allowed range in words: `0 < outer_radius <= 10 m`.
-   subroutine get_allowed(self, text)
+   subroutine get_allowed(self, text, interval)
       !> The field.
       class(field_type), intent(in) :: self
       !> The range with its unit, or the list of allowed words.
       character(len=:), allocatable, intent(out) :: text
+      !> The range, where its ends are resolved.
+      type(interval_type), intent(in), optional :: interval
 
       if (self%n_choice > 0) then
          text = join_quoted(self%choices(:self%n_choice))
@@ -272,13 +338,13 @@ contains
       else if (associated(self%logical_value)) then
          text = '.true., .false.'
       else
-         text = to_text(self%lower)
-         call drop_idle_decimal(text)
-         text = text//' '//trim(merge('< ', '<=', self%lower_open))//' '//trim(self%key)//' ' &
-            //trim(merge('< ', '<=', self%upper_open))//' '//to_text(self%upper)
-         call drop_idle_decimal(text)
+         if (present(interval)) then
+            call get_range_text(interval, trim(self%key), text)
+         else
+            call get_range_text(new_interval(self%range), trim(self%key), text)
+         end if
          if (self%unit /= '') text = text//' '//trim(self%unit)
-         if (associated(self%integer_value)) text = text//', whole'
+         if (associated(self%integer_value) .or. self%whole_entries) text = text//', whole'
       end if
    end subroutine get_allowed
 
@@ -292,14 +358,5 @@ contains
       empty = .false.
       if (associated(self%list_value)) empty = self%list_value%count == 0
    end function is_empty
-
-   !> Takes `.0` from the end of a text.
-   pure subroutine drop_idle_decimal(text)
-      !> A text that ends with a number.
-      character(len=:), allocatable, intent(inout) :: text
-
-      if (len(text) < 3) return
-      if (text(len(text) - 1:) == '.0') text = text(:len(text) - 2)
-   end subroutine drop_idle_decimal
 
 end module thud_field

@@ -1,10 +1,10 @@
-!> The one kind of all real numbers.
+!> Kinds of numbers: one of all real numbers, and the integers that memory is counted in.
 module thud_kinds
-   use, intrinsic :: iso_fortran_env, only: real64
+   use, intrinsic :: iso_fortran_env, only: int8, int64, real64
    implicit none (type, external)
    private
 
-   public :: wp
+   public :: int8, int64, wp
 
    !> Working precision: IEEE double.
    integer, parameter :: wp = real64

@@ -1,19 +1,18 @@
-!> Descriptions of keys, one constructor per kind of value.
+!> Descriptions of keys, one constructor per kind of value. Ranges are intervals such as `(0, 10]`, see
+!> `thud_interval`; `in_group` and `owned_by` say where the keys stand and who uses them.
 module thud_new_field
    use thud_field, only: field_type, list_type, name_length
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: choice_field, integer_field, list_field, logical_field, real_field, text_field
+   public :: choice_field, in_group, integer_field, list_field, logical_field, owned_by, real_field, text_field
 
 contains
 
    !> Describes a real key.
-   function real_field(group, key, variable, unit, meaning, lower, upper, lower_open, upper_open) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
+   function real_field(key, variable, unit, meaning, range) result(field)
+      !> Name of the key.
       character(len=*), intent(in) :: key
       !> The variable behind the key.
       real(wp), intent(in), target :: variable
@@ -21,49 +20,35 @@ contains
       character(len=*), intent(in) :: unit
       !> What the value is.
       character(len=*), intent(in) :: meaning
-      !> Lower bound of the allowed range.
-      real(wp), intent(in) :: lower
-      !> Upper bound of the allowed range.
-      real(wp), intent(in) :: upper
-      !> The lower bound itself is not allowed (default: it is).
-      logical, intent(in), optional :: lower_open
-      !> The upper bound itself is not allowed (default: it is).
-      logical, intent(in), optional :: upper_open
+      !> Allowed range.
+      character(len=*), intent(in) :: range
       !> The description.
       type(field_type) :: field
 
-      field = field_type(group=group, key=key, unit=unit, meaning=meaning, lower=lower, upper=upper)
+      field = field_type(key=key, unit=unit, meaning=meaning, range=range)
       field%real_value => variable
-      if (present(lower_open)) field%lower_open = lower_open
-      if (present(upper_open)) field%upper_open = upper_open
    end function real_field
 
    !> Describes an integer key.
-   function integer_field(group, key, variable, meaning, lower, upper) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
+   function integer_field(key, variable, meaning, range) result(field)
+      !> Name of the key.
       character(len=*), intent(in) :: key
       !> The variable behind the key.
       integer, intent(in), target :: variable
       !> What the value is.
       character(len=*), intent(in) :: meaning
-      !> Smallest allowed value.
-      integer, intent(in) :: lower
-      !> Largest allowed value.
-      integer, intent(in) :: upper
+      !> Allowed range.
+      character(len=*), intent(in) :: range
       !> The description.
       type(field_type) :: field
 
-      field = field_type(group=group, key=key, meaning=meaning, lower=real(lower, wp), upper=real(upper, wp))
+      field = field_type(key=key, meaning=meaning, range=range)
       field%integer_value => variable
    end function integer_field
 
    !> Describes a key that is true or false.
-   function logical_field(group, key, variable, meaning) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
+   function logical_field(key, variable, meaning) result(field)
+      !> Name of the key.
       character(len=*), intent(in) :: key
       !> The variable behind the key.
       logical, intent(in), target :: variable
@@ -72,15 +57,13 @@ contains
       !> The description.
       type(field_type) :: field
 
-      field = field_type(group=group, key=key, meaning=meaning)
+      field = field_type(key=key, meaning=meaning)
       field%logical_value => variable
    end function logical_field
 
    !> Describes a key with a list of numbers, each of which lies in one range.
-   function list_field(group, key, variable, unit, meaning, lower, upper, lower_open, upper_open) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
+   function list_field(key, variable, unit, meaning, range, whole) result(field)
+      !> Name of the key.
       character(len=*), intent(in) :: key
       !> The variable behind the key.
       type(list_type), intent(in), target :: variable
@@ -88,27 +71,21 @@ contains
       character(len=*), intent(in) :: unit
       !> What the values are.
       character(len=*), intent(in) :: meaning
-      !> Lower bound of the allowed range.
-      real(wp), intent(in) :: lower
-      !> Upper bound of the allowed range.
-      real(wp), intent(in) :: upper
-      !> The lower bound itself is not allowed (default: it is).
-      logical, intent(in), optional :: lower_open
-      !> The upper bound itself is not allowed (default: it is).
-      logical, intent(in), optional :: upper_open
+      !> Allowed range of each.
+      character(len=*), intent(in) :: range
+      !> They are whole numbers (default: not).
+      logical, intent(in), optional :: whole
       !> The description.
       type(field_type) :: field
 
-      field = real_field(group, key, variable%values(1), unit, meaning, lower, upper, lower_open, upper_open)
-      field%real_value => null()
+      field = field_type(key=key, unit=unit, meaning=meaning, range=range)
+      if (present(whole)) field%whole_entries = whole
       field%list_value => variable
    end function list_field
 
    !> Describes a key with free text.
-   function text_field(group, key, variable, meaning) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
+   function text_field(key, variable, meaning) result(field)
+      !> Name of the key.
       character(len=*), intent(in) :: key
       !> The variable behind the key.
       character(len=name_length), intent(in), target :: variable
@@ -117,15 +94,13 @@ contains
       !> The description.
       type(field_type) :: field
 
-      field = field_type(group=group, key=key, meaning=meaning)
+      field = field_type(key=key, meaning=meaning)
       field%text_value => variable
    end function text_field
 
    !> Describes a key that takes one of several words.
-   function choice_field(group, key, variable, meaning, choices) result(field)
-      !> Namelist group.
-      character(len=*), intent(in) :: group
-      !> Key within the group.
+   function choice_field(key, variable, meaning, choices) result(field)
+      !> Name of the key.
       character(len=*), intent(in) :: key
       !> The variable behind the key.
       character(len=name_length), intent(in), target :: variable
@@ -136,9 +111,35 @@ contains
       !> The description.
       type(field_type) :: field
 
-      field = text_field(group, key, variable, meaning)
+      field = text_field(key, variable, meaning)
       field%n_choice = size(choices)
       field%choices(:size(choices)) = choices
    end function choice_field
+
+   !> Puts keys into a namelist group, unless they stand in one already.
+   function in_group(group, fields) result(placed)
+      !> Name of the group.
+      character(len=*), intent(in) :: group
+      !> The keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> The same in the group: [n_field].
+      type(field_type) :: placed(size(fields))
+
+      placed = fields
+      where (placed%group == '') placed%group = group
+   end function in_group
+
+   !> Says what uses keys.
+   function owned_by(owner, fields) result(owned)
+      !> A source model or `modes`.
+      character(len=*), intent(in) :: owner
+      !> The keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> The same with their owner: [n_field].
+      type(field_type) :: owned(size(fields))
+
+      owned = fields
+      owned%owner = owner
+   end function owned_by
 
 end module thud_new_field

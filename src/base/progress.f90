@@ -1,5 +1,6 @@
 !> Reports on long work. The library only tells how far it is; who runs it may show that.
 module thud_progress
+   !$ use omp_lib, only: omp_in_parallel
    use thud_kinds, only: wp
    implicit none (type, external)
    private
@@ -45,6 +46,8 @@ contains
 
       procedure(handler), pointer :: current
 
+      ! Of many drops that are computed at once none tells how far it is.
+      !$ if (omp_in_parallel()) return
       ! Another thread may change it meanwhile.
       current => show
       if (associated(current)) call current(done, whole, unit)

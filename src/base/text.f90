@@ -8,7 +8,7 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, join_quoted, lower_case, newline, quoted, to_text
+   public :: fixed, join_quoted, lower_case, newline, quoted, split, to_text
 
    !> Line feed, the line end of every file that thud writes.
    character(len=*), parameter :: newline = new_line('a')
@@ -223,5 +223,24 @@ contains
 
       length = sum([(quoted_length(words(i)), i=1, size(words))]) + 2*max(size(words) - 1, 0)
    end function joined_length
+
+   !> Words of a list with commas between.
+   pure function split(list, n_word) result(words)
+      !> The list.
+      character(len=*), intent(in) :: list
+      !> Number of words.
+      integer, intent(in) :: n_word
+      !> The words: [n_word].
+      character(len=32) :: words(n_word)
+      integer :: i, at, length
+
+      words = ''
+      at = 1
+      do i = 1, n_word
+         length = index(list(at:)//',', ',') - 1
+         words(i) = list(at:at + length - 1)
+         at = at + length + 1
+      end do
+   end function split
 
 end module thud_text

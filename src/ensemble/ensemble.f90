@@ -11,6 +11,7 @@ module thud_ensemble
    use thud_constants, only: reference_force, reference_time
    use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_error, only: error_type, input_error, numerical_error
+   use thud_force_history, only: force_count
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
@@ -21,10 +22,7 @@ module thud_ensemble
    implicit none (type, external)
    private
 
-   public :: force_count, new_projections, projections_type, solve_ensemble, verdict_type
-
-   !> Kinds of force: elastic, on the floor.
-   integer, parameter :: force_count = 2
+   public :: are_alike, new_projections, projections_type, solve_ensemble
 
    !> Matrices of the levels, one per window length, made when first needed.
    type :: projections_type
@@ -35,12 +33,6 @@ module thud_ensemble
       !> The matrices: [n_window].
       type(band_projection_type), allocatable :: window(:)
    end type projections_type
-
-   !> Levels and verdict of a set, for each kind of force.
-   type :: verdict_type
-      !> The source conforms: [force_count].
-      logical :: conforms(force_count) = .false.
-   end type verdict_type
 
    !> Arrays of one thread.
    type :: workspace_type
@@ -76,8 +68,24 @@ contains
       allocate (projections%window(get_window_class(n_sample)))
    end function new_projections
 
+   !> Whether matrices of one serve for the other: same rate, bands and longest window.
+   pure function are_alike(one, other) result(alike)
+      !> The one.
+      type(projections_type), intent(in) :: one
+      !> The other, which may be empty.
+      type(projections_type), intent(in) :: other
+      !> They do.
+      logical :: alike
+
+      alike = .false.
+      if (.not. allocated(other%window)) return
+      alike = size(one%window) == size(other%window) .and. size(one%bands) == size(other%bands)
+      if (.not. alike) return
+      alike = abs(one%sample_rate - other%sample_rate) <= 0.0_wp .and. all(one%bands%set == other%bands%set)
+   end function are_alike
+
    !> Outcomes, levels and verdicts of all sets.
-   subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, outcomes, levels, verdicts, forces, error)
+   subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, outcomes, levels, met, forces, error)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
       !> Sampling of all.
@@ -94,8 +102,8 @@ contains
       type(set_outcome_type), intent(out) :: outcomes(:)
       !> Force exposure levels, dB, NaN without outcome: [n_band, force_count, n_set].
       real(wp), intent(out) :: levels(:, :, :)
-      !> The verdicts: [n_set].
-      type(verdict_type), intent(out) :: verdicts(:)
+      !> The source conforms by each force: [force_count, n_set].
+      logical, intent(out) :: met(:, :)
       !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
       !> The sampling cannot be used, its records have no room in memory, or the source is not known.
@@ -104,6 +112,7 @@ contains
       integer, allocatable :: order(:), first(:)
 
       levels = not_a_number
+      met = .false.
       forces = not_a_number
       call check_sampling(sampling, error)
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
@@ -139,14 +148,14 @@ contains
          integer, intent(in) :: members(:)
          type(set_outcome_type) :: found(size(members))
          real(wp) :: found_levels(size(levels, 1), force_count, size(members))
-         logical :: met(force_count, size(members))
+         logical :: found_met(force_count, size(members))
          integer :: i
 
-         call solve_workspace(workspace, sets(members), sampling, judged, projections, found, found_levels, met)
+         call solve_workspace(workspace, sets(members), sampling, judged, projections, found, found_levels, found_met)
          do i = 1, size(members)
             outcomes(members(i)) = found(i)
             levels(:, :, members(i)) = found_levels(:, :, i)
-            verdicts(members(i))%conforms = met(:, i)
+            met(:, members(i)) = found_met(:, i)
             if (size(forces) > 0 .and. found(i)%status == set_is_fine) call copy_forces(workspace, i, forces(:, :, members(i)))
          end do
       end subroutine run_block

@@ -8,21 +8,22 @@ module thud_finite_element
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_finite_element_options, only: finite_element_type, get_frame_count, get_stride
+   use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
+   use thud_floor_contact, only: get_nodal_areas
    use thud_force_history, only: force_history_type
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
       max_steps, new_impact_run
    use thud_kinds, only: wp
-   use thud_material, only: material_type, new_material
-   use thud_motion, only: motion_type, new_motion, take_snapshot
+   use thud_material, only: get_material_loss_factor, material_type, new_material
+   use thud_motion, only: new_motion, take_snapshot
    use thud_progress, only: report_progress
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: solve_finite_element
+   public :: finite_element_type
 
    !> Part of it at which a running computation is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
@@ -45,22 +46,60 @@ module thud_finite_element
       integer :: n_over = 0
    end type contacts_type
 
+   !> The model.
+   type, extends(finite_element_options_type) :: finite_element_type
+   contains
+      procedure, pass(options) :: solve
+      procedure, pass(options) :: get_cost
+      procedure, pass(options) :: get_loss_factors
+   end type finite_element_type
+
 contains
 
+   !> About the time that one drop takes on one core, s.
+   function get_cost(options) result(cost)
+      !> The options.
+      class(finite_element_type), intent(in) :: options
+      !> The time, s.
+      real(wp) :: cost
+
+      ! Elements, and steps that are as short as the elements are small.
+      cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
+   end function get_cost
+
+   !> Loss factor of the material in shear against frequency.
+   subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The options.
+      class(finite_element_type), intent(in) :: options
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      !> Loss factors: [n].
+      real(wp), intent(out) :: loss_factor(:)
+      !> No Prony series fits the loss factor.
+      type(error_type), allocatable, intent(out) :: error
+      type(material_type) :: material
+      integer :: i
+
+      loss_factor = 0.0_wp
+      call new_material(options%material, ball, material, error)
+      if (allocated(error)) return
+      loss_factor = [(get_material_loss_factor(material, frequency(i)), i=1, size(frequency))]
+   end subroutine get_loss_factors
+
    !> Force history of one drop.
-   subroutine solve_finite_element(ball, drop, options, sampling, history, motion, error)
+   subroutine solve(ball, drop, options, sampling, history, error)
       !> The ball.
       type(ball_type), intent(in) :: ball
       !> The drop.
       type(drop_type), intent(in) :: drop
       !> Mesh, material, contact.
-      type(finite_element_type), intent(in) :: options
+      class(finite_element_type), intent(in) :: options
       !> Sampling rate, length of the record, least number of steps in a sampling interval.
       type(sampling_type), intent(in) :: sampling
-      !> Force and motion, with the energies in the channels.
+      !> Force and motion, with the energies in the channels, and snapshots of the deformed ball.
       type(force_history_type), intent(out) :: history
-      !> Snapshots of the deformed ball.
-      type(motion_type), intent(out) :: motion
       !> The ball cannot be computed, or the balances do not close.
       type(error_type), allocatable, intent(out) :: error
       type(impact_run_type) :: run
@@ -69,6 +108,7 @@ contains
       real(wp) :: speed, gap
 
       history = new_impact_record(sampling, get_impact_velocity(drop))
+      history%touch_time = options%flight_before
       speed = history%impact_velocity - drop%gravity*options%flight_before
       gap = speed*options%flight_before + drop%gravity*options%flight_before**2/2
       if (speed < 0.0_wp) then
@@ -80,13 +120,13 @@ contains
       if (allocated(error)) return
       run = new_impact_run(ball, options, material, drop%gravity, gap, speed)
       contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
-      motion = new_motion(run%position, get_frame_count(options, sampling))
-      call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, motion, error)
+      history%motion = new_motion(run%position, get_frame_count(options, sampling))
+      call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)
-   end subroutine solve_finite_element
+   end subroutine solve
 
    !> Marches until the ball has left for good.
-   subroutine march(run, start, contacts, options, sampling, history, motion, error)
+   subroutine march(run, start, contacts, options, sampling, history, error)
       !> The ball.
       type(impact_run_type), intent(inout) :: run
       !> Height of its centre of mass at first touch, m.
@@ -94,24 +134,23 @@ contains
       !> Its contacts.
       type(contacts_type), intent(inout) :: contacts
       !> Bounces, flight, step.
-      type(finite_element_type), intent(in) :: options
+      class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
-      !> Gets its samples, and contact time and restitution of the first contact.
+      !> Gets its samples, its snapshots, and contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
-      !> Gets the snapshots.
-      type(motion_type), intent(inout) :: motion
       !> The ball cannot be computed, or the record is too short.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, time, share, first_energy
-      integer :: i, k, n_step, n_sample, stride, look, latest
+      integer :: i, k, n_step, n_sample, stride, look, latest, last
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
       n_step = 0
+      last = ubound(run%position, 2)
       look = max(1, nint(look_interval*sampling%sample_rate))
       stride = huge(stride)
-      if (size(motion%time) > 0) stride = get_stride(options, sampling)
+      if (size(history%motion%time) > 0) stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
          if (mod(i - 1, look) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
@@ -135,8 +174,9 @@ contains
                call record_sample(run, i, start, history)
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
-               if (mod(i - 1, stride) == 0) call take_snapshot(motion, time, run%position, run%velocity, &
-                  run%node_impulse/interval, run%state%gas_pressure)
+               if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
+                  run%node_impulse/interval/get_nodal_areas(run%position(:, last, 1), run%position(:, last, 2)), &
+                  run%state%gas_pressure)
                run%node_impulse = 0.0_wp
             end if
             ! The part of the impulse that lies nearer to the next sample.

@@ -1,4 +1,4 @@
-!> Options of the finite-element model, group by group.
+!> Options of the finite-element model, group by group; `thud_finite_element` adds how it is solved.
 module thud_finite_element_options
    use thud_ball, only: ball_type
    use thud_error, only: error_type, input_error
@@ -7,14 +7,14 @@ module thud_finite_element_options
    use thud_kinds, only: wp
    use thud_material, only: check_material, get_material_fields, material_options_type
    use thud_mesh, only: get_mesh_fields, mesh_options_type
-   use thud_new_field, only: integer_field, real_field
+   use thud_new_field, only: in_group, integer_field, real_field
    use thud_sampling, only: get_sample_count, sampling_type
+   use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_finite_element, finite_element_groups, finite_element_type, get_finite_element_fields
-   public :: get_frame_count, get_stride
+   public :: finite_element_options_type, get_frame_count, get_stride
 
    !> Most memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
@@ -25,12 +25,8 @@ module thud_finite_element_options
    !> Least number of elements through the wall that bend as the wall does.
    integer, parameter :: min_radial = 2
 
-   !> Groups of the options.
-   character(len=*), parameter :: finite_element_groups(*) = [character(len=16) :: &
-      'finite_element', 'mesh', 'material', 'contact', 'output']
-
    !> Options of the model.
-   type :: finite_element_type
+   type, abstract, extends(source_model_type) :: finite_element_options_type
       !> Contacts to be followed.
       integer :: bounces = 1
       !> Free flight before first touch, s.
@@ -47,39 +43,41 @@ module thud_finite_element_options
       type(material_options_type) :: material
       !> Contact.
       type(contact_options_type) :: contact
-   end type finite_element_type
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: check
+      procedure, pass(options) :: get_snapshot_shape
+   end type finite_element_options_type
 
 contains
 
-   !> Keys and allowed ranges of the groups `&finite_element`, `&mesh`, `&material`, `&contact` and
-   !> `&output`.
-   function get_finite_element_fields(options) result(fields)
+   !> Keys and allowed ranges; some stand in groups of their own.
+   function get_fields(options) result(fields)
       !> The options that the fields read and set.
-      type(finite_element_type), intent(in), target :: options
+      class(finite_element_options_type), intent(in), target :: options
       !> One field per component: [17].
       type(field_type), allocatable :: fields(:)
-      character(len=*), parameter :: group = 'finite_element'
 
       fields = [ &
-         integer_field(group, 'bounces', options%bounces, 'contacts to be followed', 1, 100), &
-         real_field(group, 'flight_before', options%flight_before, 's', 'free flight before first touch', 0.0_wp, 1.0_wp), &
-         real_field(group, 'flight_after', options%flight_after, 's', 'free flight after the last contact', &
-         0.0_wp, 10.0_wp), &
-         real_field(group, 'step_safety', options%step_safety, '', 'part of the limit of stability that a step uses', &
-         0.01_wp, 0.98_wp), &
-         get_mesh_fields(options%mesh), &
-         get_material_fields(options%material), &
-         get_contact_fields(options%contact), &
-         real_field('output', 'snapshot_interval', options%snapshot_interval, 's', &
-         'time between snapshots of the deformed ball; 0: none', 0.0_wp, 10.0_wp)]
-   end function get_finite_element_fields
+         integer_field('bounces', options%bounces, 'contacts to be followed', '[1, 100]'), &
+         real_field('flight_before', options%flight_before, 's', 'free flight before first touch', '[0, 1]'), &
+         real_field('flight_after', options%flight_after, 's', 'free flight after the last contact', &
+         '[0, 10]'), &
+         real_field('step_safety', options%step_safety, '', 'part of the limit of stability that a step uses', &
+         '[0.01, 0.98]'), &
+         in_group('mesh', get_mesh_fields(options%mesh)), &
+         in_group('material', get_material_fields(options%material)), &
+         in_group('contact', get_contact_fields(options%contact)), &
+         in_group('output', [real_field('snapshot_interval', options%snapshot_interval, 's', &
+         'time between snapshots of the deformed ball; 0: none', '[0, 10]')])]
+   end function get_fields
 
-   !> Complains about options that do not fit each other, the ball or the memory.
-   subroutine check_finite_element(options, ball, sampling, error)
-      !> The options, each inside its own range.
-      type(finite_element_type), intent(in) :: options
+   !> Refuses options that do not fit each other, the ball or the memory.
+   subroutine check(ball, options, sampling, error)
       !> The ball.
       type(ball_type), intent(in) :: ball
+      !> The options, each inside its own range.
+      class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> What is wrong.
@@ -103,12 +101,24 @@ contains
       if (bytes > max_motion_bytes) error = input_error('&output: snapshot_interval = ' &
          //to_text(options%snapshot_interval)//' s makes '//to_text(get_frame_count(options, sampling)) &
          //' snapshots, more than the memory is meant to hold; allowed: a longer interval, or 0 for none')
-   end subroutine check_finite_element
+   end subroutine check
+
+   !> Size of the snapshots.
+   function get_snapshot_shape(options, sampling) result(extents)
+      !> The options.
+      class(finite_element_options_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Nodes from pole to pole, nodes through the wall, snapshots.
+      integer :: extents(3)
+
+      extents = [options%mesh%polar_elements + 1, options%mesh%radial_elements + 1, get_frame_count(options, sampling)]
+   end function get_snapshot_shape
 
    !> Most snapshots of a run.
    pure function get_frame_count(options, sampling) result(n_frame)
       !> The options.
-      type(finite_element_type), intent(in) :: options
+      class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> The number.
@@ -121,7 +131,7 @@ contains
    !> Samples between two snapshots.
    pure function get_stride(options, sampling) result(stride)
       !> The options, with snapshots.
-      type(finite_element_type), intent(in) :: options
+      class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> The number, at least 1.

@@ -42,13 +42,12 @@ contains
       type(contact_options_type), intent(in), target :: options
       !> One field per component: [2].
       type(field_type), allocatable :: fields(:)
-      character(len=*), parameter :: group = 'contact'
 
       fields = [ &
-         choice_field(group, 'treatment', options%treatment, 'how the floor holds the ball', &
+         choice_field('treatment', options%treatment, 'how the floor holds the ball', &
          [character(len=8) :: 'penalty', 'impulse']), &
-         real_field(group, 'penalty_ratio', options%penalty_ratio, '', &
-         'stiffness of the penalty over that of the elements above it, per area', 0.01_wp, 100.0_wp)]
+         real_field('penalty_ratio', options%penalty_ratio, '', &
+         'stiffness of the penalty over that of the elements above it, per area', '[0.01, 100]')]
    end function get_contact_fields
 
    !> The contact of a ball.

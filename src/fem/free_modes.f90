@@ -8,9 +8,9 @@ module thud_free_modes
    use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_legendre, only: get_legendre
-   use thud_mesh, only: mesh_options_type, mesh_type, new_mesh
+   use thud_mesh, only: get_mesh_fields, mesh_options_type, mesh_type, new_mesh
    use thud_mode_matrices, only: apply_inverse, apply_mass, mode_matrices_type, new_mode_matrices
-   use thud_new_field, only: integer_field
+   use thud_new_field, only: in_group, integer_field
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -33,6 +33,8 @@ module thud_free_modes
    type :: modes_options_type
       !> Number of elastic modes; 0 where none are asked for.
       integer :: count = 6
+      !> Numbers of elements.
+      type(mesh_options_type) :: mesh
    end type modes_options_type
 
    !> The elastic modes in ascending order; the rigid motion is told apart.
@@ -55,27 +57,26 @@ module thud_free_modes
 
 contains
 
-   !> Keys and allowed ranges of the group `&modes`.
+   !> Keys and allowed ranges of the groups `&modes` and `&mesh`.
    function get_modes_fields(options) result(fields)
       !> The options that the fields read and set.
       type(modes_options_type), intent(in), target :: options
-      !> One field per component: [1].
-      type(field_type) :: fields(1)
+      !> One field per component: [3].
+      type(field_type), allocatable :: fields(:)
 
-      fields = [integer_field('modes', 'count', options%count, 'number of elastic free modes', 1, 100)]
+      fields = [in_group('modes', [integer_field('count', options%count, 'number of elastic free modes', '[1, 100]')]), &
+         in_group('mesh', get_mesh_fields(options%mesh))]
    end function get_modes_fields
 
-   !> Complains about more modes than the mesh can tell.
-   subroutine check_modes(options, mesh_options, error)
-      !> Number of modes.
+   !> Refuses more modes than the mesh resolves.
+   subroutine check_modes(options, error)
+      !> Number of modes, and the mesh.
       type(modes_options_type), intent(in) :: options
-      !> Numbers of elements.
-      type(mesh_options_type), intent(in) :: mesh_options
       !> Names the count and the most that is allowed.
       type(error_type), allocatable, intent(out) :: error
       integer :: most
 
-      most = mesh_options%polar_elements*mesh_options%radial_elements/4
+      most = options%mesh%polar_elements*options%mesh%radial_elements/4
       if (options%count > most) error = input_error('&modes: count = '//to_text(options%count) &
          //' is not allowed with so few elements; allowed: 1 to '//to_text(most)//', a quarter of their number')
    end subroutine check_modes

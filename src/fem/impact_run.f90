@@ -4,7 +4,7 @@ module thud_impact_run
    use thud_ball, only: ball_type
    use thud_constants, only: pi
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
-   use thud_finite_element_options, only: finite_element_type
+   use thud_finite_element_options, only: finite_element_options_type
    use thud_floor_contact, only: floor_contact_type, get_penalty_forces, new_floor_contact, stop_at_floor
    use thud_kinds, only: wp
    use thud_material, only: material_type
@@ -69,7 +69,7 @@ contains
       !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh and contact.
-      type(finite_element_type), intent(in) :: options
+      class(finite_element_options_type), intent(in) :: options
       !> The material.
       type(material_type), intent(in) :: material
       !> Gravity, m/s2.

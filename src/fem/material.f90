@@ -64,25 +64,24 @@ contains
       type(material_options_type), intent(in), target :: options
       !> One field per component: [8].
       type(field_type), allocatable :: fields(:)
-      character(len=*), parameter :: group = 'material'
 
       fields = [ &
-         choice_field(group, 'law', options%law, 'law of elasticity', &
+         choice_field('law', options%law, 'law of elasticity', &
          [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
-         real_field(group, 'mooney_share', options%mooney_share, '', &
-         'part of the shear modulus with the second invariant, of mooney_rivlin', 0.0_wp, 1.0_wp), &
-         real_field(group, 'bulk_ratio', options%bulk_ratio, '', &
-         "most bulk modulus over shear modulus; less where Poisson's ratio says so", 2.0_wp, 1.0e5_wp), &
-         choice_field(group, 'viscosity', options%viscosity, 'law of viscosity', &
+         real_field('mooney_share', options%mooney_share, '', &
+         'part of the shear modulus with the second invariant, of mooney_rivlin', '[0, 1]'), &
+         real_field('bulk_ratio', options%bulk_ratio, '', &
+         "most bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
+         choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'constant_loss', 'prony']), &
-         real_field(group, 'loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt; ' &
-         //'over 10 to 1000 Hz, of constant_loss', 0.0_wp, 1.0_wp, lower_open=.true.), &
-         real_field(group, 'loss_frequency', options%loss_frequency, 'Hz', &
-         "where the ball's modulus is the storage modulus", 1.0_wp, 1.0e4_wp), &
-         list_field(group, 'prony_share', options%prony_share, '', 'moduli over the long-term modulus, of prony', &
-         0.0_wp, 1.0e3_wp), &
-         list_field(group, 'prony_time', options%prony_time, 's', 'relaxation times, of prony', &
-         0.0_wp, 1.0e3_wp, lower_open=.true.)]
+         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt; ' &
+         //'over 10 to 1000 Hz, of constant_loss', '(0, 1]'), &
+         real_field('loss_frequency', options%loss_frequency, 'Hz', &
+         "where the ball's modulus is the storage modulus", '[1, 10000]'), &
+         list_field('prony_share', options%prony_share, '', 'moduli over the long-term modulus, of prony', &
+         '[0, 1000]'), &
+         list_field('prony_time', options%prony_time, 's', 'relaxation times, of prony', &
+         '(0, 1000]')]
    end function get_material_fields
 
    !> Complains about options that do not fit each other, and about balls that the model cannot take.

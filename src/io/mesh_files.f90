@@ -55,18 +55,16 @@ contains
    end function get_frame_name
 
    !> Bytes that the files of the snapshots will take, about.
-   pure function estimate_motion_bytes(n_polar, n_radial, n_frame) result(bytes)
-      !> Elements from pole to pole.
-      integer, intent(in) :: n_polar
-      !> Elements through the wall.
-      integer, intent(in) :: n_radial
-      !> Snapshots.
-      integer, intent(in) :: n_frame
+   pure function estimate_motion_bytes(extents) result(bytes)
+      !> Nodes from pole to pole, nodes through the wall, snapshots.
+      integer, intent(in) :: extents(3)
       !> The bytes.
       real(wp) :: bytes
 
       ! Three vectors and two scalars a node; four corners, an offset and a type an element; in base 64.
-      bytes = real(n_frame, wp)*(2000 + 4*(88*real((n_polar + 1)*(n_radial + 1), wp) + 41*real(n_polar*n_radial, wp))/3)
+      associate (n => real(extents, wp))
+         bytes = n(3)*(2000 + 4*(88*n(1)*n(2) + 41*(n(1) - 1)*(n(2) - 1))/3)
+      end associate
    end function estimate_motion_bytes
 
    !> Snapshots, their list, and the pressures on the floor.

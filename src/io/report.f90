@@ -1,16 +1,17 @@
 !> Results as text: the files of a run.
 module thud_report
-   use thud_band, only: band_type
+   use thud_band, only: octave_count
    use thud_case, only: case_type
+   use thud_compute, only: get_judged_force, is_conforming, verdict_type
    use thud_constants, only: version
-   use thud_force_history, only: force_history_type
+   use thud_force_history, only: force_count, force_history_type, force_names, get_scalars, scalar_fields
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: get_channels_csv, get_force_csv, get_levels_csv, get_summary, verdict
+   public :: get_channels_csv, get_force_csv, get_levels_csv, get_summary, get_word
 
    !> Format of a row of numbers: every bit of them, 25 characters each with its comma.
    character(len=*), parameter :: csv_form = '(*(es24.16e3,:,","))'
@@ -80,34 +81,34 @@ contains
    end function get_channels_csv
 
    !> Levels, limits and verdict per band.
-   function get_levels_csv(bands, elastic_level, floor_level, criteria, judged_level) result(text)
-      !> The bands: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> Levels of the elastic force, dB: [n_band].
-      real(wp), intent(in) :: elastic_level(:)
-      !> Levels of the force on the floor, dB: [n_band].
-      real(wp), intent(in) :: floor_level(:)
-      !> Criteria of the octaves, which are the first five: [n_criterion].
-      type(criterion_type), intent(in) :: criteria(:)
-      !> Force that the verdict is on.
-      character(len=*), intent(in) :: judged_level
+   function get_levels_csv(case, verdict) result(text)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its levels and criteria.
+      type(verdict_type), intent(in) :: verdict
       !> Text of `levels.csv`.
       character(len=:), allocatable :: text
-      logical :: octave
       integer :: i, j
 
-      text = 'bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,elastic_level_dB,floor_level_dB,' &
-         //'lower_limit_dB,upper_limit_dB,verdict_'//judged_level//newline
-      do i = 1, size(bands)
-         octave = bands(i)%upper > 1.5_wp*bands(i)%lower
-         text = text//trim(merge('octave', 'third ', octave))
-         associate (numbers => [bands(i)%nominal, bands(i)%lower, bands(i)%upper, elastic_level(i), floor_level(i)])
-            do j = 1, size(numbers)
-               text = text//','//to_text(numbers(j))
-            end do
+      text = 'bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz'
+      do j = 1, force_count
+         text = text//','//trim(force_names(j))//'_level_dB'
+      end do
+      text = text//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force)//newline
+      ! The octaves serve the verdict also where only others are asked for.
+      do i = verdict%first_band, size(verdict%bands)
+         associate (band => verdict%bands(i))
+            text = text//trim(band%set)
+            associate (numbers => [band%nominal, band%lower, band%upper, verdict%level(i, :)])
+               do j = 1, size(numbers)
+                  text = text//','//to_text(numbers(j))
+               end do
+            end associate
          end associate
-         if (octave) then
-            text = text//','//to_text(criteria(i)%lower)//','//to_text(criteria(i)%upper)//','//verdict(criteria(i))
+         if (i <= octave_count) then
+            associate (criterion => verdict%criteria(i, get_judged_force(case)))
+               text = text//','//to_text(criterion%lower)//','//to_text(criterion%upper)//','//get_word(criterion)
+            end associate
          else
             text = text//',,,no limit'
          end if
@@ -116,42 +117,37 @@ contains
    end function get_levels_csv
 
    !> The scalars of a run as a namelist file.
-   function get_summary(case, history, criteria) result(text)
+   function get_summary(case, history, verdict) result(text)
       !> The case.
       type(case_type), intent(in) :: case
       !> Its force history.
       type(force_history_type), intent(in) :: history
-      !> The criteria: [n_criterion].
-      type(criterion_type), intent(in) :: criteria(:)
+      !> Its levels and criteria.
+      type(verdict_type), intent(in) :: verdict
       !> Text of `summary.nml`.
       character(len=:), allocatable :: text
+      real(wp) :: scalars(size(scalar_fields))
+      integer :: i
 
+      scalars = get_scalars(history)
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
-         //newline//'&summary'//newline &
-         //line('case', quoted(case%name), '') &
-         //line('model', quoted(case%model), '') &
-         //line('contact_time', to_text(history%contact_time), 's') &
-         //line('peak_force', to_text(history%peak_force), 'N, of the elastic force') &
-         //line('peak_floor_force', to_text(history%peak_floor_force), 'N') &
-         //line('max_deflection', to_text(history%max_deflection), 'm') &
-         //line('impact_velocity', to_text(history%impact_velocity), 'm/s') &
-         //line('restitution', to_text(history%restitution), '') &
-         //line('impulse', to_text(history%impulse), 'N s, of the floor force') &
-         //'/'//newline//newline//fact_group(history)//'&checks'//newline &
-         //line('impulse_residual', to_text(history%impulse_residual), 'of the change of momentum') &
-         //line('energy_residual', to_text(history%energy_residual), 'of the energy at first touch') &
-         //'/'//newline//newline//'&verdict'//newline &
+         //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '')
+      do i = 1, size(scalars)
+         text = text//line(trim(scalar_fields(i)%name), to_text(scalars(i)), trim(scalar_fields(i)%unit))
+      end do
+      text = text//'/'//newline//newline//fact_group(history)//'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
-         //line('conforms', to_text(all(conforms(criteria))), '') &
-         //line('criterion', join_quoted(criteria%name), '') &
-         //line('unit', join_quoted(criteria%unit), '') &
-         //line('value', joined(criteria%value), '') &
-         //line('lower', joined(criteria%lower), '') &
-         //line('upper', joined(criteria%upper), '') &
-         //line('met', joined_logicals(conforms(criteria)), '') &
-         //'/'//newline
+         //line('conforms', to_text(is_conforming(case, verdict)), '')
+      associate (criteria => verdict%criteria(:, get_judged_force(case)))
+         text = text//line('criterion', join_quoted(criteria%name), '') &
+            //line('unit', join_quoted(criteria%unit), '') &
+            //line('value', joined(criteria%value), '') &
+            //line('lower', joined(criteria%lower), '') &
+            //line('upper', joined(criteria%upper), '') &
+            //line('met', joined_logicals(conforms(criteria)), '')//'/'//newline
+      end associate
    end function get_summary
 
    !> Numbers that the model chose or found as a namelist group.
@@ -172,7 +168,7 @@ contains
    end function fact_group
 
    !> Where a value lies: `conforms`, `too low` or `too high`.
-   function verdict(criterion) result(word)
+   function get_word(criterion) result(word)
       !> The criterion.
       type(criterion_type), intent(in) :: criterion
       !> The verdict.
@@ -183,7 +179,7 @@ contains
       else
          word = trim(merge('too low ', 'too high', criterion%value < criterion%lower))
       end if
-   end function verdict
+   end function get_word
 
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)

@@ -1,146 +1,133 @@
-!> Results of many sets as rows of a table.
+!> Results of many drops as rows of a table.
 module thud_set_report
-   use thud_band, only: band_type
-   use thud_shell_sets, only: get_set_fields, parameter_count, set_outcome_type, set_type
-   use thud_ensemble, only: force_count, verdict_type
-   use thud_field, only: field_type
-   use thud_hollow_sphere, only: flux_choices
+   use thud_band, only: get_band_name
+   use thud_force_history, only: force_count, force_names, outcome_count, scalar_fields
    use thud_kinds, only: wp
-   use thud_set_status, only: get_status_text, set_is_fine, set_range, status_length
+   use thud_many, only: many_type
    use thud_set_table, only: set_table_type
-   use thud_text, only: fixed, newline, to_text
+   use thud_text, only: newline, to_text
    implicit none (type, external)
    private
 
-   public :: get_band_name, get_set_header, get_set_reason, get_set_rows
-
-   !> Columns behind the parameters.
-   character(len=*), parameter :: outcome_names = 'contact_time_s,peak_force_N,peak_floor_force_N,max_deflection_m,' &
-      //'restitution,impulse_N_s'
-
-   !> Names of the forces.
-   character(len=7), parameter :: force_names(force_count) = [character(len=7) :: 'elastic', 'floor']
+   public :: get_set_header, get_set_rows
 
 contains
 
    !> First line of the results.
-   subroutine get_set_header(table, bands, text)
+   subroutine get_set_header(table, many, text)
       !> The table.
       type(set_table_type), intent(in) :: table
-      !> Bands of the levels: [n_band].
-      type(band_type), intent(in) :: bands(:)
+      !> The results, whose bands are known.
+      type(many_type), intent(in) :: many
       !> The line.
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
       text = 'set'
-      do i = 1, size(table%columns)
-         text = text//','//trim(table%keys(table%columns(i)))
+      do i = 1, size(table%names)
+         text = text//','//trim(table%names(i))
       end do
-      text = text//','//outcome_names
+      do i = 1, outcome_count
+         text = text//','//trim(scalar_fields(i)%name)
+         if (scalar_fields(i)%unit /= '') text = text//'_'//underscored(trim(scalar_fields(i)%unit))
+      end do
       do j = 1, force_count
-         do i = 1, size(bands)
-            text = text//','//trim(force_names(j)) &
-               //trim(merge('_octave_', '_third_ ', bands(i)%upper > 1.5_wp*bands(i)%lower)) &
-               //get_band_name(bands(i))//'_Hz_dB'
+         do i = many%first_band, size(many%bands)
+            text = text//','//trim(force_names(j))//'_'//trim(many%bands(i)%set)//'_'//get_band_name(many%bands(i))//'_Hz_dB'
          end do
       end do
       do j = 1, force_count
          text = text//','//trim(force_names(j))//'_conforms'
       end do
-      text = text//',status'//newline
+      text = text//',status,reason'//newline
    end subroutine get_set_header
 
    !> Lines of the results, 17 digits; what could not be computed is left out.
-   subroutine get_set_rows(table, before, sets, outcomes, levels, verdicts, text)
+   subroutine get_set_rows(table, before, values, first, last, many, text)
       !> The table.
       type(set_table_type), intent(in) :: table
-      !> Number of sets before these.
+      !> Number of drops before the first of `values`.
       integer, intent(in) :: before
-      !> The sets: [n_set].
-      type(set_type), intent(in), target :: sets(:)
-      !> Their outcomes: [n_set].
-      type(set_outcome_type), intent(in) :: outcomes(:)
-      !> Their levels, dB: [n_band, force_count, n_set].
-      real(wp), intent(in) :: levels(:, :, :)
-      !> Their verdicts: [n_set].
-      type(verdict_type), intent(in) :: verdicts(:)
+      !> The drops: [n_column, n_drop].
+      real(wp), intent(in) :: values(:, :)
+      !> The first of them to be written.
+      integer, intent(in) :: first
+      !> The last of them to be written.
+      integer, intent(in) :: last
+      !> Their results.
+      type(many_type), intent(in) :: many
       !> The lines.
       character(len=:), allocatable, intent(out) :: text
-      !> Room for a number with its comma, and for all that is none.
-      integer, parameter :: number_width = 26, rest_width = 192
+      !> Width of a number with its comma, and of all that is none.
+      integer, parameter :: number_width = 26, rest_width = 1024
       character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
-      character(len=number_width*(size(table%columns) + 6 + size(levels, 1)*force_count) + rest_width) :: row
-      type(set_type), target :: set
-      type(field_type) :: fields(parameter_count)
+      character(len=number_width*(size(table%names) + outcome_count + size(many%level(:, :, 1))) + rest_width) :: row
       integer :: i, j, at, end_of_text
 
-      fields = get_set_fields(set)
-      allocate (character(len=len(row)*size(sets)) :: text)
+      allocate (character(len=(len(row) - rest_width + 64)*max(0, last - first + 1)) :: text)
       end_of_text = 0
-      do i = 1, size(sets)
-         set = sets(i)
+      do i = first, last
          row = to_text(before + i)
-         do j = 1, size(table%columns)
+         do j = 1, size(table%names)
             at = len_trim(row) + 1
-            if (table%columns(j) <= parameter_count) then
-               write (row(at:), numbers_form) fields(table%columns(j))%real_value
-            else
-               row(at:) = ','//flux_choices(set%flux)
-            end if
+            associate (field => table%fields(j))
+               if (field%n_choice > 0) then
+                  row(at:) = ','//field%choices(nint(values(j, i)))
+               else
+                  write (row(at:), numbers_form) values(j, i)
+               end if
+            end associate
          end do
          at = len_trim(row) + 1
-         if (outcomes(i)%status == set_is_fine) then
-            associate (found => outcomes(i))
-               write (row(at:), numbers_form) found%contact_time, found%peak_force, found%peak_floor_force, &
-                  found%max_deflection, found%restitution, found%impulse, levels(:, :, i)
-            end associate
-            row(len_trim(row) + 1:) = ','//get_word(verdicts(i)%conforms(1))//','//get_word(verdicts(i)%conforms(2))
+         if (many%status(i) == 0) then
+            write (row(at:), numbers_form) many%outcome(:, i), many%level(many%first_band:, :, i)
+            do j = 1, force_count
+               row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%conforms(j, i)))
+            end do
+            row(len_trim(row) + 1:) = ',0,'//newline
          else
-            row(at:) = repeat(',', 6 + size(levels, 1)*force_count + force_count)
+            row(at:) = repeat(',', outcome_count + size(many%level(many%first_band:, :, i)) + force_count + 1) &
+               //to_text(many%status(i))//','//trim(in_quotes(many%reason(i)%text))//newline
          end if
-         row(len_trim(row) + 1:) = ','//trim(get_set_reason(outcomes(i)%status))//newline
          at = index(row, newline)
+         if (end_of_text + at > len(text)) text = text//repeat(' ', len(text) + len(row))
          text(end_of_text + 1:end_of_text + at) = row(:at)
          end_of_text = end_of_text + at
       end do
       text = text(:end_of_text)
    end subroutine get_set_rows
 
-   !> What a status means.
-   function get_set_reason(status) result(text)
-      !> The status of a set.
-      integer, intent(in) :: status
-      !> Its meaning, with the key of the parameter that it is about.
-      character(len=status_length) :: text
-      type(set_type), target :: set
-      type(field_type) :: fields(parameter_count)
+   !> A unit as part of a name.
+   pure function underscored(unit) result(name)
+      !> The unit.
+      character(len=*), intent(in) :: unit
+      !> It without blanks.
+      character(len=len(unit)) :: name
+      integer :: i
 
-      ! Descriptions of keys take longer than most rows.
-      text = get_status_text(status, '')
-      if (status <= set_range) return
-      fields = get_set_fields(set)
-      text = get_status_text(status, fields(max(1, min(parameter_count, status - set_range)))%key)
-   end function get_set_reason
+      name = unit
+      do i = 1, len(unit)
+         if (unit(i:i) == ' ') name(i:i) = '_'
+      end do
+   end function underscored
 
-   !> Nominal frequency of a band: 31.5, 63.
-   pure function get_band_name(band) result(name)
-      !> The band.
-      type(band_type), intent(in) :: band
-      !> Its name.
-      character(len=len(fixed(band%nominal, merge(1, 0, band%nominal < 32)))) :: name
+   !> A sentence as a cell.
+   pure function in_quotes(sentence) result(cell)
+      !> The sentence.
+      character(len=*), intent(in) :: sentence
+      !> It in quotes, as far as there is space; quotes inside are doubled.
+      character(len=2*len(sentence) + 2) :: cell
+      integer :: i, at
 
-      name = fixed(band%nominal, merge(1, 0, band%nominal < 32))
-   end function get_band_name
-
-   !> A verdict in a table.
-   pure function get_word(conforms) result(word)
-      !> The verdict.
-      logical, intent(in) :: conforms
-      !> Yes or no.
-      character(len=merge(3, 2, conforms)) :: word
-
-      word = merge('yes', 'no ', conforms)
-   end function get_word
+      cell = '"'
+      at = 1
+      do i = 1, len(sentence)
+         at = at + 1
+         cell(at:at) = sentence(i:i)
+         if (sentence(i:i) == '"') at = at + 1
+         if (sentence(i:i) == '"') cell(at:at) = '"'
+      end do
+      cell(at + 1:) = '"'
+   end function in_quotes
 
 end module thud_set_report

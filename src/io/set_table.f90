@@ -1,14 +1,15 @@
-!> Tables of parameter sets: comma-separated text with the keys in its first line and one set in each of the
-!> others. Empty lines and lines that begin with `#` are skipped.
+!> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
+!> commas or blanks stand between the values, decimal commas beside tabs and semicolons; empty lines and what
+!> follows a `#` are skipped.
 module thud_set_table
-   use thud_shell_sets, only: get_set_fields, parameter_count, set_type
+   use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type
-   use thud_hollow_sphere, only: flux_choices
+   use thud_field, only: field_type, key_length
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
+   use thud_many, only: column_type, find_columns
    use thud_posix, only: directory_exists
-   use thud_text, only: join_quoted, quoted, to_text
+   use thud_text, only: join_quoted, lower_case, quoted, to_text
    implicit none (type, external)
    private
 
@@ -17,8 +18,11 @@ module thud_set_table
    !> Longest path of a file.
    integer, parameter :: path_length = 4096
 
-   !> Number of the column that chooses the flux term, behind those of the numbers.
-   integer, parameter :: flux_column = parameter_count + 1
+   !> Most columns.
+   integer, parameter :: max_columns = 256
+
+   !> Length of a name or value.
+   integer, parameter :: cell_length = 64
 
    !> An open table.
    type :: set_table_type
@@ -26,33 +30,31 @@ module thud_set_table
       character(len=path_length) :: path = ''
       !> Its lines.
       type(line_reader_type) :: reader
-      !> Keys of all columns that there may be.
-      character(len=24) :: keys(flux_column) = ''
-      !> For each column of the file its place among the keys: [n_column].
-      integer, allocatable :: columns(:)
+      !> The keys of its columns: [n_column].
+      type(column_type), allocatable :: columns(:)
+      !> Their names: [n_column].
+      character(len=cell_length), allocatable :: names(:)
+      !> What they are; pointers into the case: [n_column].
+      type(field_type), allocatable :: fields(:)
    end type set_table_type
 
 contains
 
    !> Opens a table and reads its first line.
-   subroutine open_set_table(path, table, error)
+   subroutine open_set_table(path, case, table, error)
       !> Path of the file.
       character(len=*), intent(in) :: path
+      !> The case, which has the keys.
+      type(case_type), intent(in), target :: case
       !> The table.
       type(set_table_type), intent(out) :: table
       !> The file cannot be read, or a key is not known or given twice.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
-      character(len=:), allocatable :: key
-      type(set_type), target :: set
-      type(field_type) :: fields(parameter_count)
-      integer :: at, place
+      type(field_type), allocatable :: fields(:)
       logical :: done, there
 
       table%path = path
-      fields = get_set_fields(set)
-      table%keys = [fields%key, 'momentum_flux           ']
-      allocate (table%columns(0))
       if (directory_exists(path)) then
          error = input_error(path//': this is a directory; allowed: a table of sets')
          return
@@ -65,60 +67,50 @@ contains
       call next_line(table, line, there, error)
       if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
          //'first line and one set in each of the others')
-      at = 1
-      do while (.not. allocated(error) .and. at <= len_trim(line) + 1)
-         key = trim(adjustl(line(at:get_end(line, at))))
-         place = findloc(table%keys == key, .true., dim=1)
-         if (place == 0) then
-            error = line_error(table, quoted(key)//' is not a known key; allowed: '//join_quoted(table%keys))
-         else if (any(table%columns == place)) then
-            error = line_error(table, quoted(key)//' is given twice; allowed: once')
-         else
-            table%columns = [table%columns, place]
-         end if
-         at = get_end(line, at) + 2
-      end do
-      if (allocated(error)) call close_lines(table%reader)
+      if (.not. allocated(error)) then
+         call split_line(line, table%names)
+         call find_columns(case, table%names, table%columns, error)
+         if (allocated(error)) error = line_error(table, error%message)
+      end if
+      if (.not. allocated(error)) then
+         allocate (fields, source=get_active_fields(case))
+         table%fields = fields(table%columns%place)
+      else
+         call close_lines(table%reader)
+      end if
    end subroutine open_set_table
 
-   !> The next sets.
-   subroutine read_sets(table, base, sets, n_set, error)
+   !> The next drops.
+   subroutine read_sets(table, values, n_set, error)
       !> The table.
       type(set_table_type), intent(inout) :: table
-      !> What a set has where the table has no column for it.
-      type(set_type), intent(in) :: base
-      !> Room for the sets: [n_room].
-      type(set_type), intent(inout) :: sets(:)
-      !> Number of sets that were read; fewer than there is room for at the end of the table.
+      !> Their values: [n_column, n_room].
+      real(wp), intent(out) :: values(:, :)
+      !> Number of drops that were read; fewer than fit at the end of the table.
       integer, intent(out) :: n_set
       !> A line has the wrong number of values, or a value is none.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
-      type(set_type), target :: set
-      type(field_type) :: fields(parameter_count)
-      integer :: at, i
+      character(len=cell_length), allocatable :: cells(:)
+      integer :: i
       logical :: there
 
-      fields = get_set_fields(set)
       n_set = 0
-      do while (n_set < size(sets))
+      do while (n_set < size(values, 2))
          call next_line(table, line, there, error)
          if (allocated(error) .or. .not. there) return
-         set = base
-         at = 1
-         do i = 1, size(table%columns)
-            if (at > len_trim(line) + 1) exit
-            call read_value(table, table%columns(i), trim(line(at:get_end(line, at))), fields, set%flux, error)
-            if (allocated(error)) return
-            at = get_end(line, at) + 2
-         end do
-         if (i <= size(table%columns) .or. at <= len_trim(line) + 1) then
-            error = line_error(table, 'the number of values is another than that of the keys; allowed: ' &
-               //to_text(size(table%columns))//' values with commas between')
+         call split_line(line, cells)
+         if (size(cells) /= size(table%names)) then
+            error = line_error(table, 'it has '//to_text(size(cells))//' values and the first line ' &
+               //to_text(size(table%names))//' keys; allowed: one value for each key, with commas, semicolons, tabs or ' &
+               //'blanks between')
             return
          end if
          n_set = n_set + 1
-         sets(n_set) = set
+         do i = 1, size(cells)
+            call read_value(table, i, trim(cells(i)), values(i, n_set), error)
+            if (allocated(error)) return
+         end do
       end do
    end subroutine read_sets
 
@@ -126,62 +118,102 @@ contains
    subroutine next_line(table, line, there, error)
       !> The table; closed at its end.
       type(set_table_type), intent(inout) :: table
-      !> The line.
+      !> The line, without comment.
       character(len=line_length), intent(out) :: line
       !> There was one.
       logical, intent(out) :: there
       !> The line is too long or cannot be read.
       type(error_type), allocatable, intent(out) :: error
-      integer :: length
+      integer :: length, mark
 
       there = .false.
       do while (.not. there)
          call read_line(table%reader, line, length)
          if (length == -1) exit
          if (length < 0) error = input_error(trim(table%path)//': the file cannot be read; allowed: a table of sets')
-         if (length > line_length .and. line(1:1) /= '#') error = line_error(table, 'it is too long; allowed: up to ' &
+         mark = index(line, '#')
+         if (mark > 0) line(mark:) = ''
+         if (length > line_length .and. mark == 0) error = line_error(table, 'it is too long; allowed: up to ' &
             //to_text(line_length)//' characters')
          if (allocated(error)) exit
-         there = line /= '' .and. line(1:1) /= '#'
+         there = line /= ''
       end do
       if (.not. there) call close_lines(table%reader)
    end subroutine next_line
 
-   !> One value of a set.
-   subroutine read_value(table, column, text, fields, flux, error)
+   !> Cells of a line: the first of tab, semicolon and comma that it holds stands between them, else blanks do.
+   pure subroutine split_line(line, cells)
+      !> The line.
+      character(len=*), intent(in) :: line
+      !> The cells, without blanks and quotes around them: [n_cell].
+      character(len=cell_length), allocatable, intent(out) :: cells(:)
+      character(len=1), parameter :: tab = achar(9)
+      character(len=len(line)) :: rest
+      character(len=1) :: separator
+      integer :: i, n, at, length, last, place
+
+      separator = ' '
+      if (index(line, ',') > 0) separator = ','
+      if (index(line, ';') > 0) separator = ';'
+      if (index(line, tab) > 0) separator = tab
+      rest = adjustl(line)
+      last = len_trim(rest)
+      ! Spreadsheets may end lines with their separator.
+      if (separator == ';') last = verify(rest(:last), '; ', back=.true.)
+      allocate (cells(max_columns))
+      n = 0
+      at = 1
+      do while (at <= last + merge(1, 0, separator /= ' ') .and. n < max_columns)
+         length = index(rest(at:last)//separator, separator) - 1
+         n = n + 1
+         cells(n) = adjustl(rest(at:at + length - 1))
+         at = at + length + 1
+         if (separator == ' ') at = at + max(0, verify(rest(at:)//'x', ' ') - 1)
+      end do
+      cells = cells(:n)
+      do i = 1, n
+         length = len_trim(cells(i))
+         if (length > 1 .and. scan(cells(i)(1:1), '''"') == 1) cells(i) = cells(i)(2:length - 1)
+         place = index(cells(i), ',')
+         if (place > 0) cells(i)(place:place) = '.'
+      end do
+   end subroutine split_line
+
+   !> One value of a drop.
+   subroutine read_value(table, column, word, value, error)
       !> The table.
       type(set_table_type), intent(in) :: table
-      !> Place of its key.
+      !> Number of its column.
       integer, intent(in) :: column
       !> The value as it stands in the table.
-      character(len=*), intent(in) :: text
-      !> Numbers of the set, one of which is set: [parameter_count].
-      type(field_type), intent(in) :: fields(:)
-      !> Number of the choice of the flux term, which may be set.
-      integer, intent(inout) :: flux
+      character(len=*), intent(in) :: word
+      !> The value; of a choice its number, of a flag 0 or 1.
+      real(wp), intent(out) :: value
       !> The value is none.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: word
+      character(len=:), allocatable :: wanted
       character(len=128) :: message
-      real(wp) :: number
       integer :: status
 
-      word = trim(adjustl(text))
-      if (column == flux_column) then
-         flux = findloc(flux_choices == word, .true., dim=1)
-         if (flux == 0) error = line_error(table, 'momentum_flux = '//quoted(word)//' is not allowed; allowed: ' &
-            //join_quoted(flux_choices))
-         return
-      end if
+      value = 0.0_wp
       status = 1
-      if (is_number(word)) read (word, *, iostat=status, iomsg=message) number
-      if (status == 0) status = merge(0, 1, abs(number) <= huge(number))
-      if (status == 0) then
-         fields(column)%real_value = number
-      else
-         error = line_error(table, trim(fields(column)%key)//' = '//quoted(word)//' is not a number; allowed: a ' &
-            //'number in SI units')
-      end if
+      associate (field => table%fields(column))
+         select case (field%get_kind())
+         case ('choice')
+            wanted = 'allowed; allowed: '//join_quoted(field%choices(:field%n_choice))
+            value = real(findloc(field%choices(:field%n_choice) == lower_case(word), .true., dim=1), wp)
+            status = merge(0, 1, value > 0.0_wp)
+         case ('flag')
+            wanted = 'allowed; allowed: true, false'
+            status = merge(0, 1, any(lower_case(word) == [character(len=7) :: 'true', 'false', '.true.', '.false.', '1', '0']))
+            if (any(lower_case(word) == [character(len=7) :: 'true', '.true.', '1'])) value = 1.0_wp
+         case default
+            wanted = 'a number; allowed: a number in SI units'
+            if (is_number(word)) read (word, *, iostat=status, iomsg=message) value
+            if (status == 0) status = merge(0, 1, abs(value) <= huge(value))
+         end select
+      end associate
+      if (status /= 0) error = line_error(table, trim(table%names(column))//' = '//quoted(word)//' is not '//wanted)
    end subroutine read_value
 
    !> Whether a text holds nothing but a number; to the reader other characters mean repeats and names, and signs
@@ -197,20 +229,6 @@ contains
       sign = scan(text, '+-', back=.true.)
       if (sign > 1) yes = yes .and. scan(text(sign - 1:sign - 1), 'eEdD') == 1
    end function is_number
-
-   !> Last character of the value that begins at a place of a line.
-   pure function get_end(line, at) result(last)
-      !> The line.
-      character(len=*), intent(in) :: line
-      !> The place.
-      integer, intent(in) :: at
-      !> The last character before the next comma or the end of the line.
-      integer :: last
-
-      last = len_trim(line)
-      if (at > last) return
-      if (index(line(at:last), ',') > 0) last = at + index(line(at:last), ',') - 2
-   end function get_end
 
    !> Error of a line.
    function line_error(table, message) result(error)

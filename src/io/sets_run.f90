@@ -1,31 +1,26 @@
-!> A run of many sets of the shell model from end to end: case and table in, one row of results per set out, a
-!> chunk at a time, so that the memory does not grow with the table.
+!> A run of many drops from end to end: case and table in, one row of results per drop out, a chunk at a time, so
+!> that the memory does not grow with the table.
 module thud_sets_run
-   use thud_band, only: band_type, get_octaves, get_thirds, octave_count
-   use thud_case, only: case_type, get_case_text
+   use thud_atomic_write, only: close_part, open_part, require_directory, write_part
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_case, only: case_type
+   use thud_case_text, only: get_case_text
+   use thud_compute, only: get_judged_force
    use thud_constants, only: version
-   use thud_shell_sets, only: set_outcome_type, set_type
-   use thud_ensemble, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
    use thud_error, only: error_type, input_error
    use thud_file, only: check_owner, text_file_type, write_files
-   use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
-   use thud_atomic_write, only: close_part, open_part, require_directory, write_part
+   use thud_many, only: many_type, new_many, solve_many
    use thud_posix, only: directory_exists, lock_directory, lock_type, remove_file, unlock_directory
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type
-   use thud_sampling, only: get_sample_count
-   use thud_set_report, only: get_band_name, get_set_header, get_set_reason, get_set_rows
-   use thud_set_status, only: set_is_fine
+   use thud_set_report, only: get_set_header, get_set_rows
    use thud_set_table, only: open_set_table, read_sets, set_table_type
-   use thud_text, only: fixed, newline, quoted, to_text
+   use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
    private
 
    public :: run_sets
-
-   !> Sets that are read, computed and written at a time.
-   integer, parameter :: chunk_size = 16384
 
    !> Files of the results.
    character(len=*), parameter :: result_file = 'sets.csv', input_file = 'sets.nml'
@@ -34,8 +29,8 @@ module thud_sets_run
    type :: tally_type
       !> Sets, those that were computed, and those that conform by the force of the case.
       integer :: sets = 0, computed = 0, conforming = 0
-      !> Status of the first that failed.
-      integer :: failure = set_is_fine
+      !> Why the first of those failed that did.
+      character(len=1024) :: failure = ''
       !> Smallest and largest contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
@@ -56,7 +51,7 @@ contains
       type(outcome_type), intent(out) :: outcome
       !> The run failed; nothing was written.
       type(error_type), allocatable, intent(out) :: error
-      type(case_type) :: case
+      type(case_type), target :: case
       type(set_table_type) :: table
       type(tally_type) :: tally
       type(lock_type) :: lock
@@ -64,12 +59,9 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call check_case(case, error)
-      if (allocated(error)) then
-         error%message = path//': '//error%message
-         return
-      end if
-      call open_set_table(table_path, table, error)
+      if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case with a source model')
+      if (allocated(error)) return
+      call open_set_table(table_path, case, table, error)
       if (allocated(error)) return
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
@@ -86,7 +78,7 @@ contains
       if (tally%computed < tally%sets) then
          if (outcome%remark /= '') outcome%remark = outcome%remark//'; '
          outcome%remark = outcome%remark//to_text(tally%sets - tally%computed)//' of '//to_text(tally%sets) &
-            //' sets have no results, such as: '//trim(get_set_reason(tally%failure))
+            //' sets have no results, such as: '//trim(tally%failure)
       end if
       if (outcome%remark /= '') outcome%remark = path//': '//outcome%remark
       outcome%conforms = tally%conforming == tally%sets
@@ -96,7 +88,7 @@ contains
    !> Computes all sets and writes both files, or none, into the locked directory.
    subroutine write_results(case, table, threads, outcome, tally, error)
       !> The case.
-      type(case_type), intent(in) :: case
+      type(case_type), intent(in), target :: case
       !> The table, open.
       type(set_table_type), intent(inout) :: table
       !> Number of threads.
@@ -111,7 +103,7 @@ contains
       logical :: differs
 
       input(1)%name = input_file
-      input(1)%content = get_case_text(case)
+      call get_case_text(case, input(1)%content)
       call check_owner(outcome%directory, [character(len=8) :: result_file, input_file], input_file, input(1)%content, &
          differs, error, locked=.true.)
       if (.not. allocated(error)) call write_sets(case, table, threads, outcome%directory, tally, error)
@@ -119,24 +111,10 @@ contains
       if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
    end subroutine write_results
 
-   !> Complains about cases whose sets cannot be computed together.
-   subroutine check_case(case, error)
-      !> The case.
-      type(case_type), intent(in) :: case
-      !> Names the key.
-      type(error_type), allocatable, intent(out) :: error
-
-      if (.not. case%has_impact .or. case%model /= 'hollow_sphere') then
-         error = input_error('&model: name = '//quoted(case%model)//" has no sets; allowed: 'hollow_sphere'")
-      else if (case%level_method /= 'exact') then
-         error = input_error('&levels: method = '//quoted(case%level_method)//" is not for sets; allowed: 'exact'")
-      end if
-   end subroutine check_case
-
    !> Computes and writes chunk after chunk.
    subroutine write_sets(case, table, threads, directory, tally, error)
       !> The case.
-      type(case_type), intent(in) :: case
+      type(case_type), intent(in), target :: case
       !> The table, open.
       type(set_table_type), intent(inout) :: table
       !> Number of threads.
@@ -147,46 +125,30 @@ contains
       type(tally_type), intent(inout) :: tally
       !> A value is none, the sampling cannot be used, or the file cannot be written.
       type(error_type), allocatable, intent(out) :: error
-      type(set_type) :: base
-      type(set_type), allocatable :: sets(:)
-      type(set_outcome_type), allocatable :: outcomes(:)
-      type(verdict_type), allocatable :: verdicts(:)
-      real(wp), allocatable :: levels(:, :, :), no_forces(:, :, :)
-      type(projections_type) :: projections
-      type(band_type), allocatable :: more(:)
+      type(many_type) :: many
       type(text_file_type) :: parts(threads)
+      real(wp), allocatable :: values(:, :)
       character(len=:), allocatable :: text
-      integer :: unit, n, first_band, first, last, i
+      integer :: unit, n, i
 
-      base = set_type(case%ball, case%drop, &
-         findloc(flux_choices == case%options%hollow_sphere%momentum_flux, .true., dim=1))
-      allocate (more(0))
-      if (case%bands /= 'octave') more = get_thirds()
-      ! The octaves come first and serve the verdict also where only thirds are asked for.
-      first_band = merge(octave_count, 0, case%bands == 'third') + 1
-      projections = new_projections(case%sampling%sample_rate, more, get_sample_count(case%sampling))
-      allocate (sets(chunk_size), outcomes(chunk_size), verdicts(chunk_size), no_forces(0, 0, 0))
-      allocate (levels(octave_count + size(more), force_count, chunk_size))
+      call new_many(case, .true., many)
+      allocate (values(size(table%columns), get_chunk_size(many%cost, threads)))
       call open_part(directory, result_file, unit, error)
       if (allocated(error)) return
-      call get_set_header(table, projections%bands(first_band:), text)
+      call get_set_header(table, many, text)
       call write_part(directory, result_file, unit, text, error)
       do while (.not. allocated(error))
-         call read_sets(table, base, sets, n, error)
+         call read_sets(table, values, n, error)
          if (allocated(error) .or. n == 0) exit
-         call solve_ensemble(sets(:n), case%sampling, trim(case%source), threads, .true., projections, outcomes(:n), &
-            levels(:, :, :n), verdicts(:n), no_forces, error)
+         call solve_many(case, table%columns, values(:, :n), threads, .false., many, error)
          if (allocated(error)) exit
-         call add(tally, outcomes(:n), levels(:, :, :n), verdicts(:n), merge(1, 2, case%level_force == 'elastic'))
          ! To write numbers takes longer than to compute them.
-         !$omp parallel do num_threads(threads) private(first, last)
+         !$omp parallel do num_threads(threads)
          do i = 1, threads
-            first = (i - 1)*n/threads + 1
-            last = i*n/threads
-            call get_set_rows(table, tally%sets - n + first - 1, sets(first:last), outcomes(first:last), &
-               levels(first_band:, :, first:last), verdicts(first:last), parts(i)%content)
+            call get_set_rows(table, tally%sets, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, many, parts(i)%content)
          end do
          !$omp end parallel do
+         call add(tally, many, get_judged_force(case))
          do i = 1, threads
             if (.not. allocated(error)) call write_part(directory, result_file, unit, parts(i)%content, error)
          end do
@@ -197,28 +159,38 @@ contains
       call close_part(directory, result_file, unit, error)
    end subroutine write_sets
 
+   !> Sets that are read, computed and written at a time: about half a second of work for each thread.
+   pure function get_chunk_size(cost, threads) result(chunk_size)
+      !> Time that one takes, s.
+      real(wp), intent(in) :: cost
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Number of sets.
+      integer :: chunk_size
+
+      chunk_size = threads*max(1, min(16384/threads, nint(0.5_wp/cost)))
+   end function get_chunk_size
+
    !> Adds sets to a tally.
-   pure subroutine add(tally, outcomes, levels, verdicts, force)
+   pure subroutine add(tally, many, force)
       !> The tally.
       type(tally_type), intent(inout) :: tally
-      !> Outcomes of the sets: [n_set].
-      type(set_outcome_type), intent(in) :: outcomes(:)
-      !> Levels, dB, octaves first: [n_band, force_count, n_set].
-      real(wp), intent(in) :: levels(:, :, :)
-      !> The verdicts: [n_set].
-      type(verdict_type), intent(in) :: verdicts(:)
+      !> The results.
+      type(many_type), intent(in) :: many
       !> Number of the force that the verdict is on.
       integer, intent(in) :: force
       real(wp) :: values(octave_count + 1)
       integer :: i
 
-      tally%sets = tally%sets + size(outcomes)
-      do i = 1, size(outcomes)
-         if (tally%failure == set_is_fine) tally%failure = outcomes(i)%status
-         if (outcomes(i)%status /= set_is_fine) cycle
+      tally%sets = tally%sets + size(many%status)
+      do i = 1, size(many%status)
+         if (many%status(i) /= 0) then
+            if (tally%failure == '') tally%failure = many%reason(i)%text
+            cycle
+         end if
          tally%computed = tally%computed + 1
-         if (verdicts(i)%conforms(force)) tally%conforming = tally%conforming + 1
-         values = [outcomes(i)%contact_time, levels(:octave_count, force, i)]
+         if (many%conforms(force, i)) tally%conforming = tally%conforming + 1
+         values = [many%outcome(1, i), many%level(:octave_count, force, i)]
          tally%span(:, 1) = min(tally%span(:, 1), values)
          tally%span(:, 2) = max(tally%span(:, 2), values)
       end do

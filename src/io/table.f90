@@ -1,11 +1,12 @@
 !> Results as tables on the screen.
 module thud_table
-   use thud_band, only: octave_count
+   use thud_band, only: get_band_name, octave_count
    use thud_case, only: case_type
+   use thud_compute, only: get_judged_force, verdict_type
    use thud_force_history, only: force_history_type
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
-   use thud_report, only: verdict
+   use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
@@ -16,42 +17,39 @@ module thud_table
 contains
 
    !> The table that a run shows on the screen.
-   function get_table(case, history, elastic_level, floor_level, criteria) result(text)
+   function get_table(case, history, verdict) result(text)
       !> The case.
       type(case_type), intent(in) :: case
       !> Its force history.
       type(force_history_type), intent(in) :: history
-      !> Levels of the elastic force, the octaves first, dB: [n_band].
-      real(wp), intent(in) :: elastic_level(:)
-      !> Levels of the force on the floor, dB: [n_band].
-      real(wp), intent(in) :: floor_level(:)
-      !> The criteria, the octaves first: [n_criterion].
-      type(criterion_type), intent(in) :: criteria(:)
+      !> Its levels and criteria.
+      type(verdict_type), intent(in) :: verdict
       !> The table.
       character(len=:), allocatable :: text
-      character(len=6), parameter :: octave_name(octave_count) = ['  31.5', '    63', '   125', '   250', '   500']
       integer :: i
 
       text = '  octave   force exposure level, dB       limits, dB      verdict on the'//newline &
          //'      Hz     elastic       floor      '//padded(case%source, 18)//trim(case%level_force)//' force'//newline
-      do i = 1, octave_count
-         text = text//'  '//octave_name(i)//right(fixed(elastic_level(i), 2), 12)//right(fixed(floor_level(i), 2), 12) &
-            //right(fixed(criteria(i)%lower, 1), 10)//' to '//padded(fixed(criteria(i)%upper, 1), 8) &
-            //verdict(criteria(i))//newline
-      end do
-      text = text//newline &
-         //scalar_row('contact time', history%contact_time*1000, 3, 'ms', criteria(octave_count + 1), 1000.0_wp) &
-         //scalar_row('restitution', history%restitution, 4, '', criteria(octave_count + 2), 1.0_wp) &
-         //scalar_row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
-         //scalar_row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
-         //scalar_row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp) &
-         //scalar_row('peak elastic force', history%peak_force, 1, 'N') &
-         //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
-         //scalar_row('largest deflection', history%max_deflection*1000, 3, 'mm') &
-         //scalar_row('impulse', history%impulse, 3, 'N s') &
-         //facts(history)//newline &
-         //'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
-         //' to the limits of the '//trim(case%source)//' (levels: '//trim(case%level_method)//').'//newline
+      associate (criteria => verdict%criteria(:, get_judged_force(case)))
+         do i = 1, octave_count
+            text = text//'  '//right(get_band_name(verdict%bands(i)), 6)//right(fixed(verdict%level(i, 1), 2), 12) &
+               //right(fixed(verdict%level(i, 2), 2), 12)//right(fixed(criteria(i)%lower, 1), 10)//' to ' &
+               //padded(fixed(criteria(i)%upper, 1), 8)//get_word(criteria(i))//newline
+         end do
+         text = text//newline &
+            //scalar_row('contact time', history%contact_time*1000, 3, 'ms', criteria(octave_count + 1), 1000.0_wp) &
+            //scalar_row('restitution', history%restitution, 4, '', criteria(octave_count + 2), 1.0_wp) &
+            //scalar_row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
+            //scalar_row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
+            //scalar_row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp) &
+            //scalar_row('peak elastic force', history%peak_force, 1, 'N') &
+            //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
+            //scalar_row('largest deflection', history%max_deflection*1000, 3, 'mm') &
+            //scalar_row('impulse', history%impulse, 3, 'N s') &
+            //facts(history)//newline &
+            //'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
+            //' to the limits of the '//trim(case%source)//' (levels: '//trim(case%level_method)//').'//newline
+      end associate
    end function get_table
 
    !> The free modes on the screen.
@@ -91,7 +89,7 @@ contains
       row = '  '//padded(name, 20)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
       if (present(criterion) .and. present(scale)) then
          row = row//right(short(criterion%lower*scale), 8)//' to '//padded(short(criterion%upper*scale), 8) &
-            //verdict(criterion)
+            //get_word(criterion)
       end if
       row = trim(row)//newline
    end function scalar_row

@@ -37,25 +37,24 @@ contains
       type(ball_type), intent(in), target :: ball
       !> One field per component: [8].
       type(field_type), allocatable :: fields(:)
-      character(len=*), parameter :: group = 'ball'
 
       fields = [ &
-         real_field(group, 'outer_radius', ball%outer_radius, 'm', 'outer radius', &
-         0.0_wp, 10.0_wp, lower_open=.true.), &
-         real_field(group, 'wall_thickness', ball%wall_thickness, 'm', 'wall thickness, less than the outer radius', &
-         0.0_wp, ball%outer_radius, lower_open=.true., upper_open=.true.), &
-         real_field(group, 'mass', ball%mass, 'kg', 'mass', &
-         0.0_wp, 1.0e6_wp, lower_open=.true.), &
-         real_field(group, 'youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
-         0.0_wp, 1.0e13_wp, lower_open=.true.), &
-         real_field(group, 'poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", &
-         -1.0_wp, 0.5_wp, lower_open=.true.), &
-         real_field(group, 'gauge_pressure', ball%gauge_pressure, 'Pa', &
-         'overpressure of the gas in the undeformed ball', 0.0_wp, 1.0e8_wp), &
-         real_field(group, 'ambient_pressure', ball%ambient_pressure, 'Pa', &
-         'pressure of the air around the ball', 0.0_wp, 1.0e8_wp), &
-         real_field(group, 'heat_capacity_ratio', ball%heat_capacity_ratio, '', &
-         'ratio of specific heats of the enclosed gas', 1.0_wp, 2.0_wp)]
+         real_field('outer_radius', ball%outer_radius, 'm', 'outer radius', &
+         '(0, 10]'), &
+         real_field('wall_thickness', ball%wall_thickness, 'm', 'wall thickness, less than the outer radius', &
+         '(0, outer_radius)'), &
+         real_field('mass', ball%mass, 'kg', 'mass', &
+         '(0, 1000000]'), &
+         real_field('youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
+         '(0, 1e13]'), &
+         real_field('poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", &
+         '(-1, 0.5]'), &
+         real_field('gauge_pressure', ball%gauge_pressure, 'Pa', &
+         'overpressure of the gas in the undeformed ball', '[0, 1e8]'), &
+         real_field('ambient_pressure', ball%ambient_pressure, 'Pa', &
+         'pressure of the air around the ball', '[0, 1e8]'), &
+         real_field('heat_capacity_ratio', ball%heat_capacity_ratio, '', &
+         'ratio of specific heats of the enclosed gas', '[1, 2]')]
    end function get_ball_fields
 
    !> Density of the wall, kg/m3.

@@ -24,13 +24,12 @@ contains
       type(drop_type), intent(in), target :: drop
       !> One field per component: [2].
       type(field_type) :: fields(2)
-      character(len=*), parameter :: group = 'drop'
 
       fields = [ &
-         real_field(group, 'height', drop%height, 'm', "height of the ball's lowest point over the floor", &
-         0.0_wp, 1.0e6_wp, lower_open=.true.), &
-         real_field(group, 'gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
-         0.0_wp, 1.0e3_wp, lower_open=.true.)]
+         real_field('height', drop%height, 'm', "height of the ball's lowest point over the floor", &
+         '(0, 1000000]'), &
+         real_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
+         '(0, 1000]')]
    end function get_drop_fields
 
    !> Velocity at first touch, m/s (paper eq. 4).

@@ -2,14 +2,22 @@
 !> Levels, verdicts and files know this type only, never the model behind it.
 module thud_force_history
    use thud_kinds, only: wp
+   use thud_motion, only: motion_type
    implicit none (type, external)
    private
 
-   public :: force_history_type, max_residual, new_force_history, part_name_length
+   public :: force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
+   public :: outcome_count, part_name_length, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
    real(wp), parameter :: max_residual = 1.0e-6_wp
+
+   !> Forces that levels and verdicts are made of: without and with the flux of momentum.
+   integer, parameter :: force_count = 2
+
+   !> Their names.
+   character(len=8), parameter :: force_names(force_count) = [character(len=8) :: 'elastic', 'floor']
 
    !> Length of the name of a part of the force.
    integer, parameter :: part_name_length = 24
@@ -42,11 +50,15 @@ module thud_force_history
       real(wp), allocatable :: fact(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
+      !> Snapshots of the deformed source, of models that take some.
+      type(motion_type) :: motion
+      !> Time of first touch in the record, s.
+      real(wp) :: touch_time = 0.0_wp
       !> Time from first touch to release, s.
       real(wp) :: contact_time = 0.0_wp
-      !> Largest elastic force, N.
+      !> Largest elastic force, N; of models whose spikes no force plate records, of the part that it does.
       real(wp) :: peak_force = 0.0_wp
-      !> Largest force on the floor, N.
+      !> Largest force on the floor, N, likewise.
       real(wp) :: peak_floor_force = 0.0_wp
       !> Largest deflection, m.
       real(wp) :: max_deflection = 0.0_wp
@@ -60,7 +72,46 @@ module thud_force_history
       real(wp) :: energy_residual = 0.0_wp
    end type force_history_type
 
+   !> One number that describes an impact.
+   type :: scalar_field_type
+      !> Its name.
+      character(len=part_name_length) :: name = ''
+      !> Its SI unit, blank for pure numbers.
+      character(len=8) :: unit = ''
+      !> What it is.
+      character(len=64) :: meaning = ''
+   end type scalar_field_type
+
+   !> Of these numbers the first are those that each of many drops is described by.
+   integer, parameter :: outcome_count = 6
+
+   !> The numbers that describe an impact, in the order of `get_scalars`.
+   type(scalar_field_type), parameter :: scalar_fields(11) = [ &
+      scalar_field_type('contact_time', 's', 'contact time'), &
+      scalar_field_type('peak_force', 'N', 'largest elastic force'), &
+      scalar_field_type('peak_floor_force', 'N', 'largest force on the floor'), &
+      scalar_field_type('max_deflection', 'm', 'largest deflection'), &
+      scalar_field_type('restitution', '', 'coefficient of restitution'), &
+      scalar_field_type('impulse', 'N s', 'time integral of the force on the floor'), &
+      scalar_field_type('impact_velocity', 'm/s', 'velocity at first touch'), &
+      scalar_field_type('touch_time', 's', 'time of first touch in the record'), &
+      scalar_field_type('sample_rate', 'Hz', 'samples per second'), &
+      scalar_field_type('impulse_residual', '', 'what the balance of momentum misses, relative'), &
+      scalar_field_type('energy_residual', '', 'what the balance of energy misses, relative')]
+
 contains
+
+   !> The numbers that describe an impact.
+   pure function get_scalars(history) result(values)
+      !> The history.
+      type(force_history_type), intent(in) :: history
+      !> The numbers, SI units: [size(scalar_fields)].
+      real(wp) :: values(size(scalar_fields))
+
+      values = [history%contact_time, history%peak_force, history%peak_floor_force, history%max_deflection, &
+         history%restitution, history%impulse, history%impact_velocity, history%touch_time, history%sample_rate, &
+         history%impulse_residual, history%energy_residual]
+   end function get_scalars
 
    !> A history of zero force.
    pure function new_force_history(sample_rate, n_sample, part_name) result(history)

@@ -11,16 +11,16 @@ module thud_hunt_crossley
    use thud_new_field, only: real_field
    use thud_rk4, only: locate_zero, rk4_step
    use thud_sampling, only: sampling_type
+   use thud_source_model, only: source_model_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_hunt_crossley, get_damping, get_hunt_crossley_fields, get_stiffness, hunt_crossley_type
-   public :: solve_hunt_crossley
+   public :: get_damping, get_stiffness, hunt_crossley_type
 
    !> Options of the model. Of stiffness and contact time one is given, of damping and
    !> restitution at most one; 0 means not given.
-   type :: hunt_crossley_type
+   type, extends(source_model_type) :: hunt_crossley_type
       !> Stiffness k, N/m^exponent.
       real(wp) :: stiffness = 0.0_wp
       !> Wanted contact time, s.
@@ -31,6 +31,10 @@ module thud_hunt_crossley
       real(wp) :: damping = 0.0_wp
       !> Wanted coefficient of restitution.
       real(wp) :: restitution = 0.0_wp
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: check
+      procedure, pass(options) :: solve
    end type hunt_crossley_type
 
    !> Equation of motion M z'' = -F with F = k d^n (1 + 3/2 alpha d').
@@ -48,29 +52,32 @@ module thud_hunt_crossley
 
 contains
 
-   !> Keys and allowed ranges of the group `&hunt_crossley`.
-   function get_hunt_crossley_fields(options) result(fields)
+   !> Keys and allowed ranges.
+   function get_fields(options) result(fields)
       !> The options that the fields read and set.
-      type(hunt_crossley_type), intent(in), target :: options
+      class(hunt_crossley_type), intent(in), target :: options
       !> One field per component: [5].
       type(field_type), allocatable :: fields(:)
-      character(len=*), parameter :: group = 'hunt_crossley'
 
       fields = [ &
-         real_field(group, 'stiffness', options%stiffness, '', &
-         'stiffness, N/m^exponent; 0: from contact_time', 0.0_wp, 1.0e15_wp), &
-         real_field(group, 'contact_time', options%contact_time, 's', &
-         'wanted contact time; 0: from stiffness', 0.0_wp, 10.0_wp), &
-         real_field(group, 'exponent', options%exponent, '', 'exponent of the deflection', 1.0_wp, 5.0_wp), &
-         real_field(group, 'damping', options%damping, 's/m', 'damping alpha; 0: from restitution', 0.0_wp, 1.0e2_wp), &
-         real_field(group, 'restitution', options%restitution, '', &
-         'wanted coefficient of restitution; 0: from damping', 0.0_wp, 1.0_wp)]
-   end function get_hunt_crossley_fields
+         real_field('stiffness', options%stiffness, '', &
+         'stiffness, N/m^exponent; 0: from contact_time', '[0, 1e15]'), &
+         real_field('contact_time', options%contact_time, 's', &
+         'wanted contact time; 0: from stiffness', '[0, 10]'), &
+         real_field('exponent', options%exponent, '', 'exponent of the deflection', '[1, 5]'), &
+         real_field('damping', options%damping, 's/m', 'damping alpha; 0: from restitution', '[0, 100]'), &
+         real_field('restitution', options%restitution, '', &
+         'wanted coefficient of restitution; 0: from damping', '[0, 1]')]
+   end function get_fields
 
-   !> Complains about values that are missing or contradict each other.
-   subroutine check_hunt_crossley(options, error)
+   !> Refuses values that are missing or contradict each other.
+   subroutine check(ball, options, sampling, error)
+      !> The source.
+      type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
-      type(hunt_crossley_type), intent(in) :: options
+      class(hunt_crossley_type), intent(in) :: options
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
 
@@ -84,7 +91,7 @@ contains
          error = input_error('&hunt_crossley: restitution = '//to_text(options%restitution) &
             //' is not allowed; allowed: 0 (not given) or 0.01 <= restitution <= 1')
       end if
-   end subroutine check_hunt_crossley
+   end subroutine check
 
    !> Right-hand side of the equation of motion.
    pure subroutine get_derivative(self, time, state, rate, valid)
@@ -228,13 +235,13 @@ contains
    end function get_stiffness
 
    !> Force history of one drop.
-   subroutine solve_hunt_crossley(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error)
       !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       !> The drop.
       type(drop_type), intent(in) :: drop
       !> Stiffness and damping.
-      type(hunt_crossley_type), intent(in) :: options
+      class(hunt_crossley_type), intent(in) :: options
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
       !> Force and motion from first touch on.
@@ -256,6 +263,6 @@ contains
          end if
       end if
       call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error)
-   end subroutine solve_hunt_crossley
+   end subroutine solve
 
 end module thud_hunt_crossley

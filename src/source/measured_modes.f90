@@ -11,17 +11,18 @@ module thud_measured_modes
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_source_model, only: source_model_type
    use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
 
-   public :: check_measured_modes, get_measured_modes_fields, measured_modes_type, solve_measured_modes
+   public :: measured_modes_type
 
    !> Part by which the effective masses may miss the mass of the ball: their printed digits.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
 
    !> Options of the model: one entry per mode in each list.
-   type :: measured_modes_type
+   type, extends(source_model_type) :: measured_modes_type
       !> Natural frequencies, Hz.
       type(list_type) :: frequency
       !> Damping ratios.
@@ -30,6 +31,10 @@ module thud_measured_modes
       type(list_type) :: effective_mass
       !> The masses need not add up to that of the ball.
       logical :: allow_mass_mismatch = .false.
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: check
+      procedure, pass(options) :: solve
    end type measured_modes_type
 
    !> Motion and force of one mode in closed form.
@@ -46,31 +51,32 @@ module thud_measured_modes
 
 contains
 
-   !> Keys and allowed ranges of the group `&measured_modes`.
-   function get_measured_modes_fields(options) result(fields)
+   !> Keys and allowed ranges.
+   function get_fields(options) result(fields)
       !> The options that the fields read and set.
-      type(measured_modes_type), intent(in), target :: options
+      class(measured_modes_type), intent(in), target :: options
       !> One field per component: [4].
       type(field_type), allocatable :: fields(:)
-      character(len=*), parameter :: group = 'measured_modes'
 
       fields = [ &
-         list_field(group, 'frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
-         1.0e-3_wp, 1.0e6_wp), &
-         list_field(group, 'damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
-         0.0_wp, 1.0_wp, upper_open=.true.), &
-         list_field(group, 'effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
-         0.0_wp, 1.0e6_wp, lower_open=.true.), &
-         logical_field(group, 'allow_mass_mismatch', options%allow_mass_mismatch, &
+         list_field('frequency', options%frequency, 'Hz', 'natural frequencies of the ball on the floor', &
+         '[0.001, 1000000]'), &
+         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios, one per mode', &
+         '[0, 1)'), &
+         list_field('effective_mass', options%effective_mass, 'kg', 'effective masses, one per mode', &
+         '(0, 1000000]'), &
+         logical_field('allow_mass_mismatch', options%allow_mass_mismatch, &
          'effective masses need not add up to the mass of the ball')]
-   end function get_measured_modes_fields
+   end function get_fields
 
-   !> Complains about lists that do not fit each other or the ball.
-   subroutine check_measured_modes(options, ball, error)
-      !> The options, each inside its own range.
-      type(measured_modes_type), intent(in) :: options
+   !> Refuses lists that do not fit each other or the ball.
+   subroutine check(ball, options, sampling, error)
       !> The ball.
       type(ball_type), intent(in) :: ball
+      !> The options, each inside its own range.
+      class(measured_modes_type), intent(in) :: options
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: total
@@ -90,14 +96,16 @@ contains
             end if
          end if
       end associate
-   end subroutine check_measured_modes
+   end subroutine check
 
    !> Force history of one drop.
-   subroutine solve_measured_modes(drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error)
+      !> The ball, whose mass the effective masses add up to.
+      type(ball_type), intent(in) :: ball
       !> The drop.
       type(drop_type), intent(in) :: drop
       !> The modes.
-      type(measured_modes_type), intent(in) :: options
+      class(measured_modes_type), intent(in) :: options
       !> Sampling rate and length of the record.
       type(sampling_type), intent(in) :: sampling
       !> Force and motion from first touch on.
@@ -149,7 +157,7 @@ contains
       else
          call check_contact_samples(sampling, history%contact_time, error)
       end if
-   end subroutine solve_measured_modes
+   end subroutine solve
 
    !> One mode from its measured numbers.
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)

@@ -1,13 +1,12 @@
 !> Instants of the deforming ball, for pictures: positions, velocities and pressures at the nodes.
 module thud_motion
-   use thud_floor_contact, only: get_nodal_areas
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
    public :: motion_type, new_motion, take_snapshot
 
-   !> Snapshots; nodes are numbered as in `thud_mesh`.
+   !> Snapshots; nodes run from the lowest point to the highest and from the inner surface to the outer.
    type :: motion_type
       !> Number of snapshots taken.
       integer :: n_frame = 0
@@ -45,7 +44,7 @@ contains
    end function new_motion
 
    !> Adds a snapshot where there is room for one.
-   pure subroutine take_snapshot(motion, time, position, velocity, floor_force, cavity_pressure)
+   pure subroutine take_snapshot(motion, time, position, velocity, contact_pressure, cavity_pressure)
       !> The snapshots.
       type(motion_type), intent(inout) :: motion
       !> Time since the record began, s.
@@ -54,8 +53,8 @@ contains
       real(wp), intent(in) :: position(0:, 0:, :)
       !> Velocities of the nodes, m/s: the same shape.
       real(wp), intent(in) :: velocity(0:, 0:, :)
-      !> Forces of the floor on the nodes of the outer surface, N: [0:n_polar].
-      real(wp), intent(in) :: floor_force(0:)
+      !> Pressures on the floor at the nodes of the outer surface, Pa: [0:n_polar].
+      real(wp), intent(in) :: contact_pressure(0:)
       !> Overpressure of the gas, Pa.
       real(wp), intent(in) :: cavity_pressure
 
@@ -65,8 +64,7 @@ contains
          motion%time(i) = time
          motion%position(:, :, :, i) = position
          motion%velocity(:, :, :, i) = velocity
-         motion%contact_pressure(:, i) = floor_force/get_nodal_areas(position(:, ubound(position, 2), 1), &
-            position(:, ubound(position, 2), 2))
+         motion%contact_pressure(:, i) = contact_pressure
          motion%cavity_pressure(i) = cavity_pressure
       end associate
    end subroutine take_snapshot

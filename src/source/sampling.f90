@@ -38,13 +38,12 @@ contains
       type(sampling_type), intent(in), target :: sampling
       !> One field per component: [3].
       type(field_type) :: fields(3)
-      character(len=*), parameter :: group = 'sampling'
 
       fields = [ &
-         real_field(group, 'sample_rate', sampling%sample_rate, 'Hz', 'samples per second', 2000.0_wp, 1.0e7_wp), &
-         real_field(group, 'duration', sampling%duration, 's', 'length of the record from first touch', &
-         1.0e-3_wp, 10.0_wp), &
-         integer_field(group, 'substeps', sampling%substeps, 'integration steps per sampling interval', 1, 10000)]
+         real_field('sample_rate', sampling%sample_rate, 'Hz', 'samples per second', '[2000, 1e7]'), &
+         real_field('duration', sampling%duration, 's', 'length of the record from first touch', &
+         '[0.001, 10]'), &
+         integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]')]
    end function get_sampling_fields
 
    !> Complains about a record with too many samples or steps.

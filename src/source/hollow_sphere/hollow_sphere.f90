@@ -11,18 +11,22 @@ module thud_hollow_sphere
    use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_error, lumped_type, solve_lumped
    use thud_new_field, only: choice_field
    use thud_sampling, only: sampling_type
+   use thud_source_model, only: source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: compression_weights, flux_choices, get_gas_energy, get_gas_force, get_hollow_sphere_fields
+   public :: compression_weights, flux_choices, get_gas_energy, get_gas_force
    public :: get_shell_stiffness, hollow_sphere_type, is_wild, new_shell, restitution_weights, shell_type
    public :: solve_hollow_sphere
 
    !> Options of the model.
-   type :: hollow_sphere_type
+   type, extends(source_model_type) :: hollow_sphere_type
       !> What becomes of the momentum of wall that enters or leaves the flat cap.
       character(len=name_length) :: momentum_flux = 'momentum_balance'
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: solve => solve_hollow_sphere
    end type hollow_sphere_type
 
    !> The choices of `momentum_flux`.
@@ -61,16 +65,16 @@ module thud_hollow_sphere
 
 contains
 
-   !> Keys and allowed values of the group `&hollow_sphere`.
-   function get_hollow_sphere_fields(options) result(fields)
+   !> The one key.
+   function get_fields(options) result(fields)
       !> The options that the fields read and set.
-      type(hollow_sphere_type), intent(in), target :: options
+      class(hollow_sphere_type), intent(in), target :: options
       !> One field per component: [1].
-      type(field_type) :: fields(1)
+      type(field_type), allocatable :: fields(:)
 
-      fields = [choice_field('hollow_sphere', 'momentum_flux', options%momentum_flux, &
+      fields = [choice_field('momentum_flux', options%momentum_flux, &
          'momentum of wall that enters or leaves the flat cap', flux_choices)]
-   end function get_hollow_sphere_fields
+   end function get_fields
 
    !> The equation of motion of a ball.
    pure function new_shell(ball, compression_weight, restitution_weight) result(shell)
@@ -252,7 +256,7 @@ contains
       !> The drop.
       type(drop_type), intent(in) :: drop
       !> The choice of momentum flux.
-      type(hollow_sphere_type), intent(in) :: options
+      class(hollow_sphere_type), intent(in) :: options
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
       !> Force and motion from first touch on.

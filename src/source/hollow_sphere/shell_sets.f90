@@ -14,25 +14,23 @@ module thud_shell_sets
    use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, is_wild, &
       restitution_weights, shell_type, solve_hollow_sphere
    use thud_impact_batch, only: get_single, impact_batch_type
+   use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
+   use thud_new_field, only: in_group
    use thud_lumped, only: at_deflection, at_velocity
    use thud_power, only: not_a_number
    use thud_rk4, only: longest_valid, rk4_step
    use thud_sampling, only: get_sample_count, min_contact_samples, sampling_type
-   use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_flux, set_is_fine, set_outlasts, set_range
+   use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_is_fine, set_outlasts, set_range
    use thud_shell_impacts, only: solve_impacts
    use thud_shell_batch, only: batch_size
    implicit none (type, external)
    private
 
-   public :: block_size, get_blocks, get_set_fields, outcome_count, parameter_count, set_outcome_type, set_type
-   public :: solve_block
+   public :: block_size, get_blocks, get_numbers, get_set_fields, set_outcome_type, set_type, solve_block
 
    !> Sets of one block.
    integer, parameter :: block_size = batch_size
-
-   !> Keys of a set that are numbers: those of ball and drop.
-   integer, parameter :: parameter_count = 10
 
    !> One drop.
    type :: set_type
@@ -66,29 +64,36 @@ module thud_shell_sets
    !> are taken here err by up to some twenty times as much as the single solver's.
    real(wp), parameter :: doubtful = 0.1_wp*max_residual
 
-   !> Numbers of an outcome.
-   integer, parameter :: outcome_count = 6
-
 contains
 
-   !> Keys and allowed ranges of the numbers of a set, in the order of their status codes.
+   !> Keys and allowed ranges of the numbers of a set.
    function get_set_fields(set) result(fields)
       !> The set that the fields read and set.
       type(set_type), intent(in), target :: set
-      !> One field per key: [parameter_count].
-      type(field_type) :: fields(parameter_count)
+      !> One field per number, as in `get_numbers`: [n_key].
+      type(field_type), allocatable :: fields(:)
 
-      fields = [get_ball_fields(set%ball), get_drop_fields(set%drop)]
+      fields = [in_group('ball', get_ball_fields(set%ball)), in_group('drop', get_drop_fields(set%drop))]
    end function get_set_fields
+
+   !> The numbers of a set: ball and drop hold nothing else, in the order of their keys.
+   pure function get_numbers(set) result(values)
+      !> The set.
+      type(set_type), intent(in) :: set
+      !> The numbers: [n_key].
+      real(wp) :: values((storage_size(set%ball) + storage_size(set%drop))/storage_size(1.0_wp))
+
+      values = [transfer(set%ball, values), transfer(set%drop, values)]
+   end function get_numbers
 
    !> Blocks of the sets that can be computed: of one choice of the flux term, so that lanes share their
    !> equation, and with similar contact times, because a block takes as long as its longest contact.
    subroutine get_blocks(sets, status, order, first)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> Complaint about the input of each set, or `set_is_fine`: [n_set].
+      !> What is wrong with the input of each set, or `set_is_fine`: [n_set].
       integer, intent(out) :: status(:)
-      !> Numbers of the sets without complaint: [n_valid].
+      !> Numbers of the sets whose input is right: [n_valid].
       integer, allocatable, intent(out) :: order(:)
       !> Places in `order` where blocks begin, and the place after the last: [n_block + 1].
       integer, allocatable, intent(out) :: first(:)
@@ -100,12 +105,14 @@ contains
       integer :: class(size(sets))
       integer :: i, j
       type(set_type), target :: any_set
-      type(field_type) :: fields(parameter_count)
+      type(field_type), allocatable :: fields(:)
+      type(interval_type), allocatable :: ranges(:)
 
       fields = get_set_fields(any_set)
+      ranges = [(new_interval(fields(i)%range), i=1, size(fields))]
       next = 0
       do i = 1, size(sets)
-         status(i) = get_complaint(sets(i), fields)
+         status(i) = get_input_status(sets(i), fields%key, ranges)
          if (status(i) /= set_is_fine) cycle
          class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
          class(i) = min(max(class(i), 0), most - 1) + (sets(i)%flux - 1)*most
@@ -124,26 +131,33 @@ contains
    end subroutine get_blocks
 
    !> What is wrong with the input of a set.
-   function get_complaint(set, fields) result(status)
+   pure function get_input_status(set, keys, ranges) result(status)
       !> The set.
       type(set_type), intent(in) :: set
-      !> Ranges of the numbers: [parameter_count].
-      type(field_type), intent(inout) :: fields(:)
-      !> A code of `thud_set_status`.
+      !> Names of its numbers: [n_key].
+      character(len=*), intent(in) :: keys(:)
+      !> Their ranges, whose ends may depend on the set: [n_key].
+      type(interval_type), intent(in) :: ranges(:)
+      !> `set_is_fine`, or `set_range` where a value lies outside of its range.
       integer :: status
+      type(interval_type) :: range
+      real(wp) :: values(size(keys))
+      logical :: inside
       integer :: i
 
-      associate (ball => set%ball)
-         ! The one range that depends on the set.
-         fields(2)%upper = ball%outer_radius
-         i = findloc(fields%contains([ball%outer_radius, ball%wall_thickness, ball%mass, ball%youngs_modulus, &
-            ball%poisson_ratio, ball%gauge_pressure, ball%ambient_pressure, ball%heat_capacity_ratio, &
-            set%drop%height, set%drop%gravity]), .false., dim=1)
-      end associate
-      status = set_is_fine
-      if (set%flux < 1 .or. set%flux > size(compression_weights)) status = set_flux
-      if (i > 0) status = set_range + i
-   end function get_complaint
+      values = get_numbers(set)
+      inside = set%flux >= 1 .and. set%flux <= size(compression_weights)
+      do i = 1, size(keys)
+         if (ranges(i)%lower_expression == '' .and. ranges(i)%upper_expression == '') then
+            inside = inside .and. ranges(i)%contains(values(i))
+         else
+            range = ranges(i)
+            call range%resolve(keys, values)
+            inside = inside .and. range%contains(values(i))
+         end if
+      end do
+      status = merge(set_is_fine, set_range, inside)
+   end function get_input_status
 
    !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
    !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like sets.
@@ -270,7 +284,8 @@ contains
       type(force_history_type) :: history
       type(error_type), allocatable :: error
 
-      call solve_hollow_sphere(set%ball, set%drop, hollow_sphere_type(flux_choices(set%flux)), sampling, history, error)
+      call solve_hollow_sphere(set%ball, set%drop, hollow_sphere_type(momentum_flux=flux_choices(set%flux)), sampling, &
+         history, error)
       status = merge(set_coarse, set_is_fine, allocated(error))
    end function get_single_status
 

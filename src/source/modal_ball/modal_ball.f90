@@ -15,7 +15,7 @@ module thud_modal_ball
    use thud_kinds, only: wp
    use thud_lapack, only: dgemv
    use thud_legendre, only: get_legendre
-   use thud_modal_ball_options, only: modal_ball_type
+   use thud_modal_ball_options, only: modal_ball_options_type
    use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -24,7 +24,7 @@ module thud_modal_ball
    implicit none (type, external)
    private
 
-   public :: solve_modal_ball
+   public :: modal_ball_type
 
    !> Angle that a mode may turn through in a step; faster ones answer statically.
    real(wp), parameter :: max_phase = pi/2
@@ -35,16 +35,33 @@ module thud_modal_ball
    !> Families whose energy is told apart in the output, from n = 0 on.
    integer, parameter :: n_told = 6
 
+   !> The model.
+   type, extends(modal_ball_options_type) :: modal_ball_type
+   contains
+      procedure, pass(options) :: solve
+      procedure, pass(options) :: get_cost
+   end type modal_ball_type
+
 contains
 
+   !> About the time that one drop takes on one core, s.
+   function get_cost(options) result(cost)
+      !> The options.
+      class(modal_ball_type), intent(in) :: options
+      !> The time, s.
+      real(wp) :: cost
+
+      cost = 6.0e-3_wp*(options%rings/44.0_wp)**2
+   end function get_cost
+
    !> Force history of one drop.
-   subroutine solve_modal_ball(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error)
       !> The ball.
       type(ball_type), intent(in) :: ball
       !> The drop.
       type(drop_type), intent(in) :: drop
       !> Modes, rings and damping.
-      type(modal_ball_type), intent(in) :: options
+      class(modal_ball_type), intent(in) :: options
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
       !> Force and motion from first touch on; the force is the mean of each sampling interval.
@@ -67,14 +84,14 @@ contains
       call prepare(ball, options, interval, step, contact, error)
       if (allocated(error)) return
       call march(ball, sampling, interval, step, contact, history, error)
-   end subroutine solve_modal_ball
+   end subroutine solve
 
    !> Modes, their steps and the response of the rings.
    subroutine prepare(ball, options, interval, step, contact, error)
       !> The ball.
       type(ball_type), intent(in) :: ball
       !> Modes, rings and damping.
-      type(modal_ball_type), intent(in) :: options
+      class(modal_ball_options_type), intent(in) :: options
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> The modes.

@@ -1,0 +1,400 @@
+"""Groups of the input, keys and results as the library declares them.
+
+Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from thud.key import Key
+
+
+@dataclass(frozen=True)
+class Ball:
+    """Group ``&ball``.
+
+    Attributes
+    ----------
+    outer_radius : float
+        Outer radius, m; 0 < outer_radius <= 10.
+    wall_thickness : float
+        Wall thickness, less than the outer radius, m; 0 < wall_thickness < outer_radius.
+    mass : float
+        Mass, kg; 0 < mass <= 1e+06.
+    youngs_modulus : float
+        Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e+13.
+    poisson_ratio : float
+        Poisson's ratio; -1 < poisson_ratio <= 0.5.
+    gauge_pressure : float
+        Overpressure of the gas in the undeformed ball, Pa; 0 <= gauge_pressure <= 1e+08.
+    ambient_pressure : float
+        Pressure of the air around the ball, Pa; 0 <= ambient_pressure <= 1e+08.
+    heat_capacity_ratio : float
+        Ratio of specific heats of the enclosed gas; 1 <= heat_capacity_ratio <= 2.
+    """
+
+    outer_radius: float = 0.089
+    wall_thickness: float = 0.032
+    mass: float = 2.5
+    youngs_modulus: float = 1600000.0
+    poisson_ratio: float = 0.5
+    gauge_pressure: float = 0.0
+    ambient_pressure: float = 101325.0
+    heat_capacity_ratio: float = 1.4
+
+
+@dataclass(frozen=True)
+class Drop:
+    """Group ``&drop``.
+
+    Attributes
+    ----------
+    height : float
+        Height of the ball's lowest point over the floor, m; 0 < height <= 1e+06.
+    gravity : float
+        Acceleration of free fall, m/s2; 0 < gravity <= 1000.
+    """
+
+    height: float = 1.0
+    gravity: float = 9.81
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """Group ``&sampling``.
+
+    Attributes
+    ----------
+    sample_rate : float
+        Samples per second, Hz; 2000 <= sample_rate <= 1e+07.
+    duration : float
+        Length of the record from first touch, s; 0.001 <= duration <= 10.
+    substeps : int
+        Integration steps per sampling interval; 1 <= substeps <= 10000.
+    """
+
+    sample_rate: float = 44100.0
+    duration: float = 0.05
+    substeps: int = 1
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Group ``&levels``.
+
+    Attributes
+    ----------
+    method : str
+        Method of the levels; "exact", "fft".
+    bands : str
+        Bands of levels.csv; "octave", "third", "both".
+    force : str
+        Force that the verdict is on; "elastic", "floor".
+    """
+
+    method: str = "exact"
+    bands: str = "octave"
+    force: str = "elastic"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Group ``&limits``.
+
+    Attributes
+    ----------
+    source : str
+        Source whose limits apply; "rubber_ball", "tyre".
+    """
+
+    source: str = "rubber_ball"
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Free modes that are asked for.
+
+    Attributes
+    ----------
+    count : int
+        Number of elastic free modes; 1 <= count <= 100.
+    radial_elements : int
+        Elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
+    polar_elements : int
+        Elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
+    """
+
+    count: int = 6
+    radial_elements: int = field(default=8, metadata={"group": "mesh"})
+    polar_elements: int = field(default=64, metadata={"group": "mesh"})
+
+
+@dataclass(frozen=True)
+class HollowSphere:
+    """Options of the source model ``hollow_sphere``.
+
+    Attributes
+    ----------
+    momentum_flux : str
+        Momentum of wall that enters or leaves the flat cap; "momentum_balance", "retarding",
+        "conservative", "none".
+    """
+
+    name: ClassVar[str] = "hollow_sphere"
+    momentum_flux: str = "momentum_balance"
+
+
+@dataclass(frozen=True)
+class ModalBall:
+    """Options of the source model ``modal_ball``.
+
+    Attributes
+    ----------
+    harmonics : int
+        Highest harmonic whose modes oscillate; 2 <= harmonics <= 200.
+    radial_modes : int
+        Modes of each harmonic that oscillate; 1 <= radial_modes <= 20.
+    static_harmonics : int
+        Highest harmonic whose static flexibility counts; 4 <= static_harmonics <= 400.
+    rings : int
+        Rings of the lower half of the surface; 2 <= rings <= static_harmonics/2.
+    damping_law : str
+        Loss factor against frequency; "constant", "rising".
+    loss_factor : float
+        Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9.
+    loss_frequency : float
+        Frequency of a rising loss factor, Hz; 0.1 <= loss_frequency <= 100000.
+    cavity_gas : bool
+        The gas in the cavity resists changes of its volume.
+    static_families : sequence of int
+        Harmonics that answer statically; 0 <= static_families <= harmonics.
+    """
+
+    name: ClassVar[str] = "modal_ball"
+    harmonics: int = 32
+    radial_modes: int = 5
+    static_harmonics: int = 96
+    rings: int = 44
+    damping_law: str = "constant"
+    loss_factor: float = 0.1
+    loss_frequency: float = 74.0
+    cavity_gas: bool = True
+    static_families: Sequence[int] = ()
+
+
+@dataclass(frozen=True)
+class FiniteElement:
+    """Options of the source model ``finite_element``.
+
+    Attributes
+    ----------
+    bounces : int
+        Contacts to be followed; 1 <= bounces <= 100.
+    flight_before : float
+        Free flight before first touch, s; 0 <= flight_before <= 1.
+    flight_after : float
+        Free flight after the last contact, s; 0 <= flight_after <= 10.
+    step_safety : float
+        Part of the limit of stability that a step uses; 0.01 <= step_safety <= 0.98.
+    radial_elements : int
+        Elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
+    polar_elements : int
+        Elements from pole to pole; 8 <= polar_elements <= 1024; group ``&mesh``.
+    law : str
+        Law of elasticity; "neo_hookean", "mooney_rivlin"; group ``&material``.
+    mooney_share : float
+        Part of the shear modulus with the second invariant, of mooney_rivlin; 0 <= mooney_share <=
+        1; group ``&material``.
+    bulk_ratio : float
+        Most bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <= bulk_ratio
+        <= 100000; group ``&material``.
+    viscosity : str
+        Law of viscosity; "none", "kelvin_voigt", "constant_loss", "prony"; group ``&material``.
+    loss_factor : float
+        Loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss; 0 <
+        loss_factor <= 1; group ``&material``.
+    loss_frequency : float
+        Where the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <= 10000; group
+        ``&material``.
+    prony_share : sequence of float
+        Moduli over the long-term modulus, of prony; 0 <= prony_share <= 1000; group ``&material``.
+    prony_time : sequence of float
+        Relaxation times, of prony, s; 0 < prony_time <= 1000; group ``&material``.
+    treatment : str
+        How the floor holds the ball; "penalty", "impulse"; group ``&contact``.
+    penalty_ratio : float
+        Stiffness of the penalty over that of the elements above it, per area; 0.01 <=
+        penalty_ratio <= 100; group ``&contact``.
+    snapshot_interval : float
+        Time between snapshots of the deformed ball; 0: none, s; 0 <= snapshot_interval <= 10;
+        group ``&output``.
+    """
+
+    name: ClassVar[str] = "finite_element"
+    bounces: int = 1
+    flight_before: float = 0.0
+    flight_after: float = 0.0
+    step_safety: float = 0.85
+    radial_elements: int = field(default=8, metadata={"group": "mesh"})
+    polar_elements: int = field(default=64, metadata={"group": "mesh"})
+    law: str = field(default="neo_hookean", metadata={"group": "material"})
+    mooney_share: float = field(default=0.2, metadata={"group": "material"})
+    bulk_ratio: float = field(default=200.0, metadata={"group": "material"})
+    viscosity: str = field(default="kelvin_voigt", metadata={"group": "material"})
+    loss_factor: float = field(default=0.2, metadata={"group": "material"})
+    loss_frequency: float = field(default=74.0, metadata={"group": "material"})
+    prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
+    prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
+    treatment: str = field(default="impulse", metadata={"group": "contact"})
+    penalty_ratio: float = field(default=3.0, metadata={"group": "contact"})
+    snapshot_interval: float = field(default=0.001, metadata={"group": "output"})
+
+
+@dataclass(frozen=True)
+class MeasuredModes:
+    """Options of the source model ``measured_modes``.
+
+    Attributes
+    ----------
+    frequency : sequence of float
+        Natural frequencies of the ball on the floor, Hz; 0.001 <= frequency <= 1e+06.
+    damping_ratio : sequence of float
+        Damping ratios, one per mode; 0 <= damping_ratio < 1.
+    effective_mass : sequence of float
+        Effective masses, one per mode, kg; 0 < effective_mass <= 1e+06.
+    allow_mass_mismatch : bool
+        Effective masses need not add up to the mass of the ball.
+    """
+
+    name: ClassVar[str] = "measured_modes"
+    frequency: Sequence[float] = ()
+    damping_ratio: Sequence[float] = ()
+    effective_mass: Sequence[float] = ()
+    allow_mass_mismatch: bool = False
+
+
+@dataclass(frozen=True)
+class HuntCrossley:
+    """Options of the source model ``hunt_crossley``.
+
+    Attributes
+    ----------
+    stiffness : float
+        Stiffness, N/m^exponent; 0: from contact_time; 0 <= stiffness <= 1e+15.
+    contact_time : float
+        Wanted contact time; 0: from stiffness, s; 0 <= contact_time <= 10.
+    exponent : float
+        Exponent of the deflection; 1 <= exponent <= 5.
+    damping : float
+        Damping alpha; 0: from restitution, s/m; 0 <= damping <= 100.
+    restitution : float
+        Wanted coefficient of restitution; 0: from damping; 0 <= restitution <= 1.
+    """
+
+    name: ClassVar[str] = "hunt_crossley"
+    stiffness: float = 0.0
+    contact_time: float = 0.0
+    exponent: float = 1.5
+    damping: float = 0.0
+    restitution: float = 0.0
+
+
+ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley
+
+# Source models by name, the default first.
+MODELS: dict[str, type[ModelOptions]] = {
+    HollowSphere.name: HollowSphere,
+    ModalBall.name: ModalBall,
+    FiniteElement.name: FiniteElement,
+    MeasuredModes.name: MeasuredModes,
+    HuntCrossley.name: HuntCrossley,
+}
+
+# Groups that every model uses.
+GROUPS = {
+    "ball": Ball,
+    "drop": Drop,
+    "sampling": Sampling,
+    "levels": Levels,
+    "limits": Limits,
+}
+
+# Unit and meaning of the numbers that describe an impact; the first ones describe each of many.
+SCALARS = {
+    "contact_time": ("s", "contact time"),
+    "peak_force": ("N", "largest elastic force"),
+    "peak_floor_force": ("N", "largest force on the floor"),
+    "max_deflection": ("m", "largest deflection"),
+    "restitution": ("", "coefficient of restitution"),
+    "impulse": ("N s", "time integral of the force on the floor"),
+    "impact_velocity": ("m/s", "velocity at first touch"),
+    "touch_time": ("s", "time of first touch in the record"),
+    "sample_rate": ("Hz", "samples per second"),
+    "impulse_residual": ("", "what the balance of momentum misses, relative"),
+    "energy_residual": ("", "what the balance of energy misses, relative"),
+}
+
+# Every key, in the order of an input file.
+KEYS = (
+    Key("", "case", "name", "text", "", "name of the case, also of its output directory", ()),
+    Key("", "ball", "outer_radius", "real", "m", "outer radius", (), 0.0, 10.0),
+    Key("", "ball", "wall_thickness", "real", "m", "wall thickness, less than the outer radius", (), 0.0, "outer_radius"),
+    Key("", "ball", "mass", "real", "kg", "mass", (), 0.0, 1000000.0),
+    Key("", "ball", "youngs_modulus", "real", "Pa", "modulus of elasticity", (), 0.0, 10000000000000.0),
+    Key("", "ball", "poisson_ratio", "real", "", "Poisson's ratio", (), -1.0, 0.5),
+    Key("", "ball", "gauge_pressure", "real", "Pa", "overpressure of the gas in the undeformed ball", (), 0.0, 100000000.0),
+    Key("", "ball", "ambient_pressure", "real", "Pa", "pressure of the air around the ball", (), 0.0, 100000000.0),
+    Key("", "ball", "heat_capacity_ratio", "real", "", "ratio of specific heats of the enclosed gas", (), 1.0, 2.0),
+    Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0),
+    Key("modes", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0),
+    Key("modes", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0),
+    Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 0.0, 1000000.0),
+    Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 0.0, 1000.0),
+    Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley')),
+    Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
+    Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic whose modes oscillate", (), 2.0, 200.0),
+    Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "modes of each harmonic that oscillate", (), 1.0, 20.0),
+    Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility counts", (), 4.0, 400.0),
+    Key("modal_ball", "modal_ball", "rings", "whole", "", "rings of the lower half of the surface", (), 2.0, "static_harmonics/2"),
+    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising')),
+    Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
+    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a rising loss factor", (), 0.1, 100000.0),
+    Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume", ()),
+    Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics"),
+    Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0),
+    Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),
+    Key("finite_element", "finite_element", "flight_after", "real", "s", "free flight after the last contact", (), 0.0, 10.0),
+    Key("finite_element", "finite_element", "step_safety", "real", "", "part of the limit of stability that a step uses", (), 0.01, 0.98),
+    Key("finite_element", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0),
+    Key("finite_element", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0),
+    Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
+    Key("finite_element", "material", "mooney_share", "real", "", "part of the shear modulus with the second invariant, of mooney_rivlin", (), 0.0, 1.0),
+    Key("finite_element", "material", "bulk_ratio", "real", "", "most bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
+    Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'constant_loss', 'prony')),
+    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
+    Key("finite_element", "material", "loss_frequency", "real", "Hz", "where the ball's modulus is the storage modulus", (), 1.0, 10000.0),
+    Key("finite_element", "material", "prony_share", "list", "", "moduli over the long-term modulus, of prony", (), 0.0, 1000.0),
+    Key("finite_element", "material", "prony_time", "list", "s", "relaxation times, of prony", (), 0.0, 1000.0),
+    Key("finite_element", "contact", "treatment", "choice", "", "how the floor holds the ball", ('penalty', 'impulse')),
+    Key("finite_element", "contact", "penalty_ratio", "real", "", "stiffness of the penalty over that of the elements above it, per area", (), 0.01, 100.0),
+    Key("finite_element", "output", "snapshot_interval", "real", "s", "time between snapshots of the deformed ball; 0: none", (), 0.0, 10.0),
+    Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
+    Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),
+    Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 0.0, 1000000.0),
+    Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball", ()),
+    Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "stiffness, N/m^exponent; 0: from contact_time", (), 0.0, 1000000000000000.0),
+    Key("hunt_crossley", "hunt_crossley", "contact_time", "real", "s", "wanted contact time; 0: from stiffness", (), 0.0, 10.0),
+    Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection", (), 1.0, 5.0),
+    Key("hunt_crossley", "hunt_crossley", "damping", "real", "s/m", "damping alpha; 0: from restitution", (), 0.0, 100.0),
+    Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "wanted coefficient of restitution; 0: from damping", (), 0.0, 1.0),
+    Key("", "sampling", "sample_rate", "real", "Hz", "samples per second", (), 2000.0, 10000000.0),
+    Key("", "sampling", "duration", "real", "s", "length of the record from first touch", (), 0.001, 10.0),
+    Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0),
+    Key("", "levels", "method", "choice", "", "method of the levels", ('exact', 'fft')),
+    Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
+    Key("", "levels", "force", "choice", "", "force that the verdict is on", ('elastic', 'floor')),
+    Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
+)

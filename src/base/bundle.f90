@@ -1,0 +1,200 @@
+!> Results by name: texts, numbers and arrays of any count, for callers that learn from the bundle itself what
+!> it holds.
+module thud_bundle
+   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
+   use thud_error, only: error_type
+   use thud_kinds, only: int64, wp
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: bundle_type, leave, take
+
+   !> Numbers of one item.
+   type :: item_type
+      !> They, in Fortran's order: [n].
+      real(wp), allocatable :: values(:)
+   end type item_type
+
+   !> Texts and arrays, each with its name.
+   type :: bundle_type
+      private
+      !> A line for each: name, tab, then the extents of an array with commas between (none for a single number), or
+      !> `t` and the length of a text.
+      character(len=:), allocatable, public :: header
+      !> All texts, one after the other.
+      character(len=:), allocatable, public :: text
+      !> All arrays, the first `n_item` hold.
+      type(item_type), allocatable :: items(:)
+      !> Number of arrays.
+      integer :: n_item = 0
+   contains
+      procedure :: add_text
+      procedure :: add_number
+      procedure :: add_array
+      procedure :: count_values
+      procedure :: copy_values
+   end type bundle_type
+
+   !> Ends a name in the header, and a line of it.
+   character(len=*), parameter :: tab = achar(9), line_feed = achar(10)
+
+contains
+
+   !> Adds a text.
+   subroutine add_text(self, name, text)
+      !> The bundle.
+      class(bundle_type), intent(inout) :: self
+      !> Name of the text.
+      character(len=*), intent(in) :: name
+      !> The text.
+      character(len=*), intent(in) :: text
+
+      call add_line(self, name, 't'//to_text(len(text)))
+      if (.not. allocated(self%text)) self%text = ''
+      self%text = self%text//text
+   end subroutine add_text
+
+   !> Adds a number.
+   subroutine add_number(self, name, value)
+      !> The bundle.
+      class(bundle_type), intent(inout) :: self
+      !> Name of the number.
+      character(len=*), intent(in) :: name
+      !> The number.
+      real(wp), intent(in) :: value
+
+      call add_line(self, name, '')
+      call add_item(self, 1, [value])
+   end subroutine add_number
+
+   !> Adds an array of any rank.
+   subroutine add_array(self, name, extents, values)
+      !> The bundle.
+      class(bundle_type), intent(inout) :: self
+      !> Name of the array.
+      character(len=*), intent(in) :: name
+      !> Its extents: [rank].
+      integer, intent(in) :: extents(:)
+      !> Its elements.
+      real(wp), intent(in) :: values(*)
+      character(len=:), allocatable :: form
+      integer :: i
+
+      form = ''
+      do i = 1, size(extents)
+         form = form//to_text(extents(i))//','
+      end do
+      call add_line(self, name, form)
+      call add_item(self, product(extents), values)
+   end subroutine add_array
+
+   !> Adds a line to the header.
+   subroutine add_line(self, name, form)
+      !> The bundle.
+      type(bundle_type), intent(inout) :: self
+      !> Name of the item.
+      character(len=*), intent(in) :: name
+      !> What it is.
+      character(len=*), intent(in) :: form
+
+      if (.not. allocated(self%header)) self%header = ''
+      self%header = self%header//trim(name)//tab//form//line_feed
+   end subroutine add_line
+
+   !> Adds an array.
+   subroutine add_item(self, n, values)
+      !> The bundle.
+      type(bundle_type), intent(inout) :: self
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> The elements.
+      real(wp), intent(in) :: values(n)
+      type(item_type), allocatable :: more(:)
+      integer :: i
+
+      if (.not. allocated(self%items)) allocate (self%items(16))
+      if (self%n_item == size(self%items)) then
+         allocate (more(2*self%n_item))
+         do i = 1, self%n_item
+            call move_alloc(self%items(i)%values, more(i)%values)
+         end do
+         call move_alloc(more, self%items)
+      end if
+      self%n_item = self%n_item + 1
+      self%items(self%n_item)%values = values
+   end subroutine add_item
+
+   !> Number of all numbers.
+   pure function count_values(self) result(n)
+      !> The bundle.
+      class(bundle_type), intent(in) :: self
+      !> Their number.
+      integer :: n
+      integer :: i
+
+      n = 0
+      do i = 1, self%n_item
+         n = n + size(self%items(i)%values)
+      end do
+   end function count_values
+
+   !> All numbers in the order of the header.
+   pure subroutine copy_values(self, values)
+      !> The bundle.
+      class(bundle_type), intent(in) :: self
+      !> The numbers: [count_values].
+      real(wp), intent(out) :: values(:)
+      integer :: i, at
+
+      at = 0
+      do i = 1, self%n_item
+         associate (item => self%items(i)%values)
+            values(at + 1:at + size(item)) = item
+            at = at + size(item)
+         end associate
+      end do
+   end subroutine copy_values
+
+   !> Leaves a bundle to be collected, of an error its sentence alone.
+   subroutine leave(bundle, error, status, handle, n_byte, n_value)
+      !> The bundle.
+      type(bundle_type), pointer, intent(inout) :: bundle
+      !> What went wrong.
+      type(error_type), allocatable, intent(in) :: error
+      !> Code of the error, or 0.
+      integer, intent(out) :: status
+      !> Handle of the bundle.
+      integer(int64), intent(out) :: handle
+      !> Size of its header and its texts.
+      integer, intent(out) :: n_byte
+      !> Number of its numbers, at least 1: f2py knows no empty arrays.
+      integer, intent(out) :: n_value
+
+      status = 0
+      if (allocated(error)) then
+         deallocate (bundle)
+         allocate (bundle)
+         status = error%code
+         call bundle%add_text('message', error%message)
+      end if
+      if (.not. allocated(bundle%header)) bundle%header = ''
+      if (.not. allocated(bundle%text)) bundle%text = ''
+      handle = transfer(c_loc(bundle), handle)
+      n_byte = len(bundle%header) + 1 + len(bundle%text)
+      n_value = max(1, bundle%count_values())
+   end subroutine leave
+
+   !> The bundle behind a handle; who takes it frees it.
+   subroutine take(handle, bundle)
+      !> Handle of a bundle that was left and not yet taken.
+      integer(int64), intent(in) :: handle
+      !> The bundle.
+      type(bundle_type), pointer, intent(out) :: bundle
+      type(c_ptr) :: address
+
+      address = transfer(int(handle, c_intptr_t), c_null_ptr)
+      call c_f_pointer(address, bundle)
+   end subroutine take
+
+end module thud_bundle

@@ -1,0 +1,178 @@
+!> Allowed ranges as intervals: `(0, 10]`, or `(0, outer_radius)` where an end depends on other keys. Such an
+!> end is a product or quotient of numbers and keys of the same group.
+module thud_interval
+   use thud_kinds, only: wp
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: evaluate, expression_length, get_range_text, interval_type, new_interval, to_end_text
+
+   !> Length of an end that is an expression.
+   integer, parameter :: expression_length = 32
+
+   !> An interval of real numbers.
+   type :: interval_type
+      !> Lower end.
+      real(wp) :: lower = -huge(1.0_wp)
+      !> Upper end.
+      real(wp) :: upper = huge(1.0_wp)
+      !> The lower end does not belong to it.
+      logical :: lower_open = .false.
+      !> The upper end does not belong to it.
+      logical :: upper_open = .false.
+      !> The lower end in terms of other keys; blank where it is a number.
+      character(len=expression_length) :: lower_expression = ''
+      !> The upper end in terms of other keys; blank where it is a number.
+      character(len=expression_length) :: upper_expression = ''
+   contains
+      procedure :: contains => contains_value
+      procedure :: resolve
+   end type interval_type
+
+contains
+
+   !> Interval of a text.
+   pure function new_interval(text) result(interval)
+      !> The ends between brackets, round ones where an end is left out; blank for all numbers.
+      character(len=*), intent(in) :: text
+      !> The interval.
+      type(interval_type) :: interval
+      integer :: comma, last
+
+      last = len_trim(text)
+      if (last == 0) return
+      comma = index(text, ',')
+      interval%lower_open = text(1:1) == '('
+      interval%upper_open = text(last:last) == ')'
+      call read_end(text(2:comma - 1), interval%lower, interval%lower_expression)
+      call read_end(text(comma + 1:last - 1), interval%upper, interval%upper_expression)
+   end function new_interval
+
+   !> One end of an interval.
+   pure subroutine read_end(text, number, expression)
+      !> The end as written.
+      character(len=*), intent(in) :: text
+      !> Its value where it is a number.
+      real(wp), intent(inout) :: number
+      !> What it is otherwise.
+      character(len=expression_length), intent(out) :: expression
+
+      expression = ''
+      if (is_number(adjustl(text))) then
+         read (text, *) number
+      else
+         expression = adjustl(text)
+      end if
+   end subroutine read_end
+
+   !> Whether a text begins as numbers do.
+   pure function is_number(text) result(yes)
+      !> The text, without blanks before it.
+      character(len=*), intent(in) :: text
+      !> It does.
+      logical :: yes
+
+      yes = scan(text(1:1), '0123456789+-.') == 1
+   end function is_number
+
+   !> Sets the ends that depend on other keys.
+   pure subroutine resolve(self, keys, values)
+      !> The interval.
+      class(interval_type), intent(inout) :: self
+      !> Names of the keys: [n_key].
+      character(len=*), intent(in) :: keys(:)
+      !> Their values: [n_key].
+      real(wp), intent(in) :: values(:)
+
+      if (self%lower_expression /= '') self%lower = evaluate(self%lower_expression, keys, values)
+      if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
+   end subroutine resolve
+
+   !> Value of a product or quotient of numbers and keys; not within any range where a key is unknown.
+   pure function evaluate(expression, keys, values) result(value)
+      !> Such as `static_harmonics/2`.
+      character(len=*), intent(in) :: expression
+      !> Names of the keys: [n_key].
+      character(len=*), intent(in) :: keys(:)
+      !> Their values: [n_key].
+      real(wp), intent(in) :: values(:)
+      !> The value.
+      real(wp) :: value
+      real(wp) :: operand
+      integer :: start, length, place
+      character(len=1) :: operator
+
+      value = 1.0_wp
+      operator = '*'
+      start = 1
+      do
+         length = scan(expression(start:)//'*', '*/') - 1
+         associate (word => expression(start:start + length - 1))
+            place = findloc(keys == word, .true., dim=1)
+            if (place > 0) then
+               operand = values(place)
+            else
+               read (word, *) operand
+            end if
+         end associate
+         if (operator == '*') value = value*operand
+         if (operator == '/') value = value/operand
+         start = start + length + 1
+         if (start > len(expression)) exit
+         operator = expression(start - 1:start - 1)
+      end do
+   end function evaluate
+
+   !> Whether a value lies in the interval; NaN never does.
+   elemental function contains_value(self, value) result(inside)
+      !> The interval, its ends resolved.
+      class(interval_type), intent(in) :: self
+      !> The value.
+      real(wp), intent(in) :: value
+      !> It does.
+      logical :: inside
+
+      inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
+         .and. (value < self%upper .or. (.not. self%upper_open .and. value <= self%upper))
+   end function contains_value
+
+   !> The interval around the name of a key: `0 < outer_radius <= 10`.
+   subroutine get_range_text(interval, name, text)
+      !> The interval.
+      type(interval_type), intent(in) :: interval
+      !> Name of the key.
+      character(len=*), intent(in) :: name
+      !> The range.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: lower, upper
+
+      call to_end_text(interval%lower, interval%lower_expression, lower)
+      call to_end_text(interval%upper, interval%upper_expression, upper)
+      text = lower//' '//trim(merge('< ', '<=', interval%lower_open))//' '//name//' ' &
+         //trim(merge('< ', '<=', interval%upper_open))//' '//upper
+   end subroutine get_range_text
+
+   !> One end as text: an expression with its value, where it is known.
+   subroutine to_end_text(number, expression, text)
+      !> Its value.
+      real(wp), intent(in) :: number
+      !> The expression; blank where the end is a number.
+      character(len=*), intent(in) :: expression
+      !> The text.
+      character(len=:), allocatable, intent(out) :: text
+
+      text = to_text(number)
+      ! Whole ends need no decimals.
+      if (len(text) > 2) then
+         if (text(len(text) - 1:) == '.0') text = text(:len(text) - 2)
+      end if
+      if (expression == '') return
+      if (abs(number) < huge(number)) then
+         text = trim(expression)//' = '//text
+      else
+         text = trim(expression)
+      end if
+   end subroutine to_end_text
+
+end module thud_interval

@@ -1,0 +1,148 @@
+!> What a case comes to: free modes, the force history of its model, levels and verdict. No file is known here.
+module thud_compute
+   use thud_band, only: band_type, get_level_bands, octave_count
+   use thud_case, only: case_type, get_model_number
+   use thud_error, only: error_type
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_force_history, only: force_count, force_history_type, force_names
+   use thud_free_modes, only: free_modes_type, get_free_modes
+   use thud_kinds, only: wp
+   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
+      get_source_limits, source_limits_type
+   implicit none (type, external)
+   private
+
+   public :: compute_case, get_judged_force, get_loss_factors, is_conforming, judge_case, results_type
+   public :: verdict_type
+
+   !> Levels and criteria of an impact.
+   type :: verdict_type
+      !> Bands of the levels, the octaves first: [n_band].
+      type(band_type), allocatable :: bands(:)
+      !> Number of the first band that the case asks for.
+      integer :: first_band = 1
+      !> Levels, dB: [n_band, force_count].
+      real(wp), allocatable :: level(:, :)
+      !> Criteria, the octaves first: [criterion_count, force_count].
+      type(criterion_type) :: criteria(criterion_count, force_count)
+   end type verdict_type
+
+   !> What a case gives.
+   type :: results_type
+      !> The force, where an impact is asked for.
+      type(force_history_type) :: history
+      !> Its levels and verdict.
+      type(verdict_type) :: verdict
+      !> Free modes, where they are asked for.
+      type(free_modes_type) :: modes
+   end type results_type
+
+contains
+
+   !> Computes what a case asks for, but for levels and verdict.
+   subroutine compute_case(case, results, error)
+      !> The case, checked.
+      type(case_type), intent(in) :: case
+      !> The results.
+      type(results_type), intent(out) :: results
+      !> A computation failed.
+      type(error_type), allocatable, intent(out) :: error
+
+      if (case%has_modes) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, results%modes, error)
+      if (allocated(error) .or. .not. case%has_impact) return
+      associate (model => case%models(get_model_number(case))%model)
+         call model%solve(case%ball, case%drop, case%sampling, results%history, error)
+      end associate
+   end subroutine compute_case
+
+   !> Loss factor of the material of a case against frequency.
+   subroutine get_loss_factors(case, frequency, loss_factor, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      !> Loss factors: [n].
+      real(wp), intent(out) :: loss_factor(:)
+      !> The model has no material, or it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (model => case%models(get_model_number(case))%model)
+         call model%get_loss_factors(case%ball, frequency, loss_factor, error)
+      end associate
+   end subroutine get_loss_factors
+
+   !> Levels and criteria of the force history of a case.
+   subroutine judge_case(case, history, verdict, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its force history.
+      type(force_history_type), intent(in) :: history
+      !> Levels and criteria of both forces.
+      type(verdict_type), intent(out) :: verdict
+      !> A level cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+
+      call get_level_bands(case%bands, verdict%bands, verdict%first_band)
+      allocate (verdict%level(size(verdict%bands), force_count))
+      call judge_force(case, history, history%elastic_force, verdict%bands, verdict%level(:, 1), verdict%criteria(:, 1), &
+         error)
+      if (allocated(error)) return
+      ! Of most models both are the same.
+      if (any(abs(history%floor_force - history%elastic_force) > 0.0_wp)) then
+         call judge_force(case, history, history%floor_force, verdict%bands, verdict%level(:, 2), verdict%criteria(:, 2), &
+            error)
+      else
+         verdict%level(:, 2) = verdict%level(:, 1)
+         verdict%criteria(:, 2) = verdict%criteria(:, 1)
+      end if
+   end subroutine judge_case
+
+   !> Levels and criteria of one force.
+   subroutine judge_force(case, history, force, bands, level, criteria, error)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its force history.
+      type(force_history_type), intent(in) :: history
+      !> The force, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> The bands, octaves first: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      !> Levels, dB: [n_band].
+      real(wp), intent(out) :: level(:)
+      !> The criteria: [criterion_count].
+      type(criterion_type), intent(out) :: criteria(:)
+      !> A level cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(source_limits_type) :: limits
+
+      call get_source_limits(case%source, limits, error)
+      if (allocated(error)) return
+      call get_force_exposure_levels(force, history%sample_rate, bands, trim(case%level_method), level, error)
+      if (allocated(error)) return
+      criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
+         get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
+   end subroutine judge_force
+
+   !> Number of the force that the verdict is on.
+   pure function get_judged_force(case) result(number)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its place in `force_names`.
+      integer :: number
+
+      number = findloc(force_names == case%level_force, .true., dim=1)
+   end function get_judged_force
+
+   !> Whether the source of a case conforms.
+   pure function is_conforming(case, verdict) result(yes)
+      !> The case.
+      type(case_type), intent(in) :: case
+      !> Its verdict.
+      type(verdict_type), intent(in) :: verdict
+      !> All criteria of the judged force are met.
+      logical :: yes
+
+      yes = all(conforms(verdict%criteria(:, get_judged_force(case))))
+   end function is_conforming
+
+end module thud_compute

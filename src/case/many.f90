@@ -1,0 +1,336 @@
+!> Many drops of a case that differ in the values of some keys: outcomes, levels and verdicts of each.
+!>
+!> Drops of the shell model are computed in batches (`thud_ensemble`), all others one by one; threads share
+!> them. No number of a drop depends on the threads, on the other drops or on its place among them.
+module thud_many
+   use thud_band, only: band_type, get_level_bands, octave_count
+   use thud_case, only: case_type, check_case, get_active_fields, get_model_number
+   use thud_compute, only: compute_case, judge_case, results_type, verdict_type
+   use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, key_length, list_type
+   use thud_force_history, only: force_count, get_scalars, outcome_count
+   use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
+   use thud_kinds, only: wp
+   use thud_power, only: not_a_number
+   use thud_sampling, only: get_sample_count
+   use thud_set_status, only: set_is_fine
+   use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
+   use thud_source_limits, only: conforms
+   use thud_text, only: join_quoted, quoted
+   implicit none (type, external)
+   private
+
+   public :: column_type, find_columns, many_type, new_many, solve_many
+
+   !> What drops may not differ in: names, and what a run writes.
+   character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: 'case', 'model', 'modes', 'output']
+
+   !> About the time that one drop takes in a batch, s.
+   real(wp), parameter :: batch_cost = 1.5e-5_wp
+
+   !> A key in whose values drops differ.
+   type :: column_type
+      !> Its place among the keys that the case uses.
+      integer :: place = 0
+      !> Which entry of a list; 0 for keys that are no lists.
+      integer :: entry = 0
+   end type column_type
+
+   !> Why a drop has no results.
+   type :: reason_type
+      !> A sentence; not allocated where it has results.
+      character(len=:), allocatable :: text
+   end type reason_type
+
+   !> Results of many drops: NaN and not conforming where there are none.
+   type :: many_type
+      !> Bands of the levels, octaves first: [n_band].
+      type(band_type), allocatable :: bands(:)
+      !> Number of the first band that the case asks for.
+      integer :: first_band = 1
+      !> About the time that one drop takes on one core, s.
+      real(wp) :: cost = 0.0_wp
+      !> Levels and verdicts are wanted.
+      logical :: judged = .true.
+      !> Matrices of the levels, kept from call to call.
+      type(projections_type) :: projections
+      !> 0, or the code of the error: [n_drop].
+      integer, allocatable :: status(:)
+      !> Sentences of the errors: [n_drop].
+      type(reason_type), allocatable :: reason(:)
+      !> The first of `scalar_fields`: [outcome_count, n_drop].
+      real(wp), allocatable :: outcome(:, :)
+      !> Levels, dB: [n_band, force_count, n_drop].
+      real(wp), allocatable :: level(:, :, :)
+      !> The source conforms by each force: [force_count, n_drop].
+      logical, allocatable :: conforms(:, :)
+      !> Forces, N, of no size where they are not wanted: [n_sample, force_count, n_drop].
+      real(wp), allocatable :: force(:, :, :)
+   end type many_type
+
+contains
+
+   !> Keys by their names, entries of lists as `frequency(2)`.
+   subroutine find_columns(case, names, columns, error)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> The names: [n_column].
+      character(len=*), intent(in) :: names(:)
+      !> The keys: [n_column].
+      type(column_type), allocatable, intent(out) :: columns(:)
+      !> A name is unknown, given twice, or no entry of its list.
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type), allocatable :: fields(:)
+      type(list_type), pointer :: list
+      logical, allocatable :: possible(:)
+      integer :: i, j, bracket, status
+
+      allocate (fields, source=get_active_fields(case))
+      possible = [(.not. any(common_groups == fields(i)%group), i=1, size(fields))]
+      allocate (columns(size(names)))
+      do i = 1, size(names)
+         bracket = index(names(i)//'(', '(')
+         columns(i)%place = findloc(possible .and. fields%key == names(i)(:bracket - 1), .true., dim=1)
+         status = 0
+         if (bracket < len_trim(names(i))) read (names(i)(bracket + 1:len_trim(names(i)) - 1), *, iostat=status) &
+            columns(i)%entry
+         if (columns(i)%place > 0) then
+            list => fields(columns(i)%place)%list_value
+            if (associated(list)) then
+               if (columns(i)%entry < 1 .or. columns(i)%entry > list%count) columns(i)%place = 0
+            else if (columns(i)%entry /= 0) then
+               columns(i)%place = 0
+            end if
+         end if
+         if (columns(i)%place == 0 .or. status /= 0) then
+            error = input_error(quoted(names(i))//' is not a known key; allowed: '//join_quoted(pack(fields%key, possible)))
+         else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
+            error = input_error(quoted(names(i))//' is given twice; allowed: once')
+         end if
+         if (allocated(error)) return
+      end do
+   end subroutine find_columns
+
+   !> Prepares for many drops of a case.
+   subroutine new_many(case, judged, many)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> Levels and verdicts are wanted.
+      logical, intent(in) :: judged
+      !> What is kept from an earlier call serves again where it fits.
+      type(many_type), intent(inout) :: many
+      type(projections_type) :: wanted
+
+      call get_level_bands(case%bands, many%bands, many%first_band)
+      many%judged = judged
+      many%cost = case%models(get_model_number(case))%model%get_cost()
+      if (suits_batch(case, [column_type ::])) many%cost = batch_cost
+      wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
+      if (.not. are_alike(wanted, many%projections)) many%projections = wanted
+   end subroutine new_many
+
+   !> Computes drops.
+   subroutine solve_many(case, columns, values, threads, forces, many, error)
+      !> The case, checked.
+      type(case_type), intent(in), target :: case
+      !> In what the drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Their values, as `get_number` of the keys gives them: [n_column, n_drop].
+      real(wp), intent(in) :: values(:, :)
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Forces are wanted too.
+      logical, intent(in) :: forces
+      !> The results.
+      type(many_type), intent(inout) :: many
+      !> There is no room in memory.
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: left(:)
+      integer :: n_drop, i
+
+      n_drop = size(values, 2)
+      call set_size(many, n_drop, merge(get_sample_count(case%sampling), 0, forces))
+      left = [(i, i=1, n_drop)]
+      if (suits_batch(case, columns)) then
+         call solve_batch(case, columns, values, threads, many, error)
+         if (allocated(error)) return
+         ! The single solver has the sentences.
+         left = pack(left, many%status /= 0)
+      end if
+      !$omp parallel num_threads(threads) if (size(left) > 1)
+      call solve_singly()
+      !$omp end parallel
+
+   contains
+
+      !> The drops of one thread, one after the other.
+      subroutine solve_singly()
+         type(case_type), target :: own
+         type(field_type), allocatable :: fields(:)
+         integer :: drop
+
+         own = case
+         allocate (fields, source=get_active_fields(own))
+         !$omp do schedule(dynamic)
+         do drop = 1, size(left)
+            call solve_one(own, fields, columns, values(:, left(drop)), left(drop), many)
+         end do
+         !$omp end do
+      end subroutine solve_singly
+
+   end subroutine solve_many
+
+   !> Space for the results of a number of drops.
+   subroutine set_size(many, n_drop, n_sample)
+      !> The results.
+      type(many_type), intent(inout) :: many
+      !> Number of drops.
+      integer, intent(in) :: n_drop
+      !> Samples of the forces that are wanted.
+      integer, intent(in) :: n_sample
+
+      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms)
+      if (allocated(many%outcome)) deallocate (many%outcome, many%level, many%force)
+      allocate (many%status(n_drop), many%reason(n_drop), many%outcome(outcome_count, n_drop), &
+         many%level(size(many%bands), force_count, n_drop), many%conforms(force_count, n_drop), &
+         many%force(n_sample, force_count, merge(n_drop, 0, n_sample > 0)))
+      many%conforms = .false.
+   end subroutine set_size
+
+   !> One drop by the single solver.
+   subroutine solve_one(case, fields, columns, values, drop, many)
+      !> The case; the keys of the columns are overwritten.
+      type(case_type), intent(inout), target :: case
+      !> Its keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> In what drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Values of this one: [n_column].
+      real(wp), intent(in) :: values(:)
+      !> Number of the drop.
+      integer, intent(in) :: drop
+      !> Gets its results.
+      type(many_type), intent(inout) :: many
+      type(results_type) :: results
+      type(error_type), allocatable :: error
+      real(wp), allocatable :: scalars(:)
+      integer :: i
+
+      do i = 1, size(columns)
+         if (.not. allocated(error)) call fields(columns(i)%place)%set_number(values(i), columns(i)%entry, error)
+      end do
+      if (.not. allocated(error)) call check_case(case, error)
+      if (.not. allocated(error)) call compute_case(case, results, error)
+      if (many%judged .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
+      many%status(drop) = 0
+      many%outcome(:, drop) = not_a_number
+      many%level(:, :, drop) = not_a_number
+      if (size(many%force) > 0) many%force(:, :, drop) = not_a_number
+      if (allocated(error)) then
+         many%status(drop) = error%code
+         many%reason(drop)%text = error%message
+         return
+      end if
+      scalars = get_scalars(results%history)
+      many%outcome(:, drop) = scalars(:outcome_count)
+      if (size(many%force) > 0) then
+         many%force(:, 1, drop) = results%history%elastic_force
+         many%force(:, 2, drop) = results%history%floor_force
+      end if
+      if (.not. many%judged) return
+      many%level(:, :, drop) = results%verdict%level
+      many%conforms(:, drop) = all(conforms(results%verdict%criteria), dim=1)
+   end subroutine solve_one
+
+   !> Whether drops can be computed in batches: by the shell model, with exact levels, if they differ in nothing
+   !> but ball, drop and the options of the model.
+   function suits_batch(case, columns) result(suits)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> In what the drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> They can.
+      logical :: suits
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      suits = .false.
+      select type (model => case%models(get_model_number(case))%model)
+      type is (hollow_sphere_type)
+         allocate (fields, source=get_active_fields(case))
+         fields = fields(columns%place)
+         suits = case%level_method == 'exact' .and. all([(fields(i)%group == 'ball' .or. fields(i)%group == 'drop' &
+            .or. fields(i)%owner == case%model, i=1, size(fields))])
+      end select
+   end function suits_batch
+
+   !> Drops of the shell model in batches.
+   subroutine solve_batch(case, columns, values, threads, many, error)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> In what the drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Their values: [n_column, n_drop].
+      real(wp), intent(in) :: values(:, :)
+      !> Number of threads.
+      integer, intent(in) :: threads
+      !> Gets the results.
+      type(many_type), intent(inout) :: many
+      !> There is no room in memory.
+      type(error_type), allocatable, intent(out) :: error
+      type(set_type), allocatable :: sets(:)
+      type(set_outcome_type), allocatable :: outcomes(:)
+      integer :: i
+
+      allocate (sets(size(values, 2)), outcomes(size(values, 2)))
+      call fill_sets(case, columns, values, sets)
+      call solve_ensemble(sets, case%sampling, trim(case%source), threads, many%judged, many%projections, outcomes, &
+         many%level, many%conforms, many%force, error)
+      do i = 1, size(sets)
+         associate (found => outcomes(i))
+            many%status(i) = merge(0, 1, found%status == set_is_fine)
+            many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_floor_force, found%max_deflection, &
+               found%restitution, found%impulse]
+         end associate
+      end do
+   end subroutine solve_batch
+
+   !> Parameter sets of the shell model.
+   subroutine fill_sets(case, columns, values, sets)
+      !> The case, which gives what is not in the columns.
+      type(case_type), intent(in), target :: case
+      !> In what the drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Their values: [n_column, n_drop].
+      real(wp), intent(in) :: values(:, :)
+      !> The sets: [n_drop].
+      type(set_type), intent(out) :: sets(:)
+      type(set_type), target :: set
+      type(field_type), allocatable :: fields(:), set_fields(:)
+      integer :: place(size(columns))
+      integer :: i, j
+
+      set%ball = case%ball
+      set%drop = case%drop
+      allocate (fields, source=get_active_fields(case))
+      allocate (set_fields, source=get_set_fields(set))
+      ! What is not a number of ball or drop is the choice of the flux term.
+      place = [(findloc(set_fields%key == fields(columns(j)%place)%key, .true., dim=1), j=1, size(columns))]
+      select type (model => case%models(get_model_number(case))%model)
+      type is (hollow_sphere_type)
+         set%flux = findloc(flux_choices == model%momentum_flux, .true., dim=1)
+      end select
+      do i = 1, size(sets)
+         do j = 1, size(columns)
+            if (place(j) > 0) then
+               set_fields(place(j))%real_value = values(j, i)
+            else
+               set%flux = nint(values(j, i))
+            end if
+         end do
+         sets(i) = set
+      end do
+   end subroutine fill_sets
+
+end module thud_many

@@ -1,0 +1,228 @@
+!> Cases as namelist files: reading, writing, and the description of all keys.
+module thud_case_text
+   use thud_case, only: case_type, check_case, get_active_fields, get_fields, new_case
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, name_length
+   use thud_namelist_text, only: group_type, parse_groups
+   use thud_text, only: join_quoted, newline, quoted, to_text
+   implicit none (type, external)
+   private
+
+   public :: describe_keys, get_case_text, read_case
+
+   !> Groups that a file must hold for an impact, and for free modes.
+   character(len=24), parameter :: impact_groups(3) = [character(len=24) :: 'ball', 'drop', 'model']
+   character(len=24), parameter :: modes_groups(2) = [character(len=24) :: 'ball', 'modes']
+
+contains
+
+   !> Case from the text of a namelist file, complete and inside all ranges.
+   subroutine read_case(text, default_name, case, error)
+      !> Text of the file.
+      character(len=*), intent(in) :: text
+      !> Name of the case where the text gives none.
+      character(len=*), intent(in) :: default_name
+      !> The case.
+      type(case_type), target, intent(out) :: case
+      !> What is wrong, with group, key, value and allowed range.
+      type(error_type), allocatable, intent(out) :: error
+      type(group_type), allocatable :: groups(:)
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      call new_case(case)
+      if (len(default_name) <= name_length) case%name = default_name
+      call parse_groups(text, groups, error)
+      if (allocated(error)) return
+      allocate (fields, source=get_fields(case))
+      case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
+      case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
+      if (case%has_impact) then
+         call check_groups(groups, fields, impact_groups, error)
+      else
+         call check_groups(groups, fields, modes_groups, error)
+      end if
+      do i = 1, size(groups)
+         if (allocated(error)) return
+         call assign_group(groups(i), fields, error)
+      end do
+      if (allocated(error)) return
+      call check_use(groups, case, error)
+      if (.not. allocated(error)) call check_case(case, error)
+   end subroutine read_case
+
+   !> Refuses groups that do nothing.
+   subroutine check_use(groups, case, error)
+      !> Groups of the file: [n_group].
+      type(group_type), intent(in) :: groups(:)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> Names the group and its line.
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      allocate (fields, source=get_active_fields(case))
+      do i = 1, size(groups)
+         if (any(fields%group == groups(i)%name)) cycle
+         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing ')
+         if (case%has_impact) then
+            error%message = error%message//'with &model: name = '//quoted(case%model)//'; allowed: &'//trim(case%model)
+         else
+            error%message = error%message//'with &modes alone; allowed: '//join_quoted(distinct(fields%group))
+         end if
+         return
+      end do
+   end subroutine check_use
+
+   !> Refuses groups that are missing, unknown or given twice.
+   subroutine check_groups(groups, fields, required_groups, error)
+      !> Groups of the file: [n_group].
+      type(group_type), intent(in) :: groups(:)
+      !> Known keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> Groups that have to be there: [n].
+      character(len=*), intent(in) :: required_groups(:)
+      !> What is wrong.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i, j
+
+      do i = 1, size(groups)
+         if (.not. any(fields%group == groups(i)%name)) then
+            error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
+               //' is not a known group; allowed: '//join_quoted(distinct(fields%group)))
+            return
+         end if
+         do j = 1, i - 1
+            if (groups(j)%name /= groups(i)%name) cycle
+            error = input_error('&'//groups(i)%name//' is given twice, in line '//to_text(groups(j)%line) &
+               //' and in line '//to_text(groups(i)%line)//'; allowed: once')
+            return
+         end do
+      end do
+      do i = 1, size(required_groups)
+         if (any([(groups(j)%name == required_groups(i), j=1, size(groups))])) cycle
+         error = input_error('&'//trim(required_groups(i))//' is missing; allowed: files with the groups ' &
+            //join_quoted(required_groups))
+         return
+      end do
+   end subroutine check_groups
+
+   !> Sets the variables of one group.
+   subroutine assign_group(group, fields, error)
+      !> The group.
+      type(group_type), intent(in) :: group
+      !> Known keys: [n_field].
+      type(field_type), intent(in) :: fields(:)
+      !> A key is unknown or given twice, or its value has the wrong type.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: allowed
+      logical :: is_meant(size(fields))
+      integer :: i, j
+
+      do i = 1, size(group%assignments)
+         associate (given => group%assignments(i))
+            is_meant = fields%group == group%name .and. fields%key == given%key
+            if (.not. any(is_meant)) then
+               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+                  //' is not a known key; allowed: '//join_quoted(distinct(pack(fields%key, fields%group == group%name))))
+            else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then
+               error = input_error('&'//group%name//': '//given%key//' is given a second time in line ' &
+                  //to_text(given%line)//'; allowed: once')
+            else if (given%value == '') then
+               call fields(findloc(is_meant, .true., dim=1))%get_allowed(allowed)
+               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+                  //' has no value; allowed: '//allowed)
+            else
+               ! A key of two owners sets both.
+               do j = 1, size(fields)
+                  if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(given%value, error)
+               end do
+            end if
+         end associate
+         if (allocated(error)) return
+      end do
+   end subroutine assign_group
+
+   !> Each text once, in order.
+   pure function distinct(texts) result(once)
+      !> The texts: [n].
+      character(len=*), intent(in) :: texts(:)
+      !> The texts without repetition.
+      character(len=len(texts)), allocatable :: once(:)
+      logical :: first(size(texts))
+      integer :: i
+
+      do i = 1, size(texts)
+         first(i) = .not. any(texts(:i - 1) == texts(i))
+      end do
+      once = pack(texts, first)
+   end function distinct
+
+   !> Each key once, in order.
+   subroutine drop_repeated(fields)
+      !> The keys: [n_field].
+      type(field_type), allocatable, intent(inout) :: fields(:)
+      logical :: first(size(fields))
+      integer :: i
+
+      do i = 1, size(fields)
+         first(i) = .not. any(fields(:i - 1)%group == fields(i)%group .and. fields(:i - 1)%key == fields(i)%key)
+      end do
+      fields = pack(fields, first)
+   end subroutine drop_repeated
+
+   !> The complete input as a namelist file; reading it gives the same case.
+   subroutine get_case_text(case, text)
+      !> The case.
+      type(case_type), intent(in), target :: case
+      !> Text of the file.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: value
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      allocate (fields, source=get_active_fields(case))
+      call drop_repeated(fields)
+      text = '! thud: the full input of case '//trim(case%name)//', SI units'//newline
+      do i = 1, size(fields)
+         if (.not. any(fields(:i - 1)%group == fields(i)%group)) text = text//newline//'&'//trim(fields(i)%group)//newline
+         call fields(i)%get_text(value)
+         text = text//'   '//fields(i)%key//' = '//value
+         if (fields(i)%unit /= '') text = text//' ! '//trim(fields(i)%unit)
+         text = text//newline
+         if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//'/'//newline
+      end do
+   end subroutine get_case_text
+
+   !> Every key with its default, allowed range and meaning, as a commented namelist file. Groups
+   !> that the default model does not use stand behind `!`.
+   subroutine describe_keys(text)
+      !> The description; a valid input file.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: allowed, mark, value
+      type(case_type), target :: case
+      type(field_type), allocatable :: fields(:), active(:)
+      integer :: i
+
+      call new_case(case)
+      case%name = 'my_case'
+      allocate (fields, source=get_fields(case))
+      call drop_repeated(fields)
+      allocate (active, source=get_active_fields(case))
+      text = '! Every key of an input file with its default value. SI units.'//newline
+      do i = 1, size(fields)
+         mark = ''
+         if (.not. any(active%group == fields(i)%group)) mark = '! '
+         call fields(i)%get_allowed(allowed)
+         call fields(i)%get_text(value)
+         if (.not. any(fields(:i - 1)%group == fields(i)%group)) then
+            text = text//newline//mark//'&'//trim(fields(i)%group)//newline
+         end if
+         text = text//mark//'   ! '//trim(fields(i)%meaning)//'; allowed: '//allowed//newline &
+            //mark//'   '//trim(fields(i)%key)//' = '//value//newline
+         if (.not. any(fields(i + 1:)%group == fields(i)%group)) text = text//mark//'/'//newline
+      end do
+   end subroutine describe_keys
+
+end module thud_case_text

@@ -1,0 +1,129 @@
+!> Keys, models and results as data for other programs, in JSON: what the Python package and the reference of
+!> all keys are made from.
+module thud_schema
+   use thud_band, only: band_set_names
+   use thud_case, only: case_type, get_fields, new_case
+   use thud_constants, only: version
+   use thud_field, only: field_type
+   use thud_force_history, only: scalar_fields
+   use thud_interval, only: interval_type, new_interval
+   use thud_kinds, only: wp
+   use thud_registry, only: model_names
+   use thud_source_limits, only: source_names
+   use thud_text, only: newline, to_text
+   implicit none (type, external)
+   private
+
+   public :: get_schema
+
+contains
+
+   !> The schema.
+   subroutine get_schema(text)
+      !> One JSON object.
+      character(len=:), allocatable, intent(out) :: text
+      type(case_type), target :: case
+      type(field_type), allocatable :: fields(:)
+      character(len=:), allocatable :: entry
+      integer :: i
+
+      call new_case(case)
+      allocate (fields, source=get_fields(case))
+      text = '{"version": '//text_value(version)//','//newline//'"models": '//list_of(model_names)//','//newline &
+         //'"sources": '//list_of(source_names)//','//newline//'"band_sets": '//list_of(band_set_names)//','//newline &
+         //'"scalars": ['
+      do i = 1, size(scalar_fields)
+         associate (field => scalar_fields(i))
+            text = text//newline//'{"name": '//text_value(field%name)//', "unit": '//text_value(field%unit) &
+               //', "meaning": '//text_value(field%meaning)//'}'//trim(merge(',', ' ', i < size(scalar_fields)))
+         end associate
+      end do
+      text = text//'],'//newline//'"keys": ['
+      do i = 1, size(fields)
+         call describe(fields(i), entry)
+         text = text//newline//entry//trim(merge(',', ' ', i < size(fields)))
+      end do
+      text = text//']}'
+   end subroutine get_schema
+
+   !> One key.
+   subroutine describe(field, text)
+      !> The key.
+      type(field_type), intent(in) :: field
+      !> A JSON object.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: value
+      type(interval_type) :: interval
+
+      call field%get_text(value)
+      select case (field%get_kind())
+      case ('flag')
+         value = trim(merge('true ', 'false', value == '.true.'))
+      case ('list')
+         value = '['//value//']'
+      case ('choice', 'text')
+         value = text_value(field%text_value)
+      case default
+         continue
+      end select
+      text = '{"owner": '//text_value(field%owner)//', "group": '//text_value(field%group)//', "name": ' &
+         //text_value(field%key)//', "kind": '//text_value(field%get_kind())//', "unit": '//text_value(field%unit) &
+         //', "default": '//value//', "choices": '//list_of(field%choices(:field%n_choice))//', "meaning": ' &
+         //text_value(field%meaning)
+      if (field%range /= '') then
+         interval = new_interval(field%range)
+         text = text//', "lower": '//end_value(interval%lower, interval%lower_expression)//', "upper": ' &
+            //end_value(interval%upper, interval%upper_expression)//', "lower_open": ' &
+            //trim(merge('true ', 'false', interval%lower_open))//', "upper_open": ' &
+            //trim(merge('true ', 'false', interval%upper_open))//', "whole": ' &
+            //trim(merge('true ', 'false', field%whole_entries .or. field%get_kind() == 'whole'))
+      end if
+      text = text//'}'
+   end subroutine describe
+
+   !> One end of a range: a number, or an expression in quotes.
+   function end_value(number, expression) result(value)
+      !> The number.
+      real(wp), intent(in) :: number
+      !> The expression, blank where the end is a number.
+      character(len=*), intent(in) :: expression
+      !> A JSON value.
+      character(len=:), allocatable :: value
+
+      value = to_text(number)
+      if (expression /= '') value = text_value(expression)
+   end function end_value
+
+   !> Text as a JSON value.
+   pure function text_value(text) result(value)
+      !> The text; blanks behind it are dropped.
+      character(len=*), intent(in) :: text
+      !> It in quotes.
+      character(len=:), allocatable :: value
+      integer :: i
+
+      value = '"'
+      do i = 1, len_trim(text)
+         if (scan(text(i:i), '"\') == 1) value = value//'\'
+         value = value//text(i:i)
+      end do
+      value = value//'"'
+   end function text_value
+
+   !> Words as a JSON list.
+   pure function list_of(words) result(list)
+      !> The words: [n_word].
+      character(len=*), intent(in) :: words(:)
+      !> The list.
+      character(len=:), allocatable :: list
+      integer :: i
+
+      list = '['
+      do i = 1, size(words)
+         if (i > 1) list = list//', '
+         list = list//text_value(words(i))
+      end do
+      list = list//']'
+   end function list_of
+
+end module thud_schema

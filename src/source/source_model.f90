@@ -1,0 +1,113 @@
+!> What every source model is: options that stand in namelist groups, and the force of one drop.
+!>
+!> A model is a module `thud_<name>` with a type `<name>_type` that extends this one; the list of names in
+!> src/CMakeLists.txt makes it known. Its options stand in the group of its name unless it says otherwise.
+module thud_source_model
+   use thud_ball, only: ball_type
+   use thud_drop, only: drop_type
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_sampling, only: sampling_type
+   implicit none (type, external)
+   private
+
+   public :: source_model_type
+
+   !> A source model with its options as components.
+   type, abstract :: source_model_type
+   contains
+      procedure(get_fields), deferred, pass(options) :: get_fields
+      procedure(solve), deferred, pass(options) :: solve
+      procedure, pass(options) :: check
+      procedure, pass(options) :: get_snapshot_shape
+      procedure, pass(options) :: get_cost
+      procedure, pass(options) :: get_loss_factors
+   end type source_model_type
+
+   abstract interface
+      !> Keys of the options.
+      function get_fields(options) result(fields)
+         import :: field_type, source_model_type
+         implicit none (type, external)
+         !> The options that the fields read and set.
+         class(source_model_type), intent(in), target :: options
+         !> The keys: [n_field].
+         type(field_type), allocatable :: fields(:)
+      end function get_fields
+
+      !> Force history of one drop.
+      subroutine solve(ball, drop, options, sampling, history, error)
+         import :: ball_type, drop_type, error_type, force_history_type, sampling_type, source_model_type
+         implicit none (type, external)
+         !> The ball.
+         type(ball_type), intent(in) :: ball
+         !> The drop.
+         type(drop_type), intent(in) :: drop
+         !> The options, checked.
+         class(source_model_type), intent(in) :: options
+         !> Sampling rate, length of the record, substeps.
+         type(sampling_type), intent(in) :: sampling
+         !> Force and motion.
+         type(force_history_type), intent(out) :: history
+         !> The drop leads out of the model, the contact outlasts the record, or the steps are too coarse.
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine solve
+   end interface
+
+contains
+
+   !> Refuses options that do not fit each other, the ball or the sampling; by default all fit.
+   subroutine check(ball, options, sampling, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The options, each inside its own range.
+      class(source_model_type), intent(in) :: options
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> Names group, key, value and what is allowed.
+      type(error_type), allocatable, intent(out) :: error
+
+   end subroutine check
+
+   !> Size of the snapshots of the deformed ball; by default there are none.
+   function get_snapshot_shape(options, sampling) result(extents)
+      !> The options.
+      class(source_model_type), intent(in) :: options
+      !> The sampling.
+      type(sampling_type), intent(in) :: sampling
+      !> Nodes from pole to pole, nodes through the wall, snapshots.
+      integer :: extents(3)
+
+      extents = 0
+   end function get_snapshot_shape
+
+   !> About the time that one drop takes on one core, s.
+   function get_cost(options) result(cost)
+      !> The options.
+      class(source_model_type), intent(in) :: options
+      !> The time, s.
+      real(wp) :: cost
+
+      cost = 1.0e-3_wp
+   end function get_cost
+
+   !> Loss factor of the material against frequency, of models that have a material; others refuse.
+   subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> The options.
+      class(source_model_type), intent(in) :: options
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      !> Loss factors: [n].
+      real(wp), intent(out) :: loss_factor(:)
+      !> The model has no material, or it cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+
+      loss_factor = 0.0_wp
+      error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
+   end subroutine get_loss_factors
+
+end module thud_source_model
