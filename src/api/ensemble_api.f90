@@ -1,7 +1,7 @@
 !> The flat API for Python to ensembles; see `thud_api`.
 module thud_ensemble_api
    use thud_ball, only: ball_type
-   use thud_band, only: band_type, get_thirds
+   use thud_band, only: band_type, get_bands
    use thud_drop, only: drop_type
    use thud_shell_sets, only: get_set_fields, parameter_count, set_outcome_type, set_type
    use thud_ensemble, only: new_projections, projections_type, solve_ensemble, verdict_type
@@ -159,9 +159,9 @@ contains
       !> Bands besides the octaves.
       integer, intent(in) :: n_more
       type(projections_type) :: wanted
-      type(band_type) :: thirds(15)
+      type(band_type), allocatable :: thirds(:)
 
-      thirds = get_thirds()
+      thirds = get_bands('third')
       wanted = new_projections(sampling%sample_rate, thirds(:n_more), get_sample_count(sampling))
       if (allocated(projections%window)) then
          if (abs(wanted%sample_rate - projections%sample_rate) <= 0.0_wp &

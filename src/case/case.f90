@@ -1,6 +1,7 @@
 !> A case: everything that one run needs, as the namelist file gives it.
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
+   use thud_band, only: band_choices
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
@@ -71,8 +72,7 @@ contains
          get_model_fields(case%options), &
          get_sampling_fields(case%sampling), &
          choice_field('levels', 'method', case%level_method, 'method of the levels', level_methods), &
-         choice_field('levels', 'bands', case%bands, 'bands of levels.csv', &
-         [character(len=8) :: 'octave', 'third', 'both']), &
+         choice_field('levels', 'bands', case%bands, 'bands of levels.csv', band_choices), &
          choice_field('levels', 'force', case%level_force, 'force that the verdict is on', &
          [character(len=8) :: 'elastic', 'floor']), &
          choice_field('limits', 'source', case%source, 'source whose limits apply', source_names)]

@@ -1,6 +1,6 @@
 !> Results as text: the files of a run.
 module thud_report
-   use thud_band, only: band_type
+   use thud_band, only: band_type, octave_set
    use thud_case, only: case_type
    use thud_constants, only: version
    use thud_force_history, only: force_history_type
@@ -93,20 +93,18 @@ contains
       character(len=*), intent(in) :: judged_level
       !> Text of `levels.csv`.
       character(len=:), allocatable :: text
-      logical :: octave
       integer :: i, j
 
       text = 'bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,elastic_level_dB,floor_level_dB,' &
          //'lower_limit_dB,upper_limit_dB,verdict_'//judged_level//newline
       do i = 1, size(bands)
-         octave = bands(i)%upper > 1.5_wp*bands(i)%lower
-         text = text//trim(merge('octave', 'third ', octave))
+         text = text//trim(bands(i)%set)
          associate (numbers => [bands(i)%nominal, bands(i)%lower, bands(i)%upper, elastic_level(i), floor_level(i)])
             do j = 1, size(numbers)
                text = text//','//to_text(numbers(j))
             end do
          end associate
-         if (octave) then
+         if (bands(i)%set == octave_set) then
             text = text//','//to_text(criteria(i)%lower)//','//to_text(criteria(i)%upper)//','//verdict(criteria(i))
          else
             text = text//',,,no limit'

@@ -1,6 +1,6 @@
 !> One run from end to end: case, source model, force history, levels, verdict, files.
 module thud_run
-   use thud_band, only: band_type, get_octaves, get_thirds, octave_count
+   use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, get_case_text, read_case
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
@@ -188,12 +188,10 @@ contains
       end if
       if (.not. case%has_impact) return
       associate (history => results%history)
-         call judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
+         call judge_case(case, history, bands, first, elastic_level, floor_level, criteria, error)
          if (allocated(error)) return
          outcome%conforms = all(conforms(criteria))
          outcome%table = outcome%table//newline//get_table(case, history, elastic_level, floor_level, criteria)
-         ! The octaves come first and serve the verdict also where only thirds are asked for.
-         first = merge(octave_count, 0, case%bands == 'third') + 1
          files(at + 1:at + size(file_names))%name = file_names
          files(at + 1)%content = get_force_csv(history)
          files(at + 2)%content = get_levels_csv(bands(first:), elastic_level(first:), floor_level(first:), criteria, &
@@ -270,13 +268,15 @@ contains
    end subroutine load_case
 
    !> Levels and criteria of a force history.
-   subroutine judge_case(case, history, bands, elastic_level, floor_level, criteria, error)
+   subroutine judge_case(case, history, bands, first, elastic_level, floor_level, criteria, error)
       !> The case.
       type(case_type), intent(in) :: case
       !> Its force history.
       type(force_history_type), intent(in) :: history
       !> The bands, octaves first: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
+      !> Number of the first band that is asked for.
+      integer, intent(out) :: first
       !> Levels of the elastic force, dB: [n_band].
       real(wp), allocatable, intent(out) :: elastic_level(:)
       !> Levels of the force on the floor, dB: [n_band].
@@ -289,8 +289,7 @@ contains
       real(wp) :: levels(octave_count)
       integer :: n_peak
 
-      bands = get_octaves()
-      if (case%bands /= 'octave') bands = [get_octaves(), get_thirds()]
+      call get_level_bands(case%bands, bands, first)
       allocate (elastic_level(size(bands)), floor_level(size(bands)))
       call get_force_exposure_levels(history%elastic_force, history%sample_rate, bands, trim(case%level_method), &
          elastic_level, error)

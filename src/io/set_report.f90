@@ -1,6 +1,6 @@
 !> Results of many sets as rows of a table.
 module thud_set_report
-   use thud_band, only: band_type
+   use thud_band, only: band_type, get_band_name
    use thud_shell_sets, only: get_set_fields, parameter_count, set_outcome_type, set_type
    use thud_ensemble, only: force_count, verdict_type
    use thud_field, only: field_type
@@ -12,7 +12,7 @@ module thud_set_report
    implicit none (type, external)
    private
 
-   public :: get_band_name, get_set_header, get_set_reason, get_set_rows
+   public :: get_set_header, get_set_reason, get_set_rows
 
    !> Columns behind the parameters.
    character(len=*), parameter :: outcome_names = 'contact_time_s,peak_force_N,peak_floor_force_N,max_deflection_m,' &
@@ -40,9 +40,7 @@ contains
       text = text//','//outcome_names
       do j = 1, force_count
          do i = 1, size(bands)
-            text = text//','//trim(force_names(j)) &
-               //trim(merge('_octave_', '_third_ ', bands(i)%upper > 1.5_wp*bands(i)%lower)) &
-               //get_band_name(bands(i))//'_Hz_dB'
+            text = text//','//trim(force_names(j))//'_'//trim(bands(i)%set)//'_'//get_band_name(bands(i))//'_Hz_dB'
          end do
       end do
       do j = 1, force_count
@@ -122,16 +120,6 @@ contains
       fields = get_set_fields(set)
       text = get_status_text(status, fields(max(1, min(parameter_count, status - set_range)))%key)
    end function get_set_reason
-
-   !> Nominal frequency of a band: 31.5, 63.
-   pure function get_band_name(band) result(name)
-      !> The band.
-      type(band_type), intent(in) :: band
-      !> Its name.
-      character(len=len(fixed(band%nominal, merge(1, 0, band%nominal < 32)))) :: name
-
-      name = fixed(band%nominal, merge(1, 0, band%nominal < 32))
-   end function get_band_name
 
    !> A verdict in a table.
    pure function get_word(conforms) result(word)

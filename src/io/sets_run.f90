@@ -1,7 +1,7 @@
 !> A run of many sets of the shell model from end to end: case and table in, one row of results per set out, a
 !> chunk at a time, so that the memory does not grow with the table.
 module thud_sets_run
-   use thud_band, only: band_type, get_octaves, get_thirds, octave_count
+   use thud_band, only: band_type, get_band_name, get_level_bands, get_octaves, octave_count
    use thud_case, only: case_type, get_case_text
    use thud_constants, only: version
    use thud_shell_sets, only: set_outcome_type, set_type
@@ -15,7 +15,7 @@ module thud_sets_run
    use thud_progress, only: report_progress
    use thud_run, only: load_case, outcome_type
    use thud_sampling, only: get_sample_count
-   use thud_set_report, only: get_band_name, get_set_header, get_set_reason, get_set_rows
+   use thud_set_report, only: get_set_header, get_set_reason, get_set_rows
    use thud_set_status, only: set_is_fine
    use thud_set_table, only: open_set_table, read_sets, set_table_type
    use thud_text, only: fixed, newline, quoted, to_text
@@ -153,23 +153,20 @@ contains
       type(verdict_type), allocatable :: verdicts(:)
       real(wp), allocatable :: levels(:, :, :), no_forces(:, :, :)
       type(projections_type) :: projections
-      type(band_type), allocatable :: more(:)
+      type(band_type), allocatable :: bands(:)
       type(text_file_type) :: parts(threads)
       character(len=:), allocatable :: text
       integer :: unit, n, first_band, first, last, i
 
       base = set_type(case%ball, case%drop, &
          findloc(flux_choices == case%options%hollow_sphere%momentum_flux, .true., dim=1))
-      allocate (more(0))
-      if (case%bands /= 'octave') more = get_thirds()
-      ! The octaves come first and serve the verdict also where only thirds are asked for.
-      first_band = merge(octave_count, 0, case%bands == 'third') + 1
-      projections = new_projections(case%sampling%sample_rate, more, get_sample_count(case%sampling))
+      call get_level_bands(case%bands, bands, first_band)
+      projections = new_projections(case%sampling%sample_rate, bands(octave_count + 1:), get_sample_count(case%sampling))
       allocate (sets(chunk_size), outcomes(chunk_size), verdicts(chunk_size), no_forces(0, 0, 0))
-      allocate (levels(octave_count + size(more), force_count, chunk_size))
+      allocate (levels(size(bands), force_count, chunk_size))
       call open_part(directory, result_file, unit, error)
       if (allocated(error)) return
-      call get_set_header(table, projections%bands(first_band:), text)
+      call get_set_header(table, bands(first_band:), text)
       call write_part(directory, result_file, unit, text, error)
       do while (.not. allocated(error))
          call read_sets(table, base, sets, n, error)

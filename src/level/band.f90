@@ -1,19 +1,44 @@
 !> Fractional-octave bands of base 10 (IEC 61260-1) in the range of heavy impacts.
 module thud_band
+   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
+   use thud_text, only: fixed, join_quoted, quoted
    implicit none (type, external)
    private
 
-   public :: band_type, get_octaves, get_thirds, octave_count, third_count
+   public :: band_choices, band_set_names, band_type, find_bands, get_band_name, get_bands, get_level_bands, get_octaves
+   public :: octave_count, octave_set
 
-   !> Octaves from 31.5 to 500 Hz.
-   integer, parameter :: octave_count = 5
+   !> Adjacent bands of one width.
+   type :: band_set_type
+      !> Name of the set.
+      character(len=24) :: name
+      !> Width in tenths of a decade: 3 for octaves, 1 for third octaves.
+      integer :: width
+      !> Mid frequency of the lowest band: its distance from 1 kHz in tenths of a decade.
+      integer :: first
+      !> Mid frequency of the highest band, likewise.
+      integer :: last
+   end type band_set_type
 
-   !> Third octaves from 25 to 630 Hz.
-   integer, parameter :: third_count = 15
+   !> All sets; verdicts use the first, the octaves from 31.5 to 500 Hz.
+   type(band_set_type), parameter :: sets(*) = [ &
+      band_set_type('octave', width=3, first=-15, last=-3), &
+      band_set_type('third', width=1, first=-16, last=-2)]
+
+   !> Names of all sets: [n_set].
+   character(len=24), parameter :: band_set_names(*) = sets%name
+
+   !> The set that verdicts use.
+   character(len=24), parameter :: octave_set = band_set_names(1)
+
+   !> What a case can ask for: one set, or `both` for all: [n_set + 1].
+   character(len=24), parameter :: band_choices(*) = [band_set_names, [character(len=24) :: 'both']]
 
    !> One band.
    type :: band_type
+      !> Name of its set.
+      character(len=24) :: set = ''
       !> Name of the band, its rounded mid frequency, Hz.
       real(wp) :: nominal = 0.0_wp
       !> Exact mid frequency, Hz.
@@ -24,44 +49,87 @@ module thud_band
       real(wp) :: upper = 0.0_wp
    end type band_type
 
+   !> Rounded mid frequencies in a decade, the series R10 of ISO 3.
+   real(wp), parameter :: rounded(*) = [1.0_wp, 1.25_wp, 1.6_wp, 2.0_wp, 2.5_wp, 3.15_wp, 4.0_wp, 5.0_wp, 6.3_wp, 8.0_wp]
+
+   !> Numbers of a set and of a band in the table below.
+   integer :: i, k
+
+   !> Bands of all sets, with mid frequencies 1000 * 10^(k/10) Hz.
+   type(band_type), parameter :: all_bands(*) = [((band_type(sets(i)%name, &
+      rounded(1 + modulo(k, 10))*10.0_wp**(3 + (k - modulo(k, 10))/10), 1000*10**(k/10.0_wp), &
+      1000*10**((k - sets(i)%width/2.0_wp)/10), 1000*10**((k + sets(i)%width/2.0_wp)/10)), &
+      k=sets(i)%first, sets(i)%last, sets(i)%width), i=1, size(sets))]
+
+   !> Number of octaves.
+   integer, parameter :: octave_count = count(all_bands%set == octave_set)
+
 contains
 
-   !> Octaves: mid frequencies 1000 * 10^(3k/10) Hz.
+   !> The octaves that verdicts use.
    pure function get_octaves() result(bands)
-      !> Octaves 31.5 to 500 Hz, ascending: [5].
+      !> The bands, ascending: [octave_count].
       type(band_type) :: bands(octave_count)
-      real(wp), parameter :: nominal(octave_count) = [31.5_wp, 63.0_wp, 125.0_wp, 250.0_wp, 500.0_wp]
-      integer :: k
 
-      bands = [(new_band(nominal(k + 6), 3*k, 3), k = -5, -1)]
+      bands = get_bands(octave_set)
    end function get_octaves
 
-   !> Third octaves: mid frequencies 1000 * 10^(k/10) Hz.
-   pure function get_thirds() result(bands)
-      !> Thirds 25 to 630 Hz, ascending: [15].
-      type(band_type) :: bands(third_count)
-      real(wp), parameter :: nominal(third_count) = [25.0_wp, 31.5_wp, 40.0_wp, 50.0_wp, 63.0_wp, 80.0_wp, &
-         100.0_wp, 125.0_wp, 160.0_wp, 200.0_wp, 250.0_wp, 315.0_wp, 400.0_wp, 500.0_wp, 630.0_wp]
-      integer :: k
+   !> Bands of a set; none where there is no set of that name.
+   pure function get_bands(name) result(bands)
+      !> Name of the set.
+      character(len=*), intent(in) :: name
+      !> The bands, ascending: [n_band].
+      type(band_type), allocatable :: bands(:)
 
-      bands = [(new_band(nominal(k + 17), k, 1), k = -16, -2)]
-   end function get_thirds
+      bands = pack(all_bands, all_bands%set == name)
+   end function get_bands
 
-   !> Band around 1000 * 10^(tenths/10) Hz.
-   pure function new_band(nominal, tenths, width) result(band)
-      !> Rounded mid frequency, Hz.
-      real(wp), intent(in) :: nominal
-      !> Distance from 1 kHz in tenths of a decade.
-      integer, intent(in) :: tenths
-      !> Width in tenths of a decade: 3 for an octave, 1 for a third.
-      integer, intent(in) :: width
+   !> Bands of a set that must be known.
+   subroutine find_bands(name, bands, error)
+      !> Name of the set.
+      character(len=*), intent(in) :: name
+      !> The bands, ascending: [n_band].
+      type(band_type), allocatable, intent(out) :: bands(:)
+      !> There is no set of that name.
+      type(error_type), allocatable, intent(out) :: error
+
+      bands = get_bands(name)
+      if (size(bands) == 0) error = input_error('bands = '//quoted(name)//' is not known; allowed: ' &
+         //join_quoted(band_set_names))
+   end subroutine find_bands
+
+   !> Bands of the levels of a case: the octaves, which verdicts use, and what is asked for besides.
+   pure subroutine get_level_bands(choice, bands, first)
+      !> One of `band_choices`.
+      character(len=*), intent(in) :: choice
+      !> The bands, octaves first: [n_band].
+      type(band_type), allocatable, intent(out) :: bands(:)
+      !> Number of the first band that is asked for.
+      integer, intent(out) :: first
+
+      bands = [get_octaves(), pack(all_bands, all_bands%set /= octave_set &
+         .and. (all_bands%set == choice .or. choice == 'both'))]
+      first = merge(octave_count + 1, 1, any(choice == band_set_names(2:)))
+   end subroutine get_level_bands
+
+   !> Nominal frequency of a band as text: `31.5`, `63`.
+   pure function get_band_name(band) result(name)
       !> The band.
-      type(band_type) :: band
+      type(band_type), intent(in) :: band
+      !> Its name.
+      character(len=len(fixed(band%nominal, get_decimals(band)))) :: name
 
-      band%nominal = nominal
-      band%centre = 1000*10**(tenths/10.0_wp)
-      band%lower = 1000*10**((tenths - width/2.0_wp)/10)
-      band%upper = 1000*10**((tenths + width/2.0_wp)/10)
-   end function new_band
+      name = fixed(band%nominal, get_decimals(band))
+   end function get_band_name
+
+   !> Decimals of a nominal frequency.
+   pure function get_decimals(band) result(decimals)
+      !> The band.
+      type(band_type), intent(in) :: band
+      !> 0 or 1.
+      integer :: decimals
+
+      decimals = merge(1, 0, abs(band%nominal - nint(band%nominal)) > 0.01_wp)
+   end function get_decimals
 
 end module thud_band
