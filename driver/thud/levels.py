@@ -272,7 +272,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
 
 
 def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the smallest and largest conforming octave levels of a source, dB, shape (5,)."""
+    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
     count = len(get_bands(BANDWIDTHS[0]).nominal)
     octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
     return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])

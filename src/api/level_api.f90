@@ -180,9 +180,9 @@ contains
       character(len=8), intent(out) :: units(n_criterion)
       !> Values: [n_criterion].
       real(wp), intent(out) :: value(n_criterion)
-      !> Smallest conforming values: [n_criterion].
+      !> Minimum conforming values: [n_criterion].
       real(wp), intent(out) :: lower(n_criterion)
-      !> Largest conforming values: [n_criterion].
+      !> Maximum conforming values: [n_criterion].
       real(wp), intent(out) :: upper(n_criterion)
       !> 1 where the criterion is met, else 0: [n_criterion].
       integer, intent(out) :: met(n_criterion)

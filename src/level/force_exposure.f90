@@ -23,7 +23,7 @@ module thud_force_exposure
    !> `exact`: band energy of the record as it is; `fft`: sum over the 1 Hz bins of a 1 s record.
    character(len=24), parameter :: level_methods(2) = [character(len=24) :: 'exact', 'fft']
 
-   !> Most samples of a record: its transform still fits into memory and its length into an integer.
+   !> Maximum number of samples of a record: its transform still fits into memory and its length into an integer.
    integer, parameter :: max_samples = 100000000
 
    !> Sum of squares below which a record is taken for zero, N^2: its rounding would underflow.

@@ -24,13 +24,13 @@ module thud_source_limits
    !> end at 707 Hz.
    real(wp), parameter :: recorded_band = 1250.0_wp
 
-   !> Smallest and largest conforming values of one source.
+   !> Minimum and maximum conforming values of one source.
    type :: source_limits_type
       !> Name of the source.
       character(len=24) :: name
-      !> Smallest force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      !> Minimum force exposure levels of the octaves 31.5 to 500 Hz, dB.
       real(wp) :: lower_level(octave_count)
-      !> Largest force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      !> Maximum force exposure levels of the octaves 31.5 to 500 Hz, dB.
       real(wp) :: upper_level(octave_count)
       !> Contact time, s.
       real(wp) :: contact_time(2) = [18.0e-3_wp, 22.0e-3_wp]
@@ -67,9 +67,9 @@ module thud_source_limits
       character(len=8) :: unit = ''
       !> Value of the source under test.
       real(wp) :: value = 0.0_wp
-      !> Smallest conforming value.
+      !> Minimum conforming value.
       real(wp) :: lower = 0.0_wp
-      !> Largest conforming value.
+      !> Maximum conforming value.
       real(wp) :: upper = 0.0_wp
    end type criterion_type
 
@@ -151,7 +151,7 @@ contains
       character(len=*), intent(in) :: unit
       !> Value of the source under test.
       real(wp), intent(in) :: value
-      !> Smallest and largest conforming value: [2].
+      !> Minimum and maximum conforming value: [2].
       real(wp), intent(in) :: range(2)
       !> The criterion.
       type(criterion_type) :: criterion
