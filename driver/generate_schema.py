@@ -24,6 +24,9 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from thud.key import Key
+
+__all__ = [
+{names}]
 '''
 PAGE = """# Keys of an input file
 
@@ -91,7 +94,8 @@ def python_module(schema: Entry) -> str:
     keys = schema["keys"]
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
-    text = HEAD
+    names = sorted(map(class_name, [*groups, "modes", *schema["models"]]))
+    text = HEAD.replace("{names}", "".join(f'    "{name}",\n' for name in names))
     for group in groups:
         text += python_class(f"Group ``&{group}``.", [k for k in shared if k["group"] == group], group)
     text += python_class("Free modes that are asked for.", [k for k in keys if k["owner"] == "modes"], "modes")
@@ -111,7 +115,8 @@ def python_module(schema: Entry) -> str:
     text += "}\n\n# Every key, in the order of an input file.\nKEYS = (\n"
     for key in keys:
         ends = [float(key.get(end, 0)) if not isinstance(key.get(end, 0), str) else key[end] for end in ("lower", "upper")]
-        parts = [key["owner"], key["group"], key["name"], key["kind"], key["unit"], key["meaning"], tuple(key["choices"])]
+        parts = [key[part] for part in ("owner", "group", "name", "kind", "unit", "meaning")]
+        parts += [tuple(key["choices"])] if key["choices"] or "lower" in key else []
         parts += ends if "lower" in key else []
         text += f"    Key({', '.join(json.dumps(p) if isinstance(p, str) else repr(p) for p in parts)}),\n"
     return text + ")\n"

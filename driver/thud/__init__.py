@@ -12,19 +12,8 @@ import importlib
 from typing import Any
 
 from thud._api import version
-from thud._schema import (
-    Ball,
-    Drop,
-    FiniteElement,
-    HollowSphere,
-    HuntCrossley,
-    Levels,
-    Limits,
-    MeasuredModes,
-    ModalBall,
-    Modes,
-    Sampling,
-)
+from thud._schema import *  # noqa: F403 - the groups and models that the library declares
+from thud._schema import __all__ as _groups
 from thud.case import Case, read_case, write_case
 from thud.ensemble import Ensemble, solve_many
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
@@ -38,29 +27,19 @@ from thud.results import read_results
 __version__ = version()
 
 __all__ = [
-    "Ball",
+    *_groups,
     "Bands",
     "Case",
     "Conformity",
     "Criterion",
-    "Drop",
     "Ensemble",
-    "FiniteElement",
     "FitWarning",
     "FreeModes",
-    "HollowSphere",
-    "HuntCrossley",
     "Impact",
     "InputError",
-    "Levels",
-    "Limits",
-    "MeasuredModes",
-    "ModalBall",
-    "Modes",
     "Motion",
     "NumericalError",
     "Recording",
-    "Sampling",
     "ThudError",
     "force_exposure_levels",
     "free_modes",

@@ -11,6 +11,20 @@ from typing import ClassVar
 
 from thud.key import Key
 
+__all__ = [
+    "Ball",
+    "Drop",
+    "FiniteElement",
+    "HollowSphere",
+    "HuntCrossley",
+    "Levels",
+    "Limits",
+    "MeasuredModes",
+    "ModalBall",
+    "Modes",
+    "Sampling",
+]
+
 
 @dataclass(frozen=True)
 class Ball:
@@ -339,7 +353,7 @@ SCALARS = {
 
 # Every key, in the order of an input file.
 KEYS = (
-    Key("", "case", "name", "text", "", "name of the case, also of its output directory", ()),
+    Key("", "case", "name", "text", "", "name of the case, also of its output directory"),
     Key("", "ball", "outer_radius", "real", "m", "outer radius", (), 0.0, 10.0),
     Key("", "ball", "wall_thickness", "real", "m", "wall thickness, less than the outer radius", (), 0.0, "outer_radius"),
     Key("", "ball", "mass", "real", "kg", "mass", (), 0.0, 1000000.0),
@@ -362,7 +376,7 @@ KEYS = (
     Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
     Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a rising loss factor", (), 0.1, 100000.0),
-    Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume", ()),
+    Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics"),
     Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),
@@ -384,7 +398,7 @@ KEYS = (
     Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
     Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),
     Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 0.0, 1000000.0),
-    Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball", ()),
+    Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball"),
     Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "stiffness, N/m^exponent; 0: from contact_time", (), 0.0, 1000000000000000.0),
     Key("hunt_crossley", "hunt_crossley", "contact_time", "real", "s", "wanted contact time; 0: from stiffness", (), 0.0, 10.0),
     Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection", (), 1.0, 5.0),

@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call_direct as call, level_api, words
+from thud._api import call_direct, level_api, text
 from thud.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import ArrayLike, NDArray
 
-BANDWIDTHS = ("octave", "third")
+
+def _names(values: Iterable[bytes]) -> tuple[str, ...]:
+    """Return names from the library."""
+    return tuple(map(text, values))
+
+
+_N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()
+BANDWIDTHS, SOURCES = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
 _MAX_PEAKS = 2**31
 
 
 @dataclass(frozen=True)
 class Bands:
-    """Frequency bands of base 10 (IEC 61260-1), ascending.
+    """Frequency bands of base 10 (IEC 61260-1), ascending; the arrays are read-only.
 
     Attributes
     ----------
@@ -68,7 +78,7 @@ class Conformity:
     source : str
         Source whose limits apply.
     criteria : tuple of Criterion
-        Five octave levels, contact time, restitution, number of peaks, mass, drop height.
+        Octave levels, contact time, restitution, number of peaks, mass, drop height.
     """
 
     source: str
@@ -97,11 +107,20 @@ def get_bands(bands: str = "octave") -> Bands:
     InputError
         Where `bands` is something else.
     """
-    if not isinstance(bands, str) or bands not in BANDWIDTHS:
+    if not isinstance(bands, str):
         message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
         raise InputError(message)
-    n_band, *columns = level_api.get_bands(bands)
-    return Bands(*(column[:n_band].copy() for column in columns))
+    return _bands(bands)
+
+
+@cache
+def _bands(name: str) -> Bands:
+    """Return the bands of a set."""
+    (n_band,) = call_direct(level_api.count_bands, _word(name))
+    columns = level_api.get_bands(name, n_band)
+    for column in columns:
+        column.setflags(write=False)
+    return Bands(*columns)
 
 
 def force_exposure_levels(
@@ -139,7 +158,7 @@ def force_exposure_levels(
     count = len(get_bands(bands).nominal)
     record = _record(force)
     rate = _number("sample_rate", sample_rate)
-    (levels,) = call(level_api.force_exposure, record, rate, bands, _word(method), count)
+    (levels,) = call_direct(level_api.force_exposure, record, rate, bands, _word(method), count)
     result: NDArray[np.float64] = levels
     return result
 
@@ -172,12 +191,22 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
         Force, N, that starts and ends at zero; the part below 1.25 kHz counts.
     sample_rate : float
         Samples per second, Hz.
+
+    Raises
+    ------
+    InputError
+        Where the record is empty, not finite or not one-dimensional, or the rate is not positive.
     """
     record = _record(force)
-    if not np.isfinite(record).all():
-        message = "force holds a value that is not finite; allowed: real numbers, N"
+    if not record.size or not np.isfinite(record).all():
+        what = "holds a value that is not finite" if record.size else "has no samples"
+        message = f"force {what}; allowed: real numbers, N"
         raise InputError(message)
-    return int(level_api.count_peaks(record, _number("sample_rate", sample_rate)))
+    rate = _number("sample_rate", sample_rate)
+    if not 0 < rate < np.inf:
+        message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
+        raise InputError(message)
+    return int(level_api.count_peaks(record, rate))
 
 
 def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
@@ -214,8 +243,12 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
         Where the source is not known or `levels` does not hold five numbers.
     """
     octaves = _record(levels, "levels")
-    if octaves.shape != (5,):
-        message = f"levels have the shape {octaves.shape}; allowed: (5,), the octaves 31.5 to 500"
+    nominal = get_bands(BANDWIDTHS[0]).nominal
+    if octaves.shape != nominal.shape:
+        message = (
+            f"levels have the shape {octaves.shape}; allowed: {nominal.shape}, "
+            f"the octaves {nominal[0]:g} to {nominal[-1]:g}"
+        )
         raise InputError(message)
     if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
         message = f"peaks = {peaks!r} is not allowed; allowed: 0 <= peaks < {_MAX_PEAKS}, whole"
@@ -227,10 +260,11 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
         "drop_height": drop_height,
     }
     time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
-    names, units, value, lower, upper, met = call(
-        level_api.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height
-    )
-    rows = zip(words(names), words(units), value, lower, upper, met, strict=True)
+    names, units, value, lower, upper, met = call_direct(
+        level_api.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height,
+        _N_CRITERION,
+    )  # fmt: skip
+    rows = zip(_names(names), _names(units), value, lower, upper, met, strict=True)
     return Conformity(
         source,
         tuple(Criterion(n, u, float(v), float(a), float(b), bool(m)) for n, u, v, a, b, m in rows),
@@ -238,8 +272,9 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
 
 
 def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the smallest and largest conforming octave levels of a source, dB, shape (5,)."""
-    octaves = judge(np.zeros(5), 0, 0, 0, 0, 0, source).criteria[:5]
+    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
+    count = len(get_bands(BANDWIDTHS[0]).nominal)
+    octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
     return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
 
 

@@ -1,50 +1,95 @@
 !> The flat API for Python to levels and verdicts; see `thud_api`.
 module thud_level_api
-   use thud_band, only: band_type, get_bands_of => get_bands
+   use thud_band, only: band_set_names, band_type, find_bands, get_set_bands => get_bands
    use thud_error, only: error_type, get_status
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, recorded_band, source_limits_type
+      get_source_limits, recorded_band, source_limits_type, source_names
    use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
 
-   public :: count_peaks, force_exposure, get_bands, judge, record_force
+   public :: count_bands, count_names, count_peaks, force_exposure, get_bands, get_names, judge, record_force
 
 contains
 
-   !> Number of bands, edges and mid frequencies.
-   subroutine get_bands(bandwidth, n_band, nominal, centre, lower, upper)
+   !> Numbers of band sets, of sources and of criteria.
+   subroutine count_names(n_set, n_source, n_criterion)
       !f2py threadsafe
-      !> `octave` or `third`.
-      character(len=*), intent(in) :: bandwidth
-      !> Number of bands: 15 entries are always written, the first n_band hold.
-      integer, intent(out) :: n_band
-      !> Rounded mid frequencies, Hz: [15].
-      real(wp), intent(out) :: nominal(15)
-      !> Exact mid frequencies, Hz: [15].
-      real(wp), intent(out) :: centre(15)
-      !> Lower edges, Hz: [15].
-      real(wp), intent(out) :: lower(15)
-      !> Upper edges, Hz: [15].
-      real(wp), intent(out) :: upper(15)
-      type(band_type), allocatable :: bands(:)
+      !> Number of band sets.
+      integer, intent(out) :: n_set
+      !> Number of sources with limits.
+      integer, intent(out) :: n_source
+      !> Number of criteria of a verdict.
+      integer, intent(out) :: n_criterion
 
-      bands = get_bands_of(bandwidth)
+      n_set = size(band_set_names)
+      n_source = size(source_names)
+      n_criterion = criterion_count
+   end subroutine count_names
+
+   !> Names of band sets and sources.
+   subroutine get_names(n_set, n_source, sets, sources)
+      !f2py threadsafe
+      !> Number of band sets, from `count_names`, as the next.
+      integer, intent(in) :: n_set
+      !> Number of sources.
+      integer, intent(in) :: n_source
+      !> Band sets; verdicts use the first: [n_set].
+      character(len=24), intent(out) :: sets(n_set)
+      !> Sources with limits: [n_source].
+      character(len=24), intent(out) :: sources(n_source)
+
+      sets = band_set_names
+      sources = source_names
+   end subroutine get_names
+
+   !> Number of bands of a set.
+   subroutine count_bands(set, n_band, status, message)
+      !f2py threadsafe
+      !> Name of the set.
+      character(len=*), intent(in) :: set
+      !> Number of bands.
+      integer, intent(out) :: n_band
+      !> Code of the error, or 0.
+      integer, intent(out) :: status
+      !> Sentence of the error.
+      character(len=1024), intent(out) :: message
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
+
+      call find_bands(set, bands, error)
       n_band = size(bands)
-      nominal(:n_band) = bands%nominal
-      centre(:n_band) = bands%centre
-      lower(:n_band) = bands%lower
-      upper(:n_band) = bands%upper
-      nominal(n_band + 1:) = 0.0_wp
-      centre(n_band + 1:) = 0.0_wp
-      lower(n_band + 1:) = 0.0_wp
-      upper(n_band + 1:) = 0.0_wp
+      call get_status(error, status, message)
+   end subroutine count_bands
+
+   !> Bands of a set.
+   subroutine get_bands(set, n_band, nominal, centre, lower, upper)
+      !f2py threadsafe
+      !> Name of the set.
+      character(len=*), intent(in) :: set
+      !> Number of bands, from `count_bands`.
+      integer, intent(in) :: n_band
+      !> Rounded mid frequencies, Hz: [n_band].
+      real(wp), intent(out) :: nominal(n_band)
+      !> Exact mid frequencies, Hz: [n_band].
+      real(wp), intent(out) :: centre(n_band)
+      !> Lower edges, Hz: [n_band].
+      real(wp), intent(out) :: lower(n_band)
+      !> Upper edges, Hz: [n_band].
+      real(wp), intent(out) :: upper(n_band)
+      type(band_type) :: bands(n_band)
+
+      bands = get_set_bands(set)
+      nominal = bands%nominal
+      centre = bands%centre
+      lower = bands%lower
+      upper = bands%upper
    end subroutine get_bands
 
    !> Force exposure levels of any record.
-   subroutine force_exposure(force, n_sample, sample_rate, bandwidth, method, n_band, levels, status, message)
+   subroutine force_exposure(force, n_sample, sample_rate, set, method, n_band, levels, status, message)
       !f2py threadsafe
       !f2py integer, intent(hide), depend(force) :: n_sample = len(force)
       !> Number of samples.
@@ -53,11 +98,11 @@ contains
       real(wp), intent(in) :: force(n_sample)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> `octave` or `third`.
-      character(len=*), intent(in) :: bandwidth
+      !> Name of the band set.
+      character(len=*), intent(in) :: set
       !> `exact` or `fft`.
       character(len=*), intent(in) :: method
-      !> Number of bands: 5 octaves or 15 thirds.
+      !> Number of bands, from `count_bands`.
       integer, intent(in) :: n_band
       !> Levels, dB: [n_band].
       real(wp), intent(out) :: levels(n_band)
@@ -65,10 +110,12 @@ contains
       integer, intent(out) :: status
       !> Sentence of the error.
       character(len=1024), intent(out) :: message
+      type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
 
       levels = 0.0_wp
-      call get_force_exposure_levels(force, sample_rate, get_bands_of(bandwidth), method, levels, error)
+      call find_bands(set, bands, error)
+      if (.not. allocated(error)) call get_force_exposure_levels(force, sample_rate, bands, method, levels, error)
       call get_status(error, status, message)
    end subroutine force_exposure
 
@@ -105,13 +152,16 @@ contains
    end subroutine record_force
 
    !> Criteria of a source and which of them are met.
-   subroutine judge(source, levels, contact_time, restitution, n_peak, mass, drop_height, names, units, value, lower, &
-      upper, met, status, message)
+   subroutine judge(source, levels, n_octave, contact_time, restitution, n_peak, mass, drop_height, n_criterion, names, &
+      units, value, lower, upper, met, status, message)
       !f2py threadsafe
+      !f2py integer, intent(hide), depend(levels) :: n_octave = len(levels)
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
-      !> Octave levels 31.5 to 500 Hz, dB: [5].
-      real(wp), intent(in) :: levels(5)
+      !> Number of octaves.
+      integer, intent(in) :: n_octave
+      !> Octave levels, dB: [n_octave].
+      real(wp), intent(in) :: levels(n_octave)
       !> Contact time, s.
       real(wp), intent(in) :: contact_time
       !> Coefficient of restitution.
@@ -122,18 +172,20 @@ contains
       real(wp), intent(in) :: mass
       !> Height of drop, m.
       real(wp), intent(in) :: drop_height
-      !> Names of the criteria, with commas between.
-      character(len=512), intent(out) :: names
-      !> Units of the criteria, with commas between.
-      character(len=512), intent(out) :: units
-      !> Values: [10].
-      real(wp), intent(out) :: value(10)
-      !> Smallest conforming values: [10].
-      real(wp), intent(out) :: lower(10)
-      !> Largest conforming values: [10].
-      real(wp), intent(out) :: upper(10)
-      !> 1 where the criterion is met, else 0: [10].
-      integer, intent(out) :: met(10)
+      !> Number of criteria, from `count_names`.
+      integer, intent(in) :: n_criterion
+      !> Names of the criteria: [n_criterion].
+      character(len=24), intent(out) :: names(n_criterion)
+      !> Units of the criteria: [n_criterion].
+      character(len=8), intent(out) :: units(n_criterion)
+      !> Values: [n_criterion].
+      real(wp), intent(out) :: value(n_criterion)
+      !> Minimum conforming values: [n_criterion].
+      real(wp), intent(out) :: lower(n_criterion)
+      !> Maximum conforming values: [n_criterion].
+      real(wp), intent(out) :: upper(n_criterion)
+      !> 1 where the criterion is met, else 0: [n_criterion].
+      integer, intent(out) :: met(n_criterion)
       !> Code of the error, or 0.
       integer, intent(out) :: status
       !> Sentence of the error.
@@ -141,28 +193,17 @@ contains
       type(criterion_type) :: criteria(criterion_count)
       type(source_limits_type) :: limits
       type(error_type), allocatable :: error
-      integer :: i
 
-      names = ''
-      units = ''
-      value = 0.0_wp
-      lower = 0.0_wp
-      upper = 0.0_wp
-      met = 0
       call get_source_limits(source, limits, error)
-      call get_status(error, status, message)
-      if (status /= 0) return
-      criteria = get_criteria(limits, levels, contact_time, restitution, n_peak, mass, drop_height)
-      do i = 1, criterion_count
-         names = trim(names)//','//criteria(i)%name
-         units = trim(units)//','//criteria(i)%unit
-      end do
-      names = names(2:)
-      units = units(2:)
+      if (.not. allocated(error)) criteria = get_criteria(limits, levels, contact_time, restitution, n_peak, mass, &
+         drop_height)
+      names = criteria%name
+      units = criteria%unit
       value = criteria%value
       lower = criteria%lower
       upper = criteria%upper
       met = merge(1, 0, conforms(criteria))
+      call get_status(error, status, message)
    end subroutine judge
 
 end module thud_level_api

@@ -50,13 +50,14 @@ module thud_band
    end type band_type
 
    !> Rounded mid frequencies in a decade, the series R10 of ISO 3.
-   real(wp), parameter :: rounded(0:9) = [1.0_wp, 1.25_wp, 1.6_wp, 2.0_wp, 2.5_wp, 3.15_wp, 4.0_wp, 5.0_wp, 6.3_wp, 8.0_wp]
+   real(wp), parameter :: rounded(*) = [1.0_wp, 1.25_wp, 1.6_wp, 2.0_wp, 2.5_wp, 3.15_wp, 4.0_wp, 5.0_wp, 6.3_wp, 8.0_wp]
 
+   !> Numbers of a set and of a band in the table below.
    integer :: i, k
 
    !> Bands of all sets, with mid frequencies 1000 * 10^(k/10) Hz.
    type(band_type), parameter :: all_bands(*) = [((band_type(sets(i)%name, &
-      rounded(modulo(k, 10))*10.0_wp**(3 + (k - modulo(k, 10))/10), 1000*10**(k/10.0_wp), &
+      rounded(1 + modulo(k, 10))*10.0_wp**(3 + (k - modulo(k, 10))/10), 1000*10**(k/10.0_wp), &
       1000*10**((k - sets(i)%width/2.0_wp)/10), 1000*10**((k + sets(i)%width/2.0_wp)/10)), &
       k=sets(i)%first, sets(i)%last, sets(i)%width), i=1, size(sets))]
 

@@ -229,7 +229,7 @@ contains
       integer, intent(in) :: n_record
       !> The records, N: [n_record, n_sample].
       real(wp), intent(in) :: record(n_record, projection%n_sample)
-      !> Room for as much: [n_record, n_sample].
+      !> Workspace: [n_record, n_sample].
       real(wp), intent(inout) :: folded(n_record, projection%n_sample)
       !> Energies, N^2 s: [n_record, n_band].
       real(wp), intent(out) :: energy(n_record, size(projection%last_node))

@@ -1,5 +1,12 @@
 !> Force exposure level: the energy of a force in frequency bands, in dB
 !> (JIS A 1418-2, ISO 10140-5 annex F).
+!>
+!> The energy, 2 * integral of |F(f)|**2 df, is taken from the autocorrelation r of the record, without
+!> padding or window. With the angles m and h that the middle and the half width of the band turn
+!> through per sample it is 2/(pi f_s) * (h r(0) + 2 sum over the lags k of r(k) g(k) cos(m k) sin(h k)),
+!> g(k) = 1/k. For the sum over the bins of a zero-padded transform of N samples instead of the integral
+!> g(k) = d/sin(d k), d = pi/N, and the band reaches from half a bin below its first bin to half a bin
+!> above its last one.
 module thud_force_exposure
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_band, only: band_type
@@ -16,7 +23,7 @@ module thud_force_exposure
    !> `exact`: band energy of the record as it is; `fft`: sum over the 1 Hz bins of a 1 s record.
    character(len=24), parameter :: level_methods(2) = [character(len=24) :: 'exact', 'fft']
 
-   !> Most samples of a record: its transform still fits into memory and its length into an integer.
+   !> Maximum number of samples of a record: its transform still fits into memory and its length into an integer.
    integer, parameter :: max_samples = 100000000
 
    !> Sum of squares below which a record is taken for zero, N^2: its rounding would underflow.
@@ -52,19 +59,19 @@ contains
       last = findloc(abs(force) > 0.0_wp, .true., dim=1, back=.true.)
       select case (method)
       case ('exact')
-         energy = get_exact_energy(force(first:last), sample_rate, bands)
+         energy = get_energy(force(first:last), sample_rate, bands%lower, bands%upper, 0.0_wp)
       case ('fft')
          energy = get_bin_energy(force(first:last), sample_rate, bands)
       case default
          error = input_error('the level method '//quoted(method)//' is not known; allowed: '//join_quoted(level_methods))
          return
       end select
-      ! Rounding blurs a band by about this part of the whole energy: no less can be told apart.
+      ! Rounding blurs a band by about this part of the whole energy: no less can be resolved.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
    end subroutine get_force_exposure_levels
 
-   !> Complains about a record that has no levels.
+   !> Refuses a record that has no levels.
    subroutine check_record(force, sample_rate, bands, error)
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(:)
@@ -92,36 +99,6 @@ contains
       end if
    end subroutine check_record
 
-   !> Energy of a finite record between the band edges, 2 * integral of |F(f)|^2 df, N^2 s.
-   !>
-   !> F is the record's own Fourier transform; without padding or window the integral is a sum of
-   !> the autocorrelation, weighted with the transform of the band.
-   function get_exact_energy(force, sample_rate, bands) result(energy)
-      !> Force, N: [n_sample].
-      real(wp), intent(in) :: force(:)
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      !> The bands: [n_band].
-      type(band_type), intent(in) :: bands(:)
-      !> Energy of each band, N^2 s: [n_band].
-      real(wp) :: energy(size(bands))
-      real(wp) :: autocorrelation(size(force))
-      real(wp) :: middle, half_width, total
-      integer :: i, lag
-
-      call get_autocorrelation(force, autocorrelation)
-      do i = 1, size(bands)
-         ! Angles that the middle and the half width of the band turn through per sample.
-         middle = pi*(bands(i)%upper + bands(i)%lower)/sample_rate
-         half_width = pi*(bands(i)%upper - bands(i)%lower)/sample_rate
-         total = half_width*autocorrelation(1)
-         do lag = 1, size(force) - 1
-            total = total + 2*autocorrelation(lag + 1)*cos(middle*lag)*sin(half_width*lag)/lag
-         end do
-         energy(i) = 2*total/(pi*sample_rate)
-      end do
-   end function get_exact_energy
-
    !> Energy in the bins of a zero-padded transform between the band edges, N^2 s.
    !>
    !> The window is 1 s as in the paper (section 3), or the next whole number of seconds that
@@ -136,17 +113,107 @@ contains
       !> Energy of each band, N^2 s: [n_band].
       real(wp) :: energy(size(bands))
       real(wp), allocatable :: power(:)
-      real(wp) :: spacing_of_bins
+      real(wp) :: spacing
+      integer, dimension(size(bands)) :: first, last
       integer :: length, i
 
       length = nint(sample_rate)*ceiling(real(size(force), wp)/nint(sample_rate))
-      spacing_of_bins = sample_rate/length
-      call get_power_spectrum(force, length, power)
-      do i = 1, size(bands)
-         associate (first => ceiling(bands(i)%lower/spacing_of_bins), last => floor(bands(i)%upper/spacing_of_bins))
-            energy(i) = 2*sum(power(first + 1:last + 1))*spacing_of_bins/sample_rate**2
-         end associate
-      end do
+      spacing = sample_rate/length
+      first = ceiling(bands%lower/spacing)
+      last = floor(bands%upper/spacing)
+      ! The transform of the window takes longer than the autocorrelation of a record far shorter.
+      if (3*size(force) < length) then
+         energy = get_energy(force, sample_rate, (first - 0.5_wp)*spacing, (last + 0.5_wp)*spacing, spacing)
+      else
+         call get_power_spectrum(force, length, power)
+         energy = [(2*sum(power(first(i) + 1:last(i) + 1))*spacing/sample_rate**2, i=1, size(bands))]
+      end if
    end function get_bin_energy
+
+   !> Energies of a record between band edges, N^2 s; see the head of the module.
+   function get_energy(force, sample_rate, lower, upper, spacing) result(energy)
+      !> Force, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> Lower edges, Hz: [n_band].
+      real(wp), intent(in) :: lower(:)
+      !> Upper edges, Hz: [n_band].
+      real(wp), intent(in) :: upper(:)
+      !> Distance of the bins, Hz; 0 for the integral.
+      real(wp), intent(in) :: spacing
+      !> Energy of each band, N^2 s: [n_band].
+      real(wp) :: energy(size(lower))
+      real(wp), allocatable :: correlation(:)
+      real(wp) :: step, middle, half_width
+      integer :: i, lag
+
+      allocate (correlation(0:size(force) - 1))
+      call get_autocorrelation(force, correlation)
+      step = pi*spacing/sample_rate
+      do lag = 1, size(force) - 1
+         if (spacing > 0.0_wp) then
+            correlation(lag) = correlation(lag)*step/sin(step*lag)
+         else
+            correlation(lag) = correlation(lag)/lag
+         end if
+      end do
+      do i = 1, size(lower)
+         middle = pi*(upper(i) + lower(i))/sample_rate
+         half_width = pi*(upper(i) - lower(i))/sample_rate
+         energy(i) = 2/(pi*sample_rate)*(half_width*correlation(0) + 2*get_wave_sum(correlation(1:), middle, half_width))
+      end do
+   end function get_energy
+
+   !> Sum of x(k) cos(m k) sin(h k) over all samples.
+   !>
+   !> Sines and cosines are few, those of the starts of blocks and those within a block; they make all
+   !> others by the sums of angles.
+   pure function get_wave_sum(x, m, h) result(total)
+      !> Samples: [n].
+      real(wp), intent(in), contiguous :: x(:)
+      !> Angle per sample of the cosine.
+      real(wp), intent(in) :: m
+      !> Angle per sample of the sine.
+      real(wp), intent(in) :: h
+      !> The sum.
+      real(wp) :: total
+      integer, parameter :: block = 32
+      real(wp) :: part(block, 4), start_wave(4), angle(2)
+      integer :: start, last, i
+
+      part = 0.0_wp
+      do start = 0, size(x) - 1, block
+         last = min(block, size(x) - start)
+         angle = get_angle([m, h], start)
+         start_wave = [cos(angle(1))*[sin(angle(2)), cos(angle(2))], -sin(angle(1))*[sin(angle(2)), cos(angle(2))]]
+         do i = 1, 4
+            part(:last, i) = part(:last, i) + start_wave(i)*x(start + 1:start + last)
+         end do
+      end do
+      total = 0.0_wp
+      do i = 1, block
+         total = total + cos(m*i)*(part(i, 1)*cos(h*i) + part(i, 2)*sin(h*i)) &
+            + sin(m*i)*(part(i, 3)*cos(h*i) + part(i, 4)*sin(h*i))
+      end do
+   end function get_wave_sum
+
+   !> Angle from -pi to pi after so many samples. An angle rounded before its turns are taken off would err
+   !> the more the longer the record, and by the same in a whole block.
+   elemental function get_angle(per_sample, count) result(angle)
+      !> Angle per sample.
+      real(wp), intent(in) :: per_sample
+      !> Number of samples, up to `max_samples`.
+      integer, intent(in) :: count
+      !> The angle.
+      real(wp) :: angle
+      real(wp), parameter :: scale = 2.0_wp**24
+      real(wp) :: turns, high
+
+      turns = per_sample/(2*pi)
+      ! So few digits that the product is exact.
+      high = anint(turns*scale)/scale
+      angle = 2*pi*((high*count - anint(high*count)) + (turns - high)*count)
+   end function get_angle
 
 end module thud_force_exposure

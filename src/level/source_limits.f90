@@ -1,7 +1,7 @@
 !> What the standards ask of heavy/soft impact sources, and the verdict on a force history
 !> (JIS A 1418-2:2019 tables A.1 and A.2, ISO 10140-5:2021 table F.1, ISO 16283-2:2020 table A.1).
 module thud_source_limits
-   use thud_band, only: octave_count
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_text, only: join_quoted, quoted
@@ -12,10 +12,7 @@ module thud_source_limits
    public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, recorded_band
    public :: criterion_count, source_limits_type, source_names
 
-   !> Heavy/soft impact sources with limits in the standards.
-   character(len=24), parameter :: source_names(2) = [character(len=24) :: 'rubber_ball', 'tyre']
-
-   !> Criteria of a verdict: five octaves, contact time, restitution, peaks, mass, drop height.
+   !> Criteria of a verdict: the octaves, contact time, restitution, peaks, mass, drop height.
    integer, parameter :: criterion_count = octave_count + 5
 
    !> A peak counts where the force falls by more than this part of its maximum on both sides.
@@ -27,11 +24,13 @@ module thud_source_limits
    !> end at 707 Hz.
    real(wp), parameter :: recorded_band = 1250.0_wp
 
-   !> Smallest and largest conforming values of one source.
+   !> Minimum and maximum conforming values of one source.
    type :: source_limits_type
-      !> Smallest force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      !> Name of the source.
+      character(len=24) :: name
+      !> Minimum force exposure levels of the octaves 31.5 to 500 Hz, dB.
       real(wp) :: lower_level(octave_count)
-      !> Largest force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      !> Maximum force exposure levels of the octaves 31.5 to 500 Hz, dB.
       real(wp) :: upper_level(octave_count)
       !> Contact time, s.
       real(wp) :: contact_time(2) = [18.0e-3_wp, 22.0e-3_wp]
@@ -43,19 +42,22 @@ module thud_source_limits
       real(wp) :: drop_height(2)
    end type source_limits_type
 
-   !> Rubber ball, impact force characteristic (2): 39 +- 1, 31 +- 1.5, 23 +- 1.5, 17 +- 2,
-   !> 12.5 +- 2 dB.
-   type(source_limits_type), parameter :: rubber_ball = source_limits_type( &
-      lower_level=[38.0_wp, 29.5_wp, 21.5_wp, 15.0_wp, 10.5_wp], &
-      upper_level=[40.0_wp, 32.5_wp, 24.5_wp, 19.0_wp, 14.5_wp], &
-      mass=[2.4_wp, 2.6_wp], drop_height=[0.99_wp, 1.01_wp])
+   !> Heavy/soft impact sources with limits in the standards.
+   type(source_limits_type), parameter :: sources(*) = [ &
+      ! Impact force characteristic (2): 39 +- 1, 31 +- 1.5, 23 +- 1.5, 17 +- 2, 12.5 +- 2 dB.
+      source_limits_type('rubber_ball', &
+         lower_level=[38.0_wp, 29.5_wp, 21.5_wp, 15.0_wp, 10.5_wp], &
+         upper_level=[40.0_wp, 32.5_wp, 24.5_wp, 19.0_wp, 14.5_wp], &
+         mass=[2.4_wp, 2.6_wp], drop_height=[0.99_wp, 1.01_wp]), &
+      ! "Bang machine", characteristic (1): 47 +- 1, 40 +- 1.5, 22 +- 1.5, 11.5 +- 2, 5.5 +- 2 dB.
+      ! Its drop height comes without a tolerance; the ball's 1 cm is used.
+      source_limits_type('tyre', &
+         lower_level=[46.0_wp, 38.5_wp, 20.5_wp, 9.5_wp, 3.5_wp], &
+         upper_level=[48.0_wp, 41.5_wp, 23.5_wp, 13.5_wp, 7.5_wp], &
+         mass=[7.1_wp, 7.5_wp], drop_height=[0.84_wp, 0.86_wp])]
 
-   !> Tyre ("bang machine"), characteristic (1): 47 +- 1, 40 +- 1.5, 22 +- 1.5, 11.5 +- 2,
-   !> 5.5 +- 2 dB. Its drop height comes without a tolerance; the ball's 1 cm is used.
-   type(source_limits_type), parameter :: tyre = source_limits_type( &
-      lower_level=[46.0_wp, 38.5_wp, 20.5_wp, 9.5_wp, 3.5_wp], &
-      upper_level=[48.0_wp, 41.5_wp, 23.5_wp, 13.5_wp, 7.5_wp], &
-      mass=[7.1_wp, 7.5_wp], drop_height=[0.84_wp, 0.86_wp])
+   !> Names of the sources: [n_source].
+   character(len=24), parameter :: source_names(*) = sources%name
 
    !> One quantity, the range that it must lie in, and whether it does.
    type :: criterion_type
@@ -65,9 +67,9 @@ module thud_source_limits
       character(len=8) :: unit = ''
       !> Value of the source under test.
       real(wp) :: value = 0.0_wp
-      !> Smallest conforming value.
+      !> Minimum conforming value.
       real(wp) :: lower = 0.0_wp
-      !> Largest conforming value.
+      !> Maximum conforming value.
       real(wp) :: upper = 0.0_wp
    end type criterion_type
 
@@ -82,14 +84,14 @@ contains
       !> The source is not known.
       type(error_type), allocatable, intent(out) :: error
 
-      select case (source)
-      case ('rubber_ball')
-         limits = rubber_ball
-      case ('tyre')
-         limits = tyre
-      case default
+      integer :: at
+
+      at = findloc(source_names == source, .true., dim=1)
+      if (at == 0) then
          error = input_error('the source '//quoted(source)//' is not known; allowed: '//join_quoted(source_names))
-      end select
+      else
+         limits = sources(at)
+      end if
    end subroutine get_source_limits
 
    !> All criteria for a source, in a fixed order.
@@ -97,7 +99,7 @@ contains
       result(criteria)
       !> Limits of the standards.
       type(source_limits_type), intent(in) :: limits
-      !> Force exposure levels of the octaves 31.5 to 500 Hz, dB: [5].
+      !> Force exposure levels of the octaves 31.5 to 500 Hz, dB: [octave_count].
       real(wp), intent(in) :: levels(:)
       !> Contact time, s.
       real(wp), intent(in) :: contact_time
@@ -109,15 +111,17 @@ contains
       real(wp), intent(in) :: mass
       !> Height of drop, m.
       real(wp), intent(in) :: drop_height
-      !> The criteria: [10].
+      !> The criteria: [criterion_count].
       type(criterion_type) :: criteria(criterion_count)
-      character(len=24), parameter :: level_names(octave_count) = [character(len=24) :: &
-         'octave_31_5', 'octave_63', 'octave_125', 'octave_250', 'octave_500']
+      type(band_type) :: octaves(octave_count)
       integer :: i
 
+      octaves = get_octaves()
       associate (n => octave_count)
-         criteria(:n) = [(criterion_type(level_names(i), 'dB', levels(i), limits%lower_level(i), &
-            limits%upper_level(i)), i=1, n)]
+         do i = 1, n
+            criteria(i) = criterion_type(get_level_name(octaves(i)), 'dB', levels(i), limits%lower_level(i), &
+               limits%upper_level(i))
+         end do
          criteria(n + 1) = between('contact_time', 's', contact_time, limits%contact_time)
          criteria(n + 2) = between('restitution', '', restitution, limits%restitution)
          criteria(n + 3) = between('peak_count', '', real(peak_count, wp), [1.0_wp, 1.0_wp])
@@ -125,6 +129,19 @@ contains
          criteria(n + 5) = between('drop_height', 'm', drop_height, limits%drop_height)
       end associate
    end function get_criteria
+
+   !> Name of the level of a band: `octave_31_5`.
+   pure function get_level_name(band) result(name)
+      !> The band.
+      type(band_type), intent(in) :: band
+      !> Its level's name.
+      character(len=24) :: name
+      integer :: at
+
+      name = trim(band%set)//'_'//get_band_name(band)
+      at = index(name, '.')
+      if (at > 0) name(at:at) = '_'
+   end function get_level_name
 
    !> Criterion of a value within a range.
    pure function between(name, unit, value, range) result(criterion)
@@ -134,7 +151,7 @@ contains
       character(len=*), intent(in) :: unit
       !> Value of the source under test.
       real(wp), intent(in) :: value
-      !> Smallest and largest conforming value: [2].
+      !> Minimum and maximum conforming value: [2].
       real(wp), intent(in) :: range(2)
       !> The criterion.
       type(criterion_type) :: criterion

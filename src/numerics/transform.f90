@@ -1,4 +1,6 @@
 !> Fourier transforms of sampled records, on FFTW.
+!>
+!> To make a plan takes longer than to transform a record of a contact, so plans are kept by length.
 module thud_transform
    use, intrinsic :: iso_c_binding
    use thud_kinds, only: wp
@@ -8,6 +10,32 @@ module thud_transform
    public :: get_autocorrelation, get_low_pass, get_power_spectrum
 
    include 'fftw3.f03'
+
+   !> Lengths whose plans are kept; more only while more threads than that transform.
+   integer, parameter :: kept_count = 16
+
+   !> Longest transform whose plans are kept: those of longer ones hold much memory.
+   integer, parameter :: longest_kept = 2**18
+
+   !> Plans for one length. They fit all arrays that the compiler allocates: FFTW wants 16 bytes aligned.
+   type :: plans_type
+      !> Samples, 0 without plans.
+      integer :: length = 0
+      !> Threads that use the plans now.
+      integer :: users = 0
+      !> Number of the last use, ascending.
+      integer(c_int64_t) :: last_use = 0
+      !> From a record to its transform.
+      type(c_ptr) :: forward = c_null_ptr
+      !> From a transform to the record, times the length.
+      type(c_ptr) :: back = c_null_ptr
+   end type plans_type
+
+   !> The plans that are kept; only to be touched in the critical section `thud_fftw_planner`.
+   type(plans_type), allocatable :: kept(:)
+
+   !> Number of the latest use.
+   integer(c_int64_t) :: use_count = 0
 
 contains
 
@@ -19,6 +47,7 @@ contains
       real(wp), intent(out) :: autocorrelation(:)
       real(wp), allocatable :: signal(:)
       complex(wp), allocatable :: spectrum(:)
+      type(plans_type) :: plans
       integer :: length
 
       ! Twice the length, so that the circular correlation does not fold.
@@ -26,10 +55,10 @@ contains
       do while (length < 2*size(record))
          length = 2*length
       end do
-      call transform_padded(record, length, signal, spectrum)
+      call transform_padded(record, length, signal, spectrum, plans)
       spectrum = cmplx(real(spectrum)**2 + aimag(spectrum)**2, 0.0_wp, wp)
-      call transform_back(spectrum, signal)
-      autocorrelation = signal(:size(record))
+      call transform_back(spectrum, signal, plans)
+      autocorrelation = signal(:size(record))/length
    end subroutine get_autocorrelation
 
    !> The part of a record below a frequency.
@@ -44,14 +73,16 @@ contains
       real(wp), intent(out) :: low(:)
       real(wp), allocatable :: signal(:)
       complex(wp), allocatable :: spectrum(:)
+      type(plans_type) :: plans
       integer :: length
 
+      if (size(record) == 0) return
       ! Zeros on both sides, so that what swings before the record does not come back behind it.
       length = 2*size(record)
-      call transform_padded(record, length, signal, spectrum)
-      spectrum(min(size(spectrum), int(length*(edge/sample_rate)) + 1) + 1:) = (0.0_wp, 0.0_wp)
-      call transform_back(spectrum, signal)
-      low = signal(:size(record))
+      call transform_padded(record, length, signal, spectrum, plans)
+      spectrum(int(min(length*(edge/sample_rate), length/2.0_wp)) + 2:) = (0.0_wp, 0.0_wp)
+      call transform_back(spectrum, signal, plans)
+      low = signal(:size(record))/length
    end subroutine get_low_pass
 
    !> Squared magnitude of the transform of a zero-padded record.
@@ -64,13 +95,15 @@ contains
       real(wp), allocatable, intent(out) :: power(:)
       real(wp), allocatable :: signal(:)
       complex(wp), allocatable :: spectrum(:)
+      type(plans_type) :: plans
 
-      call transform_padded(record, length, signal, spectrum)
+      call transform_padded(record, length, signal, spectrum, plans)
+      call give_back(plans)
       power = real(spectrum)**2 + aimag(spectrum)**2
    end subroutine get_power_spectrum
 
    !> Transform of a record with zeros behind it.
-   subroutine transform_padded(record, length, signal, spectrum)
+   subroutine transform_padded(record, length, signal, spectrum, plans)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
       !> Length of the transform, at least n.
@@ -79,37 +112,82 @@ contains
       real(wp), allocatable, intent(out) :: signal(:)
       !> Its transform: [length/2 + 1].
       complex(wp), allocatable, intent(out) :: spectrum(:)
-      type(c_ptr) :: plan
+      !> Plans in use, to be given back.
+      type(plans_type), intent(out) :: plans
 
-      allocate (signal(length), source=0.0_wp)
-      allocate (spectrum(length/2 + 1))
+      allocate (signal(length), spectrum(length/2 + 1))
       signal(:size(record)) = record
-      !$omp critical (thud_fftw_planner)
-      plan = fftw_plan_dft_r2c_1d(int(length, c_int), signal, spectrum, FFTW_ESTIMATE)
-      !$omp end critical (thud_fftw_planner)
-      call fftw_execute_dft_r2c(plan, signal, spectrum)
-      !$omp critical (thud_fftw_planner)
-      call fftw_destroy_plan(plan)
-      !$omp end critical (thud_fftw_planner)
+      signal(size(record) + 1:) = 0.0_wp
+      call take_plans(signal, spectrum, plans)
+      call fftw_execute_dft_r2c(plans%forward, signal, spectrum)
    end subroutine transform_padded
 
-   !> Record of a transform.
-   subroutine transform_back(spectrum, signal)
+   !> Record of a transform, times its length.
+   subroutine transform_back(spectrum, signal, plans)
       !> The transform; it is used up: [n/2 + 1].
       complex(wp), intent(inout) :: spectrum(:)
       !> The record: [n].
       real(wp), intent(inout) :: signal(:)
-      type(c_ptr) :: plan
+      !> Plans from `transform_padded`, given back.
+      type(plans_type), intent(inout) :: plans
 
-      ! Making and freeing plans is the one part of FFTW that threads must not share.
-      !$omp critical (thud_fftw_planner)
-      plan = fftw_plan_dft_c2r_1d(size(signal, kind=c_int), spectrum, signal, FFTW_ESTIMATE)
-      !$omp end critical (thud_fftw_planner)
-      call fftw_execute_dft_c2r(plan, spectrum, signal)
-      !$omp critical (thud_fftw_planner)
-      call fftw_destroy_plan(plan)
-      !$omp end critical (thud_fftw_planner)
-      signal = signal/size(signal)
+      call fftw_execute_dft_c2r(plans%back, spectrum, signal)
+      call give_back(plans)
    end subroutine transform_back
+
+   !> Plans for arrays, kept or new ones. Planning is the one part of FFTW that threads must not share.
+   subroutine take_plans(signal, spectrum, plans)
+      !> Array of the record: [n].
+      real(wp), intent(inout) :: signal(:)
+      !> Array of its transform: [n/2 + 1].
+      complex(wp), intent(inout) :: spectrum(:)
+      !> Its plans.
+      type(plans_type), intent(out) :: plans
+      integer :: at
+
+      !$omp critical (thud_fftw_planner)
+      if (.not. allocated(kept)) allocate (kept(kept_count))
+      at = findloc(kept%length, size(signal), dim=1)
+      if (at == 0) then
+         at = minloc(kept%last_use, dim=1, mask=kept%users == 0)
+         if (at == 0) then
+            kept = [kept, plans_type()]
+            at = size(kept)
+         end if
+         call destroy(kept(at))
+         kept(at)%length = size(signal)
+         kept(at)%forward = fftw_plan_dft_r2c_1d(size(signal, kind=c_int), signal, spectrum, FFTW_ESTIMATE)
+         kept(at)%back = fftw_plan_dft_c2r_1d(size(signal, kind=c_int), spectrum, signal, FFTW_ESTIMATE)
+      end if
+      use_count = use_count + 1
+      kept(at)%last_use = use_count
+      kept(at)%users = kept(at)%users + 1
+      plans = kept(at)
+      !$omp end critical (thud_fftw_planner)
+   end subroutine take_plans
+
+   !> Ends the use of plans.
+   subroutine give_back(plans)
+      !> The plans.
+      type(plans_type), intent(in) :: plans
+      integer :: at
+
+      !$omp critical (thud_fftw_planner)
+      at = findloc(kept%length, plans%length, dim=1)
+      kept(at)%users = kept(at)%users - 1
+      if (kept(at)%users == 0 .and. plans%length > longest_kept) call destroy(kept(at))
+      !$omp end critical (thud_fftw_planner)
+   end subroutine give_back
+
+   !> Destroys plans, if there are any.
+   subroutine destroy(plans)
+      !> The plans; empty afterwards.
+      type(plans_type), intent(inout) :: plans
+
+      if (plans%length == 0) return
+      call fftw_destroy_plan(plans%forward)
+      call fftw_destroy_plan(plans%back)
+      plans = plans_type()
+   end subroutine destroy
 
 end module thud_transform

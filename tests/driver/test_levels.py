@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
 import thud
+from thud.levels import BANDWIDTHS, SOURCES, octave_limits, peak_count
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
 
@@ -16,6 +19,50 @@ def test_bands_are_complete_and_adjacent() -> None:
     assert len(thirds.nominal) == 15
     np.testing.assert_allclose(thirds.upper[:-1], thirds.lower[1:], rtol=1e-14)
     np.testing.assert_allclose(octaves.centre, np.sqrt(octaves.lower * octaves.upper), rtol=1e-14)
+
+
+def test_bands_cannot_be_changed_for_others() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        thud.get_bands().lower[0] = 0.0
+
+
+def test_sets_and_sources_are_those_of_the_library() -> None:
+    assert BANDWIDTHS == ("octave", "third")
+    assert SOURCES == ("rubber_ball", "tyre")
+    for bands in BANDWIDTHS:
+        count = len(thud.get_bands(bands).nominal)
+        assert thud.force_exposure_levels(PULSE, 44100, bands).shape == (count,)
+    for source in SOURCES:
+        lower, upper = octave_limits(source)
+        assert (lower < upper).all()
+
+
+def test_threads_share_plans() -> None:
+    # More lengths than plans are kept, so that plans come and go while others are in use.
+    records = [PULSE[:length] for length in range(40, 883, 17)] * 4
+
+    def answer(record: np.ndarray) -> tuple[bytes, int]:
+        levels = thud.force_exposure_levels(record, 44100)
+        return levels.tobytes(), peak_count(record, 44100)
+
+    alone = [answer(record) for record in records]
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(answer, records)) == alone
+
+
+@pytest.mark.parametrize(
+    ("record", "rate", "words"),
+    [
+        ([], 44100, "force has no samples"),
+        ([1.0, np.nan], 44100, "not finite"),
+        (PULSE, 0.0, "sample_rate = 0.0 is not allowed; allowed: sample_rate > 0"),
+        (PULSE, -1.0, "sample_rate = -1.0 is not allowed"),
+        (PULSE, np.nan, "sample_rate = nan is not allowed"),
+    ],
+)
+def test_peaks_of_useless_records_are_not_counted(record: object, rate: float, words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        peak_count(record, rate)  # type: ignore[arg-type]
 
 
 def test_anything_like_an_array_is_a_record() -> None:
@@ -57,7 +104,7 @@ def test_anything_like_an_array_is_a_record() -> None:
         (PULSE, {"method": "guess"}, "'guess' is not known; allowed: 'exact', 'fft'"),
     ],
 )
-def test_useless_records_are_told(record: object, options: dict[str, object], words: str) -> None:
+def test_useless_records_are_refused(record: object, options: dict[str, object], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.force_exposure_levels(record, **{"sample_rate": 44100.0, **options})  # type: ignore[arg-type]
 
