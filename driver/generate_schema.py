@@ -1,6 +1,6 @@
-"""Make driver/thud/_schema.py and docs/keys.md from the library's schema; run by ``./bootstrap schema``.
+"""Make driver/thud/_schema.py and docs/keys.md from the library's schema.
 
-Usage: thud --schema | python driver/generate_schema.py [DIRECTORY]
+Run by ``./bootstrap schema``: thud --schema | python driver/generate_schema.py [DIRECTORY]
 """
 
 from __future__ import annotations
@@ -68,16 +68,27 @@ def python_default(key: Entry) -> str:
 
 def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> str:
     """Return the dataclass of some keys."""
-    lines = ["", "", "@dataclass(frozen=True)", f"class {class_name(group)}:", f'    """{title}', ""]
+    lines = [
+        "",
+        "",
+        "@dataclass(frozen=True)",
+        f"class {class_name(group)}:",
+        f'    """{title}',
+        "",
+    ]
     lines += ["    Attributes", "    ----------"]
     for key in keys:
         words = [key["meaning"][0].upper() + key["meaning"][1:]]
         words[0] += f", {key['unit']}" if key["unit"] else ""
         words += [allowed(key)] if allowed(key) else []
         words += [f"group ``&{key['group']}``"] if key["group"] != group else []
-        lines.append(f"    {key['name']} : {python_type(key).replace('Sequence[', 'sequence of ').rstrip(']')}")
+        lines.append(
+            f"    {key['name']} : {python_type(key).replace('Sequence[', 'sequence of ').rstrip(']')}"
+        )
         indent = " " * 8
-        lines += textwrap.wrap("; ".join(words) + ".", 99, initial_indent=indent, subsequent_indent=indent)
+        lines += textwrap.wrap(
+            "; ".join(words) + ".", 99, initial_indent=indent, subsequent_indent=indent
+        )
     lines += ['    """', ""]
     if model:
         lines += [f'    name: ClassVar[str] = "{model}"']
@@ -91,35 +102,56 @@ def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> 
 
 def python_module(schema: Entry) -> str:
     """Return the text of ``_schema.py``."""
-    keys = schema["keys"]
+    keys, models = schema["keys"], schema["models"]
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
-    names = sorted(map(class_name, [*groups, "modes", *schema["models"]]))
-    text = HEAD.replace("{names}", "".join(f'    "{name}",\n' for name in names))
+    classes = sorted(map(class_name, [*groups, "modes", *models]))
+    parts = [HEAD.replace("{names}", "".join(f'    "{name}",\n' for name in classes))]
     for group in groups:
-        text += python_class(f"Group ``&{group}``.", [k for k in shared if k["group"] == group], group)
-    text += python_class("Free modes that are asked for.", [k for k in keys if k["owner"] == "modes"], "modes")
-    for model in schema["models"]:
+        members = [key for key in shared if key["group"] == group]
+        parts.append(python_class(f"Group ``&{group}``.", members, group))
+    members = [key for key in keys if key["owner"] == "modes"]
+    parts.append(python_class("Free modes that are asked for.", members, "modes"))
+    for model in models:
+        members = [key for key in keys if key["owner"] == model]
         title = f"Options of the source model ``{model}``."
-        text += python_class(title, [k for k in keys if k["owner"] == model], model, model)
-    names = [class_name(model) for model in schema["models"]]
-    text += f"\n\nModelOptions = {' | '.join(names)}\n"
-    text += "\n# Source models by name, the default first.\nMODELS: dict[str, type[ModelOptions]] = {\n"
-    text += "".join(f"    {name}.name: {name},\n" for name in names) + "}\n"
-    text += "\n# Groups that every model uses.\nGROUPS = {\n"
-    text += "".join(f'    "{group}": {class_name(group)},\n' for group in groups) + "}\n"
-    text += "\n# Unit and meaning of the numbers that describe an impact; the first ones describe each of many.\n"
-    text += "SCALARS = {\n"
-    for scalar in schema["scalars"]:
-        text += f'    "{scalar["name"]}": ({json.dumps(scalar["unit"])}, {json.dumps(scalar["meaning"])}),\n'
-    text += "}\n\n# Every key, in the order of an input file.\nKEYS = (\n"
-    for key in keys:
-        ends = [float(key.get(end, 0)) if not isinstance(key.get(end, 0), str) else key[end] for end in ("lower", "upper")]
-        parts = [key[part] for part in ("owner", "group", "name", "kind", "unit", "meaning")]
-        parts += [tuple(key["choices"])] if key["choices"] or "lower" in key else []
-        parts += ends if "lower" in key else []
-        text += f"    Key({', '.join(json.dumps(p) if isinstance(p, str) else repr(p) for p in parts)}),\n"
-    return text + ")\n"
+        parts.append(python_class(title, members, model, model))
+    names = list(map(class_name, models))
+    scalars = [f"{quoted(s['name'])}: ({quoted(s['unit'])}, {quoted(s['meaning'])})"
+               for s in schema["scalars"]]  # fmt: skip
+    parts += [
+        f"\n\nModelOptions = {' | '.join(names)}\n",
+        table("Source models by name, the default first.", "MODELS: dict[str, type[ModelOptions]]",
+              [f"{name}.name: {name}" for name in names]),
+        table("Groups that every model uses.", "GROUPS",
+              [f"{quoted(group)}: {class_name(group)}" for group in groups]),
+        table("Unit and meaning of the numbers that describe an impact.", "SCALARS", scalars),
+        "\n# Every key, in the order of an input file.\nKEYS = (\n",
+        *(f"    {python_key(key)},\n" for key in keys),
+        ")\n",
+    ]  # fmt: skip
+    return "".join(parts)
+
+
+def table(comment: str, name: str, entries: list[str]) -> str:
+    """Return a dictionary as Python writes it."""
+    lines = "".join(f"    {entry},\n" for entry in entries)
+    return f"\n# {comment}\n{name} = {{\n{lines}}}\n"
+
+
+def python_key(key: Entry) -> str:
+    """Return the `Key` of a key."""
+    parts = [key[part] for part in ("owner", "group", "name", "kind", "unit", "meaning")]
+    if key["choices"] or "lower" in key:
+        parts.append(tuple(key["choices"]))
+    if "lower" in key:
+        parts += [key["lower"], key["upper"]]
+    return f"Key({', '.join(quoted(p) if isinstance(p, str) else repr(p) for p in parts)})"
+
+
+def quoted(text: str) -> str:
+    """Return a text as Python writes it."""
+    return json.dumps(text)
 
 
 def page(schema: Entry) -> str:
@@ -133,7 +165,9 @@ def page(schema: Entry) -> str:
             group = key["group"]
             owners = sorted({k["owner"] for k in schema["keys"] if k["group"] == group} - {""})
             users = [("free modes" if owner == "modes" else f"`{owner}`") for owner in owners]
-            text += f"\n## `&{group}`\n\n" + (f"Used by {' and '.join(users)}.\n\n" if users else "")
+            text += f"\n## `&{group}`\n\n" + (
+                f"Used by {' and '.join(users)}.\n\n" if users else ""
+            )
             text += "| key | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"
         default = python_default(key) if key["default"] not in ([], "") else ""
         cells = [f"`{key['name']}`", default, key["unit"], allowed(key), key["meaning"]]

@@ -26,7 +26,7 @@ from thud.results import read_results
 
 __version__ = version()
 
-__all__ = [
+__all__ = [  # noqa: PLE0604 - the first are strings too
     *_groups,
     "Bands",
     "Case",

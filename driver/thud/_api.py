@@ -1,4 +1,7 @@
-"""The one place where Python meets the Fortran library: bundles become dictionaries, status codes exceptions."""
+"""The one place where Python meets the Fortran library.
+
+Bundles of the library become dictionaries, its status codes exceptions.
+"""
 
 from __future__ import annotations
 

@@ -336,7 +336,7 @@ GROUPS = {
     "limits": Limits,
 }
 
-# Unit and meaning of the numbers that describe an impact; the first ones describe each of many.
+# Unit and meaning of the numbers that describe an impact.
 SCALARS = {
     "contact_time": ("s", "contact time"),
     "peak_force": ("N", "largest elastic force"),

@@ -12,7 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from thud._api import call, collect, ensemble_api, text
-from thud._schema import HollowSphere, Levels, Limits
+from thud._schema import SCALARS, HollowSphere, Levels, Limits, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_kind, require_whole
 from thud.errors import InputError
@@ -152,12 +152,14 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     require_kind("case", base, Case)
     if bands is not None:
         get_bands(bands)
-    given = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
+    sampling = base.sampling
     base = replace(
         base,
         modes=None,
-        sampling=replace(
-            base.sampling, **{key: value for key, value in given.items() if value is not None}
+        sampling=Sampling(
+            sampling.sample_rate if sample_rate is None else sample_rate,
+            sampling.duration if duration is None else duration,
+            sampling.substeps if substeps is None else substeps,
         ),
         levels=replace(base.levels, bands=bands or Levels.bands),
         limits=Limits(str(source)) if source is not None else base.limits,
@@ -182,7 +184,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         columns,
         results["status"],
         results["reason"],
-        *results["outcome"].T,
+        **dict(zip(SCALARS, results["outcome"].T, strict=False)),
         elastic_levels=wanted[:, 0],
         floor_levels=wanted[:, 1],
         elastic_octaves=levels[:, 0, :octaves],
@@ -226,7 +228,7 @@ def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
 ) -> None:
     """Compute some sets and put their results in their place."""
     _, force_count, band = results["level"].shape
-    kept, _, sample = results["force"].shape
+    sample = results["force"].shape[-1]
     forces = sample > 1
     with _ONE_AT_A_TIME:
         status, outcome, level, conforms, force, *left = ensemble_api.drop_many(

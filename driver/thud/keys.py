@@ -33,7 +33,8 @@ def known_keys(model: str) -> Mapping[str, Key]:
     known = {
         key.name: key
         for key in KEYS
-        if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != _OF_FILES
+        if (key.owner == model or (not key.owner and key.group in GROUPS))
+        and key.group != _OF_FILES
     }
     return MappingProxyType(known | {key.name: key for key in (DENSITY, TEMPERATURE)})
 
