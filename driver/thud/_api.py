@@ -75,7 +75,7 @@ def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> 
     """
     *results, status, message = routine(*arguments)
     if status:
-        raise _ERRORS.get(status, NumericalError)(text(message).rstrip())
+        raise _ERRORS.get(status, NumericalError)(trimmed(message))
     return tuple(results)
 
 
@@ -130,10 +130,9 @@ def text(value: bytes) -> str:
     return value.decode(errors="surrogateescape")
 
 
-def words(value: bytes) -> list[str]:
-    """Words of a list with commas between."""
-    listed = text(value).rstrip()
-    return [word.strip() for word in listed.split(",")] if listed else []
+def trimmed(value: bytes) -> str:
+    """Text of the library without the blanks behind it."""
+    return text(value).rstrip()
 
 
 def version() -> str:

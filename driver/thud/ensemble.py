@@ -12,7 +12,7 @@ import numpy as np
 from tqdm import tqdm
 
 from thud._api import call, collect, ensemble_api, text
-from thud._schema import SCALARS, HollowSphere, Levels, Limits, Sampling
+from thud._schema import KEYS, SCALARS, HollowSphere, Levels, Limits, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_kind, require_whole
 from thud.errors import InputError
@@ -167,7 +167,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     if base.model is None or (model is not None and model != base.model.name):
         base = replace(base, model=new_model(model or HollowSphere.name, {}))
     content = case_text(base)
-    columns, numbers = _columns(parameters, base)
+    # Without parameters there is one drop, that of the case.
+    columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
     sizes = call(ensemble_api.size_many, content)
     width = _threads(threads)
     results = _allocate(len(numbers), sizes, forces=forces)
@@ -258,11 +259,15 @@ def _columns(
     parameters: Mapping[str, ArrayLike], case: Case
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return one array per key, all of one length, and their numbers for the library."""
-    if not isinstance(parameters, Mapping) or not parameters:
+    if not isinstance(parameters, Mapping):
         message = f"parameters = {parameters!r} is not allowed; allowed: arrays by their keys"
         raise InputError(message)
     assert case.model is not None  # noqa: S101 - `solve_many` has seen to it
     keys = [find_key(name, case.model.name)[0] for name in parameters]
+    for key in keys:
+        if key not in KEYS:
+            message = f"{key.name!r} is a parameter of studies; allowed: keys of the input"
+            raise InputError(message)
     given = [_array(name, values) for name, values in parameters.items()]
     numbers = [_numbers(key, array) for key, array in zip(keys, given, strict=True)]
     try:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call_direct, level_api, text
+from thud._api import call_direct, level_api, trimmed
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def _names(values: Iterable[bytes]) -> tuple[str, ...]:
     """Return names from the library."""
-    return tuple(map(text, values))
+    return tuple(map(trimmed, values))
 
 
 _N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()

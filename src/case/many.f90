@@ -23,7 +23,7 @@ module thud_many
 
    public :: column_type, find_columns, many_type, new_many, solve_many
 
-   !> What drops may not differ in: names, and what a run writes.
+   !> Groups in whose keys drops may not differ: names, and what a run writes.
    character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: 'case', 'model', 'modes', 'output']
 
    !> About the time that one drop takes in a batch, s.
@@ -87,7 +87,8 @@ contains
       integer :: i, j, bracket, status
 
       allocate (fields, source=get_active_fields(case))
-      possible = [(.not. any(common_groups == fields(i)%group), i=1, size(fields))]
+      ! Levels of all drops have the same bands.
+      possible = [(.not. any(common_groups == fields(i)%group) .and. fields(i)%key /= 'bands', i=1, size(fields))]
       allocate (columns(size(names)))
       do i = 1, size(names)
          bracket = index(names(i)//'(', '(')
@@ -144,12 +145,18 @@ contains
       logical, intent(in) :: forces
       !> The results.
       type(many_type), intent(inout) :: many
-      !> There is no room in memory.
+      !> Forces are wanted of records of different length, or there is no space in memory.
       type(error_type), allocatable, intent(out) :: error
+      type(field_type), allocatable :: fields(:)
       integer, allocatable :: left(:)
       integer :: n_drop, i
 
       n_drop = size(values, 2)
+      allocate (fields, source=get_active_fields(case))
+      if (forces .and. any(fields(columns%place)%group == 'sampling')) then
+         error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
+         return
+      end if
       call set_size(many, n_drop, merge(get_sample_count(case%sampling), 0, forces))
       left = [(i, i=1, n_drop)]
       if (suits_batch(case, columns)) then
@@ -277,7 +284,7 @@ contains
       integer, intent(in) :: threads
       !> Gets the results.
       type(many_type), intent(inout) :: many
-      !> There is no room in memory.
+      !> There is no space in memory.
       type(error_type), allocatable, intent(out) :: error
       type(set_type), allocatable :: sets(:)
       type(set_outcome_type), allocatable :: outcomes(:)
