@@ -78,7 +78,6 @@ __all__ = [
 # time.
 _LATE = {
     "plot": None,
-    "mesh_plot": None,
     "comparison": None,
     "compare": "comparison",
     "fitting": None,
