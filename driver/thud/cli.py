@@ -17,7 +17,7 @@ import thud
 from thud._api import call, api, text
 from thud.checks import require_output
 from thud.study_commands import add_study_commands
-from thud.tables import aligned
+from thud.tables import format_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -224,7 +224,7 @@ def _compare(options: argparse.Namespace) -> int:
     comparison = thud.compare(found, options.force, options.source, progress=not options.quiet)
     paths = comparison.save(options.output)
     if not options.quiet:
-        print(aligned([thud.comparison.HEADER, *comparison.table()]))
+        print(format_rows([thud.comparison.HEADER, *comparison.table()]))
         print(f"Page: {paths[-1]}")
     return 0
 

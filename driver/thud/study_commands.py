@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import thud
 from thud.checks import replace_file, require_output
 from thud.levels import BANDWIDTHS
-from thud.tables import aligned
+from thud.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse
@@ -84,7 +84,7 @@ def _run(options: argparse.Namespace) -> int:
     if computed:
         plot.save_all({study.name: draw(result)}, folder)
     if not options.quiet:
-        print(aligned(_summary(dataset) if options.kind == "sweep" else result.table()))
+        print(format_rows(_summary(dataset) if options.kind == "sweep" else result.table()))
         print(f"Results: {folder}")
     _print_failures(dataset)
     return 0 if computed else thud.NumericalError.exit_code
