@@ -59,7 +59,6 @@ __all__ = [  # noqa: PLE0604 - the first are strings too
 # time.
 _LATE = {
     "plot": None,
-    "mesh_plot": None,
     "comparison": None,
     "compare": "comparison",
     "fitting": None,

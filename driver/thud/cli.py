@@ -16,13 +16,11 @@ from tqdm import tqdm
 import thud
 from thud._api import call, api, text
 from thud.checks import require_output
-from thud.study_commands import FORMATS, add_study_commands
-from thud.tables import aligned
+from thud.study_commands import add_study_commands
+from thud.tables import format_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from matplotlib.figure import Figure
+    from collections.abc import Iterator, Sequence
 
 NOT_CONFORMING = 3
 INTERRUPTED = 130
@@ -182,9 +180,11 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     # The library pads its answer with blanks; a directory of the user's may end with them.
     folder = Path(output or os.fsdecode(directory.rstrip()))
     if not options.no_figures:
-        _draw(folder, _case_figures(case, folder))
+        impact = thud.read_results(folder) if case.model else None
+        modes = thud.free_modes(case.ball, **vars(case.modes)) if case.modes else None
+        thud.plot.save_all(thud.plot.case_figures(impact, modes), folder)
     if options.animation and (folder / "motion.pvd").exists():
-        thud.mesh_plot.animate(thud.read_results(folder), folder / "motion.gif")
+        thud.plot.animate(thud.read_results(folder), folder / "motion.gif")
     if not options.quiet:
         tqdm.write(f"{text(table)}\n  Results: {folder}\n")
     return bool(conforming)
@@ -206,34 +206,12 @@ def _interruptible() -> Iterator[None]:
         signal.signal(signal.SIGINT, usual)
 
 
-def _case_figures(case: thud.Case, folder: Path) -> dict[str, Callable[[], Figure]]:
-    """Return the figures of a case whose results are in a directory."""
-    figures: dict[str, Callable[[], Figure]] = {}
-    if case.modes:
-        modes = thud.free_modes(case.ball, **vars(case.modes))
-        figures["modes"] = lambda: thud.mesh_plot.mode_shapes(modes)
-    if case.model:
-        impact = thud.read_results(folder)
-        name = case.name.replace("_", " ")
-        source = case.limits.source
-        figures["force"] = lambda: thud.plot.force_history({name: impact}, force=None)
-        figures["levels"] = lambda: thud.plot.levels({name: impact}, source=source)
-        if impact.motion:
-            figures["motion"] = lambda: thud.mesh_plot.motion(impact)
-        model = case.model
-        if isinstance(model, thud.FiniteElement) and model.viscosity != "none":
-            figures["loss_factor"] = lambda: thud.mesh_plot.loss_factor(
-                {model.viscosity.replace("_", " "): model}
-            )
-    return figures
-
-
 def _figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper and of the documentation."""
-    from thud.figures import get_figures  # noqa: PLC0415 - matplotlib takes its time
-
     options.output.mkdir(parents=True, exist_ok=True)
-    _draw(options.output, get_figures(), quiet=options.quiet)
+    figures = thud.plot.documentation_figures()
+    for name, draw in tqdm(figures.items(), unit="figure", disable=options.quiet, leave=False):
+        thud.plot.save_all({name: draw()}, options.output)
     if not options.quiet:
         print(f"Figures: {options.output}")
     return 0
@@ -246,7 +224,7 @@ def _compare(options: argparse.Namespace) -> int:
     comparison = thud.compare(found, options.force, options.source, progress=not options.quiet)
     paths = comparison.save(options.output)
     if not options.quiet:
-        print(aligned([thud.comparison.HEADER, *comparison.table()]))
+        print(format_rows([thud.comparison.HEADER, *comparison.table()]))
         print(f"Page: {paths[-1]}")
     return 0
 
@@ -255,14 +233,6 @@ def _fit(options: argparse.Namespace) -> int:
     """Fit parameters as a study says."""
     require_output(options.output)
     return int(thud.fitting.run(options))
-
-
-def _draw(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:
-    """Draw figures and save them as PNG and SVG."""
-    for name, draw in tqdm(figures.items(), unit="figure", disable=quiet, leave=False):
-        figure = draw()
-        for ending in FORMATS:
-            thud.plot.save(figure, folder / f"{name}{ending}")
 
 
 def _exit_code(error: Exception) -> int:

@@ -13,12 +13,13 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 from tqdm import tqdm
 
-from thud import plot
 from thud.case import Case, read_case
 from thud.checks import replace_file, require_kind
 from thud.errors import InputError, ThudError
 from thud.impact import Impact, solve_case
 from thud.levels import get_bands, octave_limits
+from thud.plot.comparison import comparison_page
+from thud.plot.look import COLOURS, save_all
 from thud.recording import Recording
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ class Comparison:
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        return plot.comparison_page(self.impacts, self.force, self.source, [HEADER, *self.table()])
+        return comparison_page(self.impacts, self.force, self.source, [HEADER, *self.table()])
 
     def html(self) -> str:
         """Return the page as HTML with interactive plots, complete in one file."""
@@ -101,7 +102,7 @@ class Comparison:
             col=1,
         )
         for i, (name, impact) in enumerate(self.impacts.items()):
-            look = {"color": plot.COLOURS[i % len(plot.COLOURS)]}
+            look = {"color": COLOURS[i % len(COLOURS)]}
             group = {"name": html.escape(name), "legendgroup": str(i)}
             force = impact.force(self.force)
             # Nothing is drawn long after the contact.
@@ -144,12 +145,10 @@ class Comparison:
         """
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
-        figure = self.figure()
-        paths = [folder / f"comparison.{ending}" for ending in ("png", "svg", "html")]
-        for path in paths[:2]:
-            plot.save(figure, path)
-        replace_file(paths[2], self.html().encode())
-        return paths
+        pictures = save_all({"comparison": self.figure()}, folder)
+        page = folder / "comparison.html"
+        replace_file(page, self.html().encode())
+        return [*pictures, page]
 
 
 def compare(

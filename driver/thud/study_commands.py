@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import thud
 from thud.checks import replace_file, require_output
 from thud.levels import BANDWIDTHS
-from thud.tables import aligned
+from thud.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-FORMATS = (".png", ".svg")
 _COMMANDS = {
     "sweep": "drops over a grid, a list or a random design of parameters",
     "sensitivity": "Sobol indices: which parameter matters for what",
@@ -54,18 +53,17 @@ def add_study_commands(commands: Any) -> None:  # noqa: ANN401 - argparse does n
 
 def _run(options: argparse.Namespace) -> int:
     """Run a study, draw its figure, print what it tells."""
-    from thud.studies import figures  # noqa: PLC0415 - takes its time
+    from thud import plot  # noqa: PLC0415 - takes its time
     from thud.studies.run import describe  # noqa: PLC0415
-    from thud.studies.sweep_figure import draw_sweep  # noqa: PLC0415
 
     require_output(options.output)
     study = thud.read_study(options.study, options.kind)
     folder = Path(options.output or Path("outputs") / study.name)
     studies: dict[str, tuple[Callable[..., Any], Callable[..., Figure]]] = {
-        "sweep": (thud.sweep, draw_sweep),
-        "sensitivity": (thud.sensitivity, figures.draw_sensitivity),
-        "design": (thud.design_map, figures.draw_design_map),
-        "uncertainty": (thud.uncertainty, figures.draw_uncertainty),
+        "sweep": (thud.sweep, plot.draw_sweep),
+        "sensitivity": (thud.sensitivity, plot.draw_sensitivity),
+        "design": (thud.design_map, plot.draw_design_map),
+        "uncertainty": (thud.uncertainty, plot.draw_uncertainty),
     }
     compute, draw = studies[options.kind]
     if not options.quiet:
@@ -84,11 +82,9 @@ def _run(options: argparse.Namespace) -> int:
         replace_file(folder / f"{study.name}_indices.csv", result.csv())
     computed = int((dataset["status"] == 0).sum())
     if computed:
-        figure = draw(result)
-        for ending in FORMATS:
-            thud.plot.save(figure, folder / f"{study.name}{ending}")
+        plot.save_all({study.name: draw(result)}, folder)
     if not options.quiet:
-        print(aligned(_summary(dataset) if options.kind == "sweep" else result.table()))
+        print(format_rows(_summary(dataset) if options.kind == "sweep" else result.table()))
         print(f"Results: {folder}")
     _print_failures(dataset)
     return 0 if computed else thud.NumericalError.exit_code

@@ -8,10 +8,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
 
-def aligned(rows: Iterable[Sequence[str]]) -> str:
-    """Return rows of text as lines whose columns stand below each other.
+def format_rows(rows: Iterable[Sequence[str]]) -> str:
+    """Return rows of text as lines with columns of even width.
 
-    >>> print(aligned([("octave", "level"), ("31.5", "39")]))
+    >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
     octave  level
     31.5    39
     """

@@ -10,7 +10,6 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
-from thud.studies import figures
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -65,7 +64,7 @@ def test_map_holds_the_verdicts_of_single_drops() -> None:
 def test_ball_of_the_paper_is_marked() -> None:
     result = thud.design_map(MODAL)
     assert (result.mark, result.mark_name) == ((0.032, 1.6e6), "paper's ball")
-    axes, _ = figures.draw_design_map(result).axes
+    axes, _ = thud.plot.draw_design_map(result).axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.6))
     assert axes.get_xlabel() == "Wall thickness, mm"
@@ -78,7 +77,7 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
     height = {"low": 1, "high": 2, "count": 2, "scale": "log"}
     result = thud.design_map({"parameters": {"youngs_modulus": modulus, "height": height}})
-    figure = figures.draw_design_map(result)
+    figure = thud.plot.draw_design_map(result)
     axes, _ = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     # 1e8 Pa would need a power of ten beside the axis, over the legend.
@@ -89,13 +88,13 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     assert {"0.1", "1", "10", "100"} <= set(shown)
     shown = [text.get_text() for text in axes.get_yticklabels()]
     assert {"1", "1.2", "1.4"} <= set(shown)
-    assert figures.draw_design_map(thud.design_map(MODAL)).axes[0].get_xscale() == "linear"
+    assert thud.plot.draw_design_map(thud.design_map(MODAL)).axes[0].get_xscale() == "linear"
 
 
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     heights = {"low": 0.1, "high": 0.5, "count": 4}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
-    axes, bar = figures.draw_design_map(thud.design_map(study)).axes
+    axes, bar = thud.plot.draw_design_map(thud.design_map(study)).axes
     low, high = bar.get_ylim()
     margin = thud.design_map(study).dataset["margin"].values
     assert low <= margin.min()
@@ -109,12 +108,12 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
 def test_map_of_nearly_one_margin_is_drawn() -> None:
     heights = {"low": 0.1, "high": 0.1001, "count": 2}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
-    axes, _ = figures.draw_design_map(thud.design_map(study)).axes
+    axes, _ = thud.plot.draw_design_map(thud.design_map(study)).axes
     assert not axes.texts
 
 
 def test_star_on_the_edge_is_whole() -> None:
-    axes, _ = figures.draw_design_map(thud.design_map(MODAL)).axes
+    axes, _ = thud.plot.draw_design_map(thud.design_map(MODAL)).axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     assert not star.get_clip_on()
 
@@ -126,7 +125,7 @@ def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
     }
     result = thud.design_map(study)
     assert (result.mark, result.mark_name) == (None, "base case")
-    axes, _ = figures.draw_design_map(result).axes
+    axes, _ = thud.plot.draw_design_map(result).axes
     assert axes.get_legend() is None
     study["parameters"]["height"] = {"values": [1.0, 1.5]}
     assert thud.design_map(study).mark == (0.1, 1.0)
@@ -161,7 +160,7 @@ def test_places_without_results_stay_empty() -> None:
     study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
     result = thud.design_map(study)
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
-    figures.draw_design_map(result)
+    thud.plot.draw_design_map(result)
     assert ("sets", "9") in result.table()
 
 

@@ -197,36 +197,6 @@ def test_pressure_is_even_at_the_pole() -> None:
     assert 0 < missing[1] < missing[0] < 0.1
 
 
-def test_figures_show_what_they_should(impact: thud.Impact, tmp_path: Path) -> None:
-    motion = thud.mesh_plot.motion(impact)
-    panels = [axes for axes in motion.axes if axes.get_title()]
-    times = [float(axes.get_title().removesuffix(" ms")) for axes in panels]
-    assert len(times) == 9
-    assert times == sorted(times)
-    assert times[-1] == pytest.approx(1e3 * impact.contact_time, abs=0.6)
-    modes = thud.free_modes(count=4, **COARSE)
-    titles = [axes.get_title() for axes in thud.mesh_plot.mode_shapes(modes).axes]
-    assert titles[:4] == [
-        f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
-    ]
-    laws = {law: thud.FiniteElement(viscosity=law) for law in ("kelvin_voigt", "constant_loss")}
-    (axes,) = thud.mesh_plot.loss_factor(laws).axes
-    assert axes.get_xlabel() == "Frequency, Hz"
-    rising, constant = (line.get_ydata() for line in axes.lines)
-    assert rising[-1] / rising[0] == pytest.approx(100)
-    np.testing.assert_allclose(constant, 0.2, rtol=3e-3)
-    for figure in (motion, thud.mesh_plot.mode_shapes(modes)):
-        assert figure.get_figwidth() == pytest.approx(3.5)
-        thud.plot.save(figure, tmp_path / "figure.png")
-
-
-def test_figures_without_snapshots_are_told(tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match="snapshot_interval > 0"):
-        thud.mesh_plot.motion(thud.solve())
-    with pytest.raises(thud.InputError, match=r"allowed: \.gif"):
-        thud.mesh_plot.animate(thud.solve(), tmp_path / "ball.mp4")
-
-
 BAD = {
     "&mesh radial_elements = 0 /": "&mesh: radial_elements = 0",
     "&mesh polar_elements = 7 /": "&mesh: polar_elements = 7",

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import thud
-from thud.fitting import drawing
+from thud.plot.confidence import LINE, _label, confidence
+from thud.plot.fit import draw_fit, target_and_fit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,13 +35,13 @@ def labels(figure: Figure) -> list[str]:
 
 @pytest.mark.parametrize(("noise", "shown"), [(1.0, False), (40.0, True)])
 def test_record_is_drawn_where_it_can_be_seen(noise: float, shown: bool) -> None:  # noqa: FBT001
-    figure = drawing.target_and_fit(fit_with_noise(noise, "youngs_modulus"))
+    figure = target_and_fit(fit_with_noise(noise, "youngs_modulus"))
     assert ("Record" in labels(figure)) is shown
 
 
 def test_noise_is_that_of_the_band() -> None:
     fit = fit_with_noise(5.0, "youngs_modulus")
-    figure = drawing.target_and_fit(fit)
+    figure = target_and_fit(fit)
     assert labels(figure) == ["Record below 1.25 kHz", "Fit", r"Noise below 1.25 kHz, $\pm2\sigma$"]
     below = figure.axes[1]
     # White noise of 22.05 kHz, of which 1.25 kHz are left.
@@ -48,11 +51,11 @@ def test_noise_is_that_of_the_band() -> None:
     assert low == -high
 
 
-def test_labels_break_where_there_is_no_room() -> None:
+def test_labels_break_where_they_do_not_fit() -> None:
     units = {"youngs_modulus": ("MPa", 1e6)}
-    assert drawing._label("youngs_modulus", units, drawing.LINE / 2) == "Young's modulus, MPa"  # noqa: SLF001
-    assert drawing._label("youngs_modulus", units, drawing.LINE / 3) == "Young's modulus,\nMPa"  # noqa: SLF001
-    figure = drawing.confidence(
+    assert _label("youngs_modulus", units, LINE / 2) == "Young's modulus, MPa"
+    assert _label("youngs_modulus", units, LINE / 3) == "Young's modulus,\nMPa"
+    figure = confidence(
         fit_with_noise(5.0, "youngs_modulus", "height"),
         {"youngs_modulus": ("MPa", 1e6), "height": ("m", 1.0), "time_shift": ("ms", 1e-3)},
     )
@@ -60,3 +63,33 @@ def test_labels_break_where_there_is_no_room() -> None:
         axes.get_ylabel() for axes in figure.axes
     }
     assert shown == {"", "Young's modulus, MPa", "Height, m", "Time shift, ms"}
+
+
+def test_level_target_has_no_ellipse_of_one_parameter() -> None:
+    levels = IMPACT.levels(force="floor").tolist()
+    fit = thud.fit(thud.LevelTarget(levels, uncertainty=0.5), ["youngs_modulus"])
+    figures = draw_fit(fit, fit.shown_units())
+    assert list(figures) == ["fit"]
+    assert [text.get_text() for text in figures["fit"].axes[0].get_legend().get_texts()] == [
+        *("Its standard deviation", "Target", "Fit")
+    ]
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_ellipse_is_the_joint_confidence_region(known: bool) -> None:  # noqa: FBT001
+    fit = fit_with_noise(5.0, "youngs_modulus", "height")
+    pair = dataclasses.replace(
+        fit,
+        names=fit.names[:2],
+        units=fit.units[:2],
+        estimate=fit.estimate[:2],
+        covariance=fit.covariance[:2, :2],
+        limits=fit.limits[:2],
+        known_noise=known,
+    )
+    (axes,) = draw_fit(pair, dict.fromkeys(pair.names, ("", 1.0)))["confidence"].axes
+    points = axes.patches[0].get_xy() - pair.estimate
+    square = np.einsum("ij,jk,ik->i", points, np.linalg.inv(pair.covariance), points)
+    freedom = pair.degrees_of_freedom
+    quantile = stats.chi2.ppf(0.95, 2) if known else 2 * stats.f.ppf(0.95, 2, freedom)
+    np.testing.assert_allclose(square, quantile, rtol=1e-6)

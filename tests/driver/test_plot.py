@@ -1,16 +1,27 @@
-"""Figures: units on the axes, tolerance band, every curve in the legend, whole files."""
+"""Figures: units on the axes, tolerance band, every curve named, whole files, one file each."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import REPOSITORY
+from PIL import Image
 
 import thud
 
-if TYPE_CHECKING:
-    from pathlib import Path
+COARSE = {"radial_elements": 2, "polar_elements": 16}
+
+
+@pytest.fixture(scope="module")
+def deformed() -> thud.Impact:
+    return thud.solve(model="finite_element", flight_before=2e-3, **COARSE)
 
 
 def test_force_history_shows_every_curve_with_units() -> None:
@@ -38,7 +49,7 @@ def test_levels_show_the_tolerance_band(source: str) -> None:
     np.testing.assert_array_equal(curves["floor force"], impact.levels(force="floor"))
 
 
-def test_useless_impacts_are_told() -> None:
+def test_useless_impacts_are_refused() -> None:
     for impacts in ({}, [], thud.solve()):
         with pytest.raises(thud.InputError, match="allowed: a mapping of names to impacts"):
             thud.plot.force_history(impacts)  # type: ignore[arg-type]
@@ -63,3 +74,85 @@ def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     ]
     with pytest.raises(thud.InputError, match="allowed: "):
         thud.plot.save(figure, tmp_path / "levels.xyz")
+
+
+def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact) -> None:
+    figure = thud.plot.motion(deformed)
+    panels = [axes for axes in figure.axes if axes.get_title()]
+    times = [float(axes.get_title().removesuffix(" ms")) for axes in panels]
+    assert len(times) == 9
+    assert times == sorted(times)
+    assert times[0] == pytest.approx(0, abs=0.6)
+    assert times[-1] == pytest.approx(1e3 * deformed.contact_time, abs=0.6)
+    assert figure.get_figwidth() == pytest.approx(3.5)
+
+
+def test_animation_has_a_picture_for_each_snapshot(deformed: thud.Impact, tmp_path: Path) -> None:
+    assert deformed.motion
+    thud.plot.animate(deformed, tmp_path / "ball.gif")
+    assert [path.name for path in tmp_path.iterdir()] == ["ball.gif"]
+    with Image.open(tmp_path / "ball.gif") as pictures:
+        assert pictures.n_frames == len(deformed.motion.time)
+
+
+def test_mode_shapes_are_named() -> None:
+    modes = thud.free_modes(count=4, **COARSE)
+    figure = thud.plot.mode_shapes(modes)
+    assert [axes.get_title() for axes in figure.axes][:4] == [
+        f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
+    ]
+    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert thud.plot.mode_shapes(modes, columns=6).get_figwidth() == pytest.approx(7)
+
+
+def test_loss_factors_follow_their_laws() -> None:
+    laws = {law: thud.FiniteElement(viscosity=law) for law in ("kelvin_voigt", "constant_loss")}
+    (axes,) = thud.plot.loss_factor(laws).axes
+    assert axes.get_xlabel() == "Frequency, Hz"
+    rising, constant = (line.get_ydata() for line in axes.lines)
+    assert rising[-1] / rising[0] == pytest.approx(100)
+    np.testing.assert_allclose(constant, 0.2, rtol=3e-3)
+
+
+def test_figures_without_snapshots_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(thud.InputError, match="snapshot_interval > 0"):
+        thud.plot.motion(thud.solve())
+    with pytest.raises(thud.InputError, match=r"allowed: \.gif"):
+        thud.plot.animate(thud.solve(), tmp_path / "ball.mp4")
+
+
+@pytest.mark.parametrize(("count", "allowed"), [(0, False), (1, True), (30, True), (31, False)])
+def test_number_of_panels_has_a_range(deformed: thud.Impact, count: int, allowed: bool) -> None:  # noqa: FBT001
+    if allowed:
+        assert thud.plot.motion(deformed, count).axes
+    else:
+        with pytest.raises(thud.InputError, match=f"instants = {count} is not allowed"):
+            thud.plot.motion(deformed, count)
+
+
+def test_case_has_the_figures_of_its_results(deformed: thud.Impact) -> None:
+    modes = thud.free_modes(count=2, **COARSE)
+    assert set(thud.plot.case_figures(thud.solve())) == {"force", "levels"}
+    figures = thud.plot.case_figures(deformed)
+    assert set(figures) == {"force", "levels", "motion", "loss_factor"}
+    assert set(thud.plot.case_figures(modes=modes)) == {"modes"}
+    assert set(thud.plot.case_figures(thud.solve(), modes)) == {"force", "levels", "modes"}
+    still = thud.solve(model="finite_element", viscosity="none", snapshot_interval=0, **COARSE)
+    assert set(thud.plot.case_figures(still)) == {"force", "levels"}
+
+
+def test_figure_costs_one_file(tmp_path: Path) -> None:
+    """The example of docs/new_figure.md, on a copy of the package."""
+    page = (REPOSITORY / "docs/new_figure.md").read_text()
+    (source,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    package = tmp_path / "thud"
+    shutil.copytree(Path(thud.__file__).parent, package)
+    (package / "plot/force_loop.py").write_text(source)
+    case = REPOSITORY / "inputs/rubber_ball_100cm.nml"
+    for arguments in (["run", "-q", "-o", "out", str(case)], ["figures", "-q", "-o", "out/drawn"]):
+        command = [sys.executable, "-m", "thud.cli", *arguments]
+        place = {**os.environ, "PYTHONPATH": str(tmp_path)}
+        subprocess.run(command, cwd=tmp_path, env=place, check=True)
+    for name in ("out/force.svg", "out/force_loop.svg", "out/drawn/two_loops.svg"):
+        assert (tmp_path / name).stat().st_size > 1e4
+    assert (tmp_path / "out/force_loop.png").exists()

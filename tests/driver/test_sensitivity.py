@@ -10,7 +10,7 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
-from thud.studies import figures, sets
+from thud.studies import sets
 from thud.studies.influence import sobol_indices
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def test_samples_without_results_are_left_out() -> None:
 
 
 def test_figure_shows_every_index(lumped: Sensitivity) -> None:
-    figure = figures.draw_sensitivity(lumped)
+    figure = thud.plot.draw_sensitivity(lumped)
     (axes,) = figure.axes
     widths = [bar.get_width() for bars in axes.containers[::3] for bar in bars]
     expected = lumped.indices["total"].transpose("parameter", "output").values.ravel()
@@ -109,7 +109,7 @@ def test_figure_of_five_parameters_fits_on_half_a_page() -> None:
         "wall_thickness": {"low": 0.03, "high": 0.034},
     }
     study = {**LUMPED, "design": {"size": 8}, "parameters": parameters}
-    assert figures.draw_sensitivity(thud.sensitivity(study)).get_figheight() < 4.4
+    assert thud.plot.draw_sensitivity(thud.sensitivity(study)).get_figheight() < 4.4
 
 
 def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -21,7 +21,6 @@ import thud
 from thud import cli, tables, units
 from thud.keys import known_keys
 from thud.studies import designs, evaluation, run, sets
-from thud.studies.sweep_figure import draw_sweep
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
@@ -80,7 +79,7 @@ def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
         for name, kind in ((f"{force}_level", "octave"), (f"{force}_third_level", "third")):
             cell = found[name].sel(height=0.5, mass=2.6)
             np.testing.assert_allclose(cell, impact.levels(kind, force=force), atol=1e-6)
-    assert draw_sweep(found).axes
+    assert thud.plot.draw_sweep(found).axes
 
 
 def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import thud
-from thud.studies.sweep_figure import draw_sweep
+from thud.plot import draw_sweep
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

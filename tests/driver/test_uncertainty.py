@@ -11,7 +11,6 @@ from scipy.stats import binomtest
 
 import thud
 from thud import cli
-from thud.studies import figures
 from thud.studies.tolerances import wilson_interval
 
 if TYPE_CHECKING:
@@ -93,7 +92,7 @@ def test_sets_without_results_are_counted_apart() -> None:
 
 def test_figure_shows_distribution_over_tolerance() -> None:
     result = thud.uncertainty({**SMALL, "design": {"size": 40}})
-    (axes,) = figures.draw_uncertainty(result).axes
+    (axes,) = thud.plot.draw_uncertainty(result).axes
     limits = thud.solve().conformity().criteria[:5]
     boxes = [body.get_datalim(axes.transData).intervaly for body in axes.collections[:5]]
     half = [(c.upper - c.lower) / 2 for c in limits]

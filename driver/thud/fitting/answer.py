@@ -25,12 +25,9 @@ class Fit(Estimates):
 
     def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
         """Return the figures by name; `units` as in `table`."""
-        from thud.fitting import drawing  # noqa: PLC0415 - matplotlib takes its time
+        from thud.plot.fit import draw_fit  # noqa: PLC0415 - matplotlib takes its time
 
-        figures = {"fit": drawing.target_and_fit(self)}
-        if len(self.names) > 1:
-            figures["confidence"] = drawing.confidence(self, self.shown_units(units))
-        return figures
+        return draw_fit(self, self.shown_units(units))
 
     def save(
         self,
@@ -75,10 +72,7 @@ class Fit(Estimates):
         replace_file(paths[1], "".join(f"{','.join(map(str, row))}\n" for row in rows).encode())
         write_case(self.case, paths[2])
         if figures:
-            from thud import plot  # noqa: PLC0415 - matplotlib takes its time
+            from thud.plot.look import save_all  # noqa: PLC0415 - matplotlib takes its time
 
-            for name, figure in self.figures(units).items():
-                for ending in ("png", "svg"):
-                    paths.append(folder / f"{name}.{ending}")
-                    plot.save(figure, paths[-1])
+            paths += save_all(self.figures(units), folder)
         return paths

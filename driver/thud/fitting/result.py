@@ -9,7 +9,7 @@ import numpy as np
 
 from thud._api import version
 from thud.fitting.inference import coverage_factor
-from thud.tables import aligned
+from thud.tables import format_rows
 from thud.units import handy_unit
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ class Estimates:
             if not np.isfinite(error):
                 interval = "not known"
             rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
-        return "\n".join([aligned(rows), "", *self._remarks()])
+        return "\n".join([format_rows(rows), "", *self._remarks()])
 
     def shown_units(
         self, units: Mapping[str, tuple[str, float]] | None = None

@@ -5,17 +5,17 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from thud.impact import FORCES
 from thud.keys import plain_words
 from thud.levels import BANDWIDTHS, get_bands, octave_limits
-from thud.plot import COLOURS, COMPACT, LINES, MARKERS, SIZE, WIDTH, dress
-from thud.studies.axes import show_parameter, words
+from thud.plot.look import COLOURS, COMPACT, SIZE, dress, line_style, marker_style, new_figure
+from thud.plot.parameter_axis import show_parameter, words
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     Columns = dict[str, NDArray[Any]]
@@ -31,7 +31,7 @@ _TINY = 0.05
 
 
 class _Judged(NamedTuple):
-    """Levels of each set less the nominal ones, and the least and largest tolerance of all, dB."""
+    """Levels of each set less the nominal ones, minimum and maximum tolerance of all, dB."""
 
     excess: NDArray[np.float64]
     tolerance: tuple[float, float]
@@ -41,7 +41,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
     Each value of the first parameter of texts, up to six of them, has its panel. Lines are medians
-    over the other parameters, shades reach from the least to the largest.
+    over the other parameters, shades reach from the minimum to the maximum.
 
     Parameters
     ----------
@@ -65,14 +65,12 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
         parts = {str(value): columns[split] == value for value in np.unique(columns[split])}
     across = 1 if len(parts) == 1 else 2
     down = -(-len(parts) // across)
-    figure = Figure(figsize=(WIDTH, 1.1 + (1.9 if across == 1 else 1.6) * down), dpi=300)
-    figure.set_layout_engine("constrained")
+    figure = new_figure(1.1 + (1.9 if across == 1 else 1.6) * down)
     panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
     for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
         _draw_tolerance(dress(axes), judged.tolerance)
         levels = np.where(panel[:, np.newaxis], judged.excess, np.nan)
-        most = _MAX_MARKS // across
-        _draw_octaves(axes, dataset[name], columns[name], levels, most)
+        _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // across)
         axes.set_title(title.replace("_", " "), fontsize=SIZE - 1)
         lowest = i + across >= len(parts)
         axes.tick_params(axis="x", labelbottom=lowest)
@@ -111,7 +109,7 @@ def _judge(dataset: xr.Dataset, columns: Columns) -> _Judged:
 
 
 def _draw_tolerance(axes: Axes, tolerance: tuple[float, float]) -> None:
-    """Draw the largest tolerance of an octave, and the least on it, around the nominal level."""
+    """Draw the maximum tolerance of an octave, and the minimum on it, around the nominal level."""
     for width, colour in zip(reversed(tolerance), ("0.92", "0.84"), strict=True):
         axes.axhspan(-width, width, color=colour, linewidth=0, zorder=0)
     axes.axhline(0, color="0.45", linewidth=0.8)
@@ -122,7 +120,7 @@ def _draw_octaves(
     parameter: xr.DataArray,
     values: NDArray[Any],
     levels: NDArray[np.float64],
-    most_marks: int,
+    max_marks: int,
 ) -> None:
     """Draw the octave levels of sets, those that are not NaN, against a parameter."""
     places, members, names = _classes(values)
@@ -134,15 +132,13 @@ def _draw_octaves(
         axes.set_xlabel(words(parameter), fontsize=SIZE)
     for i, band in enumerate(get_bands().nominal):
         found = [levels[chosen, i] for chosen in members]
-        middle, least, most = (
+        middle, lower, upper = (
             np.array([_of(part, f) for part in found]) for f in (np.median, np.min, np.max)
         )
-        style: dict[str, Any] = {"color": COLOURS[i], "linestyle": LINES[i], "linewidth": 1.2}
-        if len(places) <= most_marks:
-            style |= {"marker": MARKERS[i], "markersize": 3}
-        axes.plot(places, middle, label=f"{band:g} Hz", **style)
-        if np.nanmax(most - least, initial=0) > _TINY:
-            axes.fill_between(places, least, most, color=COLOURS[i], alpha=0.15, linewidth=0)
+        marks = marker_style(i, 3) if len(places) <= max_marks else {}
+        axes.plot(places, middle, label=f"{band:g} Hz", **line_style(i), **marks)
+        if np.nanmax(upper - lower, initial=0) > _TINY:
+            axes.fill_between(places, lower, upper, color=COLOURS[i], alpha=0.15, linewidth=0)
 
 
 def _classes(
@@ -169,8 +165,8 @@ def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of
 
 def _add_legend(figure: Figure, judged: _Judged, split: str | None, others: list[str]) -> None:
     """Name the octaves over the panels, and what panels, lines, shades and grey are."""
-    least, most = judged.tolerance
-    lines = [f"Grey: tolerances of the octaves, ±{least:g} to ±{most:g} dB"]
+    minimum, maximum = judged.tolerance
+    lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
         over = plain_words(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.insert(0, f"Lines: median over {over}; shades: range")

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from thud.keys import plain_words
-from thud.plot import SIZE
+from thud.plot.look import SIZE
 from thud.units import handy_unit
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Which = Literal["x", "y"]
 # Numbers outside of these, of a parameter that has its key's unit, are shown in a handier one.
 _PLAIN = (1e-2, 1e4)
-# Largest value over least, from which ticks of a logarithmic axis are 1, 2, 5, and powers of ten.
+# Maximum over minimum, from which ticks of a logarithmic axis are 1, 2, 5, and powers of ten.
 _HALF_DECADE, _DECADES = 5.0, 200.0
 
 
@@ -41,9 +41,9 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
     """
     unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_power"])
     values = parameter.values
-    most = float(np.abs(values).max())
-    if unit == parameter.attrs["units"] and not _PLAIN[0] <= most < _PLAIN[1]:
-        unit, size = handy_unit(unit, most)
+    maximum = float(np.abs(values).max())
+    if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:
+        unit, size = handy_unit(unit, maximum)
         factor = 1 / size
     label = words(parameter) if unit == "1" else f"{words(parameter)}, {unit}"
     axes.set(**{f"{which}label": label})

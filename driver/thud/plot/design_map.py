@@ -1,0 +1,87 @@
+"""The margin to the limits of the standards over two parameters."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.ticker import MaxNLocator
+
+from thud.plot.look import SIZE, empty_axes, legend_above
+from thud.plot.parameter_axis import show_parameter
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.plot.parameter_axis import Which
+    from thud.studies import DesignMap
+
+    Values = NDArray[np.float64]
+
+_TINY = 0.05
+
+
+def draw_design_map(result: DesignMap) -> Figure:
+    """Draw the margin over two parameters, its zero as a line, and what meets all criteria.
+
+    Parameters
+    ----------
+    result
+        What `design_map` gives.
+
+    Returns
+    -------
+    Figure
+        Margin in dB, positive where all octave levels lie within their limits.
+    """
+    dataset = result.dataset
+    figure, axes = empty_axes(2.9)
+    which: tuple[Which, Which] = ("x", "y")
+    scales = [
+        show_parameter(axes, w, dataset[name]) for w, name in zip(which, result.axes, strict=True)
+    ]
+    x, y = (dataset[name].values * scale for name, scale in zip(result.axes, scales, strict=True))
+    margin = np.ma.masked_invalid(dataset["margin"].transpose(*result.axes).values.T)
+    conforms = dataset["conforms"].transpose(*result.axes).values.T
+    if margin.count():
+        _draw_margin(figure, axes, (x, y), margin)
+    row, column = np.nonzero(conforms)
+    if row.size:
+        axes.plot(x[column], y[row], ".", markersize=2, color="black", label="all criteria met")
+    if result.mark:
+        place = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
+        axes.plot(
+            *place, "*", markersize=9, markerfacecolor="white", markeredgecolor="black",
+            linestyle="none", label=result.mark_name, clip_on=False, zorder=3,
+        )  # fmt: skip
+    axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+    axes.grid(visible=False)
+    if axes.get_legend_handles_labels()[0]:
+        legend_above(axes, 2)
+    return figure
+
+
+def _draw_margin(
+    figure: Figure, axes: Axes, place: tuple[Values, Values], margin: np.ma.MaskedArray[Any, Any]
+) -> None:
+    """Draw the margin as colours, white at 0, with lines at 0 and at round values."""
+    lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
+    # The colours of the smaller side, usually of what conforms, change up to four times faster.
+    norm = TwoSlopeNorm(0, min(lower, -upper / 4, -_TINY), max(upper, -lower / 4, _TINY))
+    steps = np.asarray(MaxNLocator(7).tick_values(lower, max(upper, lower + _TINY)))
+    # Five colours from one line to the next.
+    fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
+    filled = axes.contourf(*place, margin, levels=fine, cmap="PuOr", norm=norm)
+    inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
+    if inside.size:
+        lines = axes.contour(*place, margin, inside, colors="0.25", linewidths=0.4, linestyles="-")
+        axes.clabel(lines, fontsize=SIZE - 2, fmt="%g")
+    if margin.min() < 0 < margin.max():
+        axes.contour(*place, margin, levels=[0.0], colors="black", linewidths=1.2)
+        axes.plot([], [], color="black", linewidth=1.2, label="octave limits")
+    bar = figure.colorbar(filled, ax=axes, ticks=steps)
+    bar.set_label("Margin, dB", fontsize=SIZE)
+    bar.ax.tick_params(labelsize=SIZE)

@@ -1,0 +1,15 @@
+"""The impact that several figures of the documentation show."""
+
+from functools import cache
+
+from thud.case import Ball
+from thud.impact import Impact, solve
+
+# The modulus of the paper's published modes.
+PUBLISHED = Ball(youngs_modulus=2.08e6)
+
+
+@cache
+def solve_published(viscosity: str = "kelvin_voigt") -> Impact:
+    """Return the impact of the ball of the published modes by finite elements."""
+    return solve(PUBLISHED, model="finite_element", viscosity=viscosity)

@@ -1,0 +1,148 @@
+"""Figures of a fit: target and model with their difference, and confidence regions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from matplotlib.ticker import NullLocator
+
+from thud.plot.confidence import confidence
+from thud.plot.look import COLOURS, SIZE, dress, legend_above, new_figure
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from thud.fitting.force_target import ForceMisfit
+    from thud.fitting.result import Estimates
+
+# More names of bands than that are turned.
+MAX_UPRIGHT = 5
+GREY = "0.85"
+# Names that are too long for the axis or the key.
+BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
+# Where half of the samples are this part of the maximum force off, they show beside the lines.
+VISIBLE = 0.003
+# Time that is drawn before and after the contact, as part of it.
+BEFORE, AFTER = 0.15, 0.4
+
+
+def draw_fit(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
+    """Draw a fit, and how well several parameters are known together.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    units
+        Unit of each parameter: name, and how many SI units it is.
+
+    Returns
+    -------
+    dict of str to Figure
+        ``"fit"``; of two parameters or more also ``"confidence"``.
+    """
+    figures = {"fit": target_and_fit(fit)}
+    if len(fit.names) > 1:
+        figures["confidence"] = confidence(fit, units)
+    return figures
+
+
+def target_and_fit(fit: Estimates) -> Figure:
+    """Draw target and model, and below it their difference over the uncertainty.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+
+    Returns
+    -------
+    Figure
+        Forces in kN against time in ms, or levels in dB.
+    """
+    figure = new_figure(3.6)
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
+    dress(above)
+    dress(below)
+    below.axhline(0, color="0.45", linewidth=0.8)
+    if fit.misfit.deviation_unit == "N":
+        _draw_force(fit, cast("ForceMisfit", fit.misfit), above, below)
+    else:
+        _draw_levels(fit, above, below)
+    above.tick_params(axis="x", labelbottom=False)
+    figure.align_ylabels()
+    return figure
+
+
+def _draw_force(fit: Estimates, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
+    """Draw record, fit and residual."""
+    column = misfit.history_columns(fit.impact, fit.time_shift)
+    time = 1e3 * column["time_s"]
+    record, target = column["record_N"], column["target_N"]
+    band = f"below {misfit.below / 1e3:.3g} kHz"
+    if np.median(np.abs(record - target)) > VISIBLE * target.max():
+        above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
+    above.plot(
+        time, target / 1e3, color=COLOURS[0], linewidth=2.2, alpha=0.6, label=f"Record {band}"
+    )
+    above.plot(
+        time, column["model_N"] / 1e3, color=COLOURS[1], linestyle="--", linewidth=1.1, label="Fit"
+    )
+    share = np.sqrt(misfit.size / len(time))
+    width = 2 * share * fit.noise
+    below.axhspan(-width, width, color=GREY, linewidth=0)
+    below.plot(time, column["residual_N"], color=COLOURS[6], linewidth=0.7)
+    contact = fit.impact.contact_time
+    begin, end = fit.time_shift - BEFORE * contact, fit.time_shift + (1 + AFTER) * contact
+    below.set_xlim(1e3 * max(begin, misfit.time[0]), 1e3 * min(end, misfit.time[-1]))
+    below.set_xlabel("Time, ms", fontsize=SIZE)
+    above.set_ylabel(f"{misfit.kind.capitalize()} force, kN", fontsize=SIZE)
+    below.set_ylabel("Fit - target, N", fontsize=SIZE)
+    limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
+    below.set_ylim(-limit, limit)
+    # Below, it would cover the curve.
+    above.fill_between([], [], color=GREY, linewidth=0, label=rf"Noise {band}, $\pm2\sigma$")
+    legend_above(above, 2, "lower right")
+
+
+def _draw_levels(fit: Estimates, above: Axes, below: Axes) -> None:
+    """Draw levels with their uncertainty, and whatever else was compared in the residuals."""
+    column = fit.misfit.columns(fit.impact, 0.0)
+    names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
+    values = {
+        name: np.array(column[name], dtype=np.float64)
+        for name in ("target", "uncertainty", "model")
+    }
+    place = np.arange(len(names))
+    count = sum(str(name).endswith(" Hz") for name in column["quantity"])
+    scale = 1.0 if fit.known_noise else fit.noise
+    for i in range(count):
+        edge = values["target"][i] + scale * np.array([-1, 1]) * values["uncertainty"][i]
+        name = "Target" if i == 0 else None
+        band = "Its standard deviation" if i == 0 else None
+        above.fill_between([i - 0.35, i + 0.35], *edge, color="0.75", linewidth=0, label=band)
+        above.plot(
+            [i - 0.35, i + 0.35], 2 * [values["target"][i]], color=COLOURS[0], linewidth=1.2,
+            label=name,
+        )  # fmt: skip
+    above.plot(
+        place[:count], values["model"][:count], color=COLOURS[1], linestyle="--", linewidth=1,
+        marker="o", markersize=4, label="Fit",
+    )  # fmt: skip
+    below.axhspan(-1, 1, color=GREY, linewidth=0)
+    below.plot(place, fit.residuals, color=COLOURS[1], marker="o", markersize=4, linestyle="none")
+    limit = 1.2 * max(1.2, np.abs(fit.residuals).max())
+    below.set_ylim(-limit, limit)
+    below.set_xticks(place, [BROKEN.get(name, name) for name in names])
+    below.xaxis.set_minor_locator(NullLocator())
+    below.set_xlim(-0.6, len(names) - 0.4)
+    if count > MAX_UPRIGHT:
+        below.tick_params(axis="x", labelrotation=90)
+    below.set_xlabel("Band, Hz", fontsize=SIZE)
+    above.set_ylabel("Force exposure level, dB", fontsize=SIZE)
+    below.set_ylabel("(Fit - target)\n/ uncertainty", fontsize=SIZE)
+    above.legend(fontsize=SIZE - 1, frameon=False)

@@ -1,0 +1,72 @@
+"""Loss factor of materials against frequency."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from thud.errors import InputError
+from thud.free_modes import loss_factors
+from thud.impact import Impact
+from thud.models import FiniteElement
+from thud.plot.look import SIZE, add_curves, empty_axes
+
+
+def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
+    """Draw the loss factor of materials against frequency.
+
+    Parameters
+    ----------
+    models
+        Models with a material by their names in the legend.
+
+    Returns
+    -------
+    Figure
+        Frequency in Hz and loss factor, both logarithmic.
+
+    Raises
+    ------
+    InputError
+        Where `models` is not a mapping of names to such models, or empty.
+    """
+    if not isinstance(models, Mapping) or not models:
+        message = "models are not given; allowed: a mapping of names to models, at least one"
+        raise InputError(message)
+    figure, axes = empty_axes(2.5)
+    frequency = np.geomspace(10, 1000, 200)
+    add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")
+    axes.set_xlabel("Frequency, Hz", fontsize=SIZE)
+    axes.set_ylabel("Loss factor", fontsize=SIZE)
+    axes.legend(fontsize=SIZE, frameon=False)
+    return figure
+
+
+def _draw_viscosity(impact: Impact) -> Figure | None:
+    """Draw the material of a model that has a viscous one."""
+    viscosity = impact.case.to_namelist().get("material", {}).get("viscosity", "none")
+    if viscosity == "none":
+        return None
+    model: Any = impact.case.model
+    return loss_factor({viscosity.replace("_", " "): model})
+
+
+def _draw_laws() -> Figure:
+    """Draw the laws of viscosity."""
+    laws = {
+        "Kelvin-Voigt": FiniteElement(),
+        "Prony series, constant": FiniteElement(viscosity="constant_loss"),
+        "Prony series, one term": FiniteElement(
+            viscosity="prony", prony_share=(0.5,), prony_time=(1.5e-3,)
+        ),
+    }
+    return loss_factor(laws)
+
+
+IMPACT_FIGURES = {"loss_factor": _draw_viscosity}
+DOCUMENTATION_FIGURES = {"loss_factor": _draw_laws}

@@ -1,0 +1,160 @@
+"""The deforming ball: instants of the impact (paper, figure 5), and an animation."""
+
+import os
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from matplotlib.animation import FuncAnimation, PillowWriter
+from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from thud.checks import replace_file, require_kind
+from thud.errors import InputError
+from thud.impact import Impact
+from thud.motion import Motion
+from thud.plot.examples import solve_published
+from thud.plot.half_section import add_colour_bar, draw_section, require_panels
+from thud.plot.look import SIZE, WIDTH, new_figure
+
+# Instants of the paper's figure 5.
+INSTANTS = 9
+# Nodes between two arrows, from pole to pole and through the wall.
+ARROWS = (4, 4)
+FRAMES_PER_SECOND = 12
+
+
+def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
+    """Draw instants of the impact: displacement by colour, velocity by arrows (paper, figure 5).
+
+    Parameters
+    ----------
+    impact
+        An impact with snapshots.
+    instants
+        Number of instants, at even times from first touch to release.
+
+    Returns
+    -------
+    Figure
+        Half sections on the floor; displacement since first touch in mm, time in ms.
+
+    Raises
+    ------
+    InputError
+        Where the impact has no snapshots, or no figure has so many panels.
+    """
+    shown = _snapshots(impact)
+    require_panels("instants", instants)
+    wanted = impact.touch_time + np.linspace(0, impact.contact_time, instants)
+    # Fewer panels where there are fewer snapshots.
+    chosen = sorted({int(np.argmin(np.abs(shown.time - time))) for time in wanted})
+    rows = -(-len(chosen) // 3)
+    figure = new_figure(0.6 + 1.6 * rows)
+    panels = figure.subplots(rows, 3, squeeze=False).ravel()
+    scale = _scale(shown, chosen)
+    for axes, i in zip(panels, chosen, strict=False):
+        _draw_instant(axes, impact, shown, i, scale)
+    for axes in panels:
+        axes.set_axis_off()
+    add_colour_bar(figure, panels, scale, _label(impact))
+    return figure
+
+
+def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
+    """Save the motion of the ball as an animated GIF, one picture for each snapshot.
+
+    Parameters
+    ----------
+    impact
+        An impact with snapshots.
+    path
+        Path of the file, which ends with ``.gif``.
+
+    Raises
+    ------
+    InputError
+        Where the impact has no snapshots or the path another ending.
+    OSError
+        Where the file cannot be written.
+    """
+    if Path(path).suffix.lower() != ".gif":
+        message = f"{path}: this ending is not known; allowed: .gif"
+        raise InputError(message)
+    shown = _snapshots(impact)
+    figure = Figure(figsize=(WIDTH, WIDTH), dpi=120, layout="constrained")
+    axes = figure.subplots()
+    count = len(shown.time)
+    scale = _scale(shown, range(count))
+    add_colour_bar(figure, [axes], scale, _label(impact))
+
+    def draw(i: int) -> list[Any]:
+        axes.clear()
+        _draw_instant(axes, impact, shown, i, scale)
+        axes.set_axis_off()
+        return []
+
+    animation = FuncAnimation(figure, draw, frames=count, blit=False)
+    with TemporaryDirectory() as folder:
+        whole = Path(folder, "motion.gif")
+        animation.save(whole, writer=PillowWriter(fps=FRAMES_PER_SECOND))
+        replace_file(path, whole.read_bytes())
+
+
+def _snapshots(impact: Impact) -> Motion:
+    """Return the snapshots of an impact; raise InputError where it has none."""
+    require_kind("impact", impact, Impact)
+    if impact.motion is None:
+        message = (
+            "the impact has no snapshots; allowed: a model with snapshots, snapshot_interval > 0"
+        )
+        raise InputError(message)
+    return impact.motion
+
+
+def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
+    """Return the scale of the colours of some snapshots, mm."""
+    return Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
+
+
+def _label(impact: Impact) -> str:
+    """Return what colours and arrows mean."""
+    return f"Displacement, mm (arrows: a third of the radius is {impact.impact_velocity:.1f} m/s)"
+
+
+def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
+    """Return the displacements since first touch, m, shape (n_line, n_ring)."""
+    touching = shown.start - [0, shown.start[..., 1].min()]
+    length: NDArray[np.float64] = np.hypot(*(shown.position[i] - touching).T).T
+    return length
+
+
+def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Normalize) -> None:
+    """Draw the ball at one instant, its velocities and the floor."""
+    radius = impact.case.ball.outer_radius
+    place = shown.position[i]
+    draw_section(axes, place, 1e3 * _displacement(shown, i), scale)
+    some = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
+    axes.quiver(
+        *place[some].reshape(-1, 2).T,
+        *shown.velocity[i][some].reshape(-1, 2).T,
+        angles="xy",
+        scale_units="xy",
+        # At first touch an arrow is as long as a third of the radius.
+        scale=3 * impact.impact_velocity / radius,
+        width=0.008,
+        color="0.1",
+    )
+    axes.fill_between([-0.05 * radius, 1.4 * radius], -0.12 * radius, 0, color="0.6", linewidth=0)
+    since = 1e3 * (shown.time[i] - impact.touch_time)
+    axes.set_title(f"{since:.1f} ms", fontsize=SIZE, pad=2)
+    axes.set_xlim(-0.05 * radius, 1.4 * radius)
+    axes.set_ylim(-0.4 * radius, 2.6 * radius)
+    axes.set_aspect("equal")
+
+
+IMPACT_FIGURES = {"motion": lambda impact: motion(impact) if impact.motion else None}
+DOCUMENTATION_FIGURES = {"figure5_motion": lambda: motion(solve_published())}
