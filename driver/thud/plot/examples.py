@@ -2,7 +2,7 @@
 
 from functools import cache
 
-from thud.case import Ball
+from thud._schema import Ball
 from thud.impact import Impact, solve
 
 # The modulus of the paper's published modes.

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thud.case import Drop
+from thud._schema import Drop
 from thud.impact import Impact, solve
 from thud.levels import record_force
 from thud.plot.examples import solve_published

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from thud.impact import Impact, solve
-from thud.models import ModalBall
+from thud._schema import ModalBall
 from thud.plot.look import (
     SIZE,
     empty_axes,

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from thud.errors import InputError
 from thud.free_modes import loss_factors
 from thud.impact import Impact
-from thud.models import FiniteElement
+from thud._schema import FiniteElement
 from thud.plot.look import SIZE, add_curves, empty_axes
 
 
