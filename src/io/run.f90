@@ -12,7 +12,7 @@ module thud_run
    use thud_posix, only: get_free_bytes, remove_file
    use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
    use thud_table, only: get_modes_table, get_table
-   use thud_text, only: newline, to_text
+   use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
    private
 
@@ -122,8 +122,8 @@ contains
       end associate
       free = get_free_bytes(directory)
       if (wanted <= free) return
-      error = input_error('&output: the snapshots make files of up to '//to_text(wanted)//' bytes, and '//directory &
-         //' has space for '//to_text(free)//'; allowed: a longer snapshot_interval, or 0 for no snapshots')
+      error = input_error('&output: the snapshots make files of up to '//fixed(wanted/1.0e6_wp, 1)//' MB, and '//directory &
+         //' has space for '//fixed(free/1.0e6_wp, 1)//' MB; allowed: a longer snapshot_interval, or 0 for no snapshots')
    end subroutine check_space
 
    !> Table, verdict and files of results.

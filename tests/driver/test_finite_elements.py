@@ -261,7 +261,7 @@ def test_snapshots_larger_than_the_disk_are_refused_before_the_run(
     output = "&output snapshot_interval = 1e-3 /\n"
     result = run(case_file(IMPACT + output), "--output", "/proc/thud")
     assert result.returncode == 1  # type: ignore[attr-defined]
-    assert "has room for 0" in result.stderr  # type: ignore[attr-defined]
+    assert "has space for 0" in result.stderr  # type: ignore[attr-defined]
 
 
 def test_free_modes_do_not_depend_on_what_was_computed_before() -> None:
