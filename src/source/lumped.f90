@@ -129,7 +129,8 @@ contains
       logical, intent(out) :: released
       !> The state leaves the domain of the equation.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: new_state(n_state), parts(size(history%part, 2)), length
+      real(wp) :: new_state(n_state), parts(size(history%part, 2))
+      real(wp) :: length
       logical :: valid
       integer :: component
 
