@@ -19,7 +19,8 @@ module thud_modal_ball
    use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
+   use thud_sphere_basis, only: basis_type, new_basis
+   use thud_sphere_modes, only: family_type, get_family, get_static_family
    use thud_text, only: to_text
    implicit none (type, external)
    private
