@@ -1,7 +1,7 @@
 !> Instants of the deforming ball, for pictures: positions, velocities and pressures at the nodes.
 module thud_motion
-   use thud_floor_contact, only: get_nodal_areas
    use thud_kinds, only: wp
+   use thud_nodal_areas, only: get_nodal_areas
    implicit none (type, external)
    private
 
