@@ -9,7 +9,6 @@ module thud_finite_element
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
-   use thud_floor_contact, only: get_nodal_areas
    use thud_force_history, only: force_history_type
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
@@ -17,6 +16,7 @@ module thud_finite_element
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
    use thud_motion, only: new_motion, take_snapshot
+   use thud_nodal_areas, only: get_nodal_areas
    use thud_progress, only: report_progress
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
@@ -141,7 +141,7 @@ contains
       type(force_history_type), intent(inout) :: history
       !> The ball cannot be computed, or the record is too short.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: interval, time, share, first_energy
+      real(wp) :: interval, time, first_energy
       integer :: i, k, n_step, n_sample, stride, look, latest, last
 
       n_sample = size(history%floor_force)
@@ -153,15 +153,8 @@ contains
       if (size(history%motion%time) > 0) stride = get_stride(options, sampling)
       samples: do i = 1, n_sample
          time = (i - 1)*interval
-         if (mod(i - 1, look) == 0) call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
-         if (mod(i - 1, look) == 0) call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
-         if (n_step > max_steps .or. real(n_step, wp)*n_sample*size(run%position)/2 > max_work) then
-            error = numerical_error(trim(place(time))//' stability asks for steps below ' &
-               //to_text(interval/n_step)//' s, too many for '//to_text(sampling%duration)//' s of ' &
-               //to_text(size(run%position)/2)//' nodes; allowed: a shorter duration, fewer elements, ' &
-               //'a lower bulk_ratio, less viscosity')
-            return
-         end if
+         if (mod(i - 1, look) == 0) call look_at_step(run, time, options, sampling, n_sample, n_step, error)
+         if (allocated(error)) return
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
             ! The next contact is not asked for.
@@ -179,11 +172,7 @@ contains
                   run%state%gas_pressure)
                run%node_impulse = 0.0_wp
             end if
-            ! The part of the impulse that lies nearer to the next sample.
-            share = min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp))
-            history%floor_force(i) = history%floor_force(i) + (1 - share)*run%impulse/interval
-            if (i < n_sample) history%floor_force(i + 1) = history%floor_force(i + 1) + share*run%impulse/interval
-            history%impulse = history%impulse + run%impulse
+            call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
             call follow_contact(run, contacts, time, interval/n_step, history)
             call drift(run, interval/n_step)
          end do
@@ -197,6 +186,55 @@ contains
       end if
       call continue_flight(run, latest, start, history)
    end subroutine march
+
+   !> Chooses the number of steps in the next sampling intervals. Refuses a run that takes too long.
+   subroutine look_at_step(run, time, options, sampling, n_sample, n_step, error)
+      !> The ball.
+      type(impact_run_type), intent(inout) :: run
+      !> Time since the record began, s.
+      real(wp), intent(in) :: time
+      !> Safety of the step.
+      class(finite_element_options_type), intent(in) :: options
+      !> Sampling of the record.
+      type(sampling_type), intent(in) :: sampling
+      !> Samples of the record.
+      integer, intent(in) :: n_sample
+      !> Steps of each interval.
+      integer, intent(inout) :: n_step
+      !> The steps are too many.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: interval
+
+      interval = 1/sampling%sample_rate
+      call report_progress(1.0e3_wp*time, 1.0e3_wp*sampling%duration, 'ms')
+      call choose_step(run, interval, options%step_safety, sampling%substeps, n_step)
+      associate (n_node => size(run%position)/2)
+         if (n_step <= max_steps .and. real(n_step, wp)*n_sample*n_node <= max_work) return
+         error = numerical_error(trim(place(time))//' stability asks for steps below '//to_text(interval/n_step) &
+            //' s, too many for '//to_text(sampling%duration)//' s of '//to_text(n_node) &
+            //' nodes; allowed: a shorter duration, fewer elements, a lower bulk_ratio, less viscosity')
+      end associate
+   end subroutine look_at_step
+
+   !> Adds the impulse of the floor in one step to the record, as part of the means around two samples.
+   pure subroutine add_impulse(impulse, interval, i, share, history)
+      !> The impulse, N s.
+      real(wp), intent(in) :: impulse
+      !> Sampling interval, s.
+      real(wp), intent(in) :: interval
+      !> Number of the sample before it.
+      integer, intent(in) :: i
+      !> Part of the step that lies nearer to the next sample.
+      real(wp), intent(in) :: share
+      !> Gets the impulse.
+      type(force_history_type), intent(inout) :: history
+
+      associate (force => history%floor_force)
+         force(i) = force(i) + (1 - share)*impulse/interval
+         if (i < size(force)) force(i + 1) = force(i + 1) + share*impulse/interval
+      end associate
+      history%impulse = history%impulse + impulse
+   end subroutine add_impulse
 
    !> Whether a node may reach the floor in the next step.
    pure function will_touch(run, step) result(touches)

@@ -6,17 +6,17 @@
 !> (forward increments of Lagrange multipliers, Carpenter, Taylor and Katona 1991, Int. J. Numer.
 !> Methods Eng. 32, 103-128); nothing sinks in, and the energy of what is stopped is lost.
 module thud_floor_contact
-   use thud_constants, only: pi
    use thud_field, only: field_type, name_length
    use thud_kinds, only: wp
    use thud_material, only: material_type
    use thud_mesh, only: mesh_type
    use thud_new_field, only: choice_field, real_field
+   use thud_nodal_areas, only: get_nodal_areas
    implicit none (type, external)
    private
 
-   public :: contact_options_type, floor_contact_type, get_contact_fields, get_nodal_areas, get_penalty_forces, &
-      new_floor_contact, stop_at_floor
+   public :: contact_options_type, floor_contact_type, get_contact_fields, get_penalty_forces, new_floor_contact, &
+      stop_at_floor
 
    !> What the group asks for.
    type :: contact_options_type
@@ -70,26 +70,6 @@ contains
             /hypot(mesh%r(:, last) - mesh%r(:, last - 1), mesh%z(:, last) - mesh%z(:, last - 1))
       end associate
    end function new_floor_contact
-
-   !> Areas of a surface that belong to its nodes: integrals of their shape functions over the frustums
-   !> beside them, as for forces of a pressure.
-   pure function get_nodal_areas(r, z) result(area)
-      !> Distances of the nodes from the axis, m: [0:n].
-      real(wp), intent(in) :: r(0:)
-      !> Their heights, m: [0:n].
-      real(wp), intent(in) :: z(0:)
-      !> The areas, m2: [0:n].
-      real(wp) :: area(0:ubound(r, 1))
-      real(wp) :: width
-      integer :: j
-
-      area = 0.0_wp
-      do j = 1, ubound(r, 1)
-         width = hypot(r(j) - r(j - 1), z(j) - z(j - 1))
-         area(j - 1) = area(j - 1) + pi*width*(2*r(j - 1) + r(j))/3
-         area(j) = area(j) + pi*width*(r(j - 1) + 2*r(j))/3
-      end do
-   end function get_nodal_areas
 
    !> Forces of the penalty.
    pure subroutine get_penalty_forces(contact, height, force, energy)

@@ -42,9 +42,9 @@ contains
       real(wp), intent(out) :: mass(n_node, n_node)
       real(wp) :: strain(4*n_point, 2*n_node), shape(n_point, n_node), pressure(n_dilatation, n_dilatation)
       real(wp) :: point(n_line), weight(n_line), value(n_node), gradient(n_node, 2), jacobian(2, 2)
-      real(wp) :: determinant, radius, volume, root
+      real(wp) :: determinant, radius, volume
       real(wp) :: divergence(2*n_node), hoop(n_node), basis(n_dilatation)
-      integer :: i, j, k, row, info
+      integer :: i, j, k, info
 
       call get_gauss_points(point, weight)
       dilatation = 0.0_wp
@@ -63,16 +63,7 @@ contains
             hoop = value/radius
             divergence(1::2) = gradient(:, 1) + hoop
             divergence(2::2) = gradient(:, 2)
-            ! Rows whose squares add up to twice the energy of distortion: three stretches without
-            ! their mean, and the shear.
-            root = sqrt(2*shear_modulus*volume)
-            row = 4*(k - 1)
-            strain(row + 1:row + 3, :) = spread(-root/3*divergence, 1, 3)
-            strain(row + 1, 1::2) = strain(row + 1, 1::2) + root*gradient(:, 1)
-            strain(row + 2, 2::2) = strain(row + 2, 2::2) + root*gradient(:, 2)
-            strain(row + 3, 1::2) = strain(row + 3, 1::2) + root*hoop
-            strain(row + 4, 1::2) = root/sqrt(2.0_wp)*gradient(:, 2)
-            strain(row + 4, 2::2) = root/sqrt(2.0_wp)*gradient(:, 1)
+            strain(4*k - 3:4*k, :) = get_distortion(sqrt(2*shear_modulus*volume), gradient, hoop, divergence)
             shape(k, :) = sqrt(density*volume)*value
             ! Coordinates of the size of the element keep the functions of the pressure apart.
             basis = [1.0_wp, (radius - r(5))/(maxval(r) - minval(r)), &
@@ -86,5 +77,27 @@ contains
       call dpotrf('L', n_dilatation, pressure, n_dilatation, info)
       call dtrsm('L', 'L', 'N', 'N', n_dilatation, 2*n_node, 1.0_wp, pressure, n_dilatation, dilatation, n_dilatation)
    end subroutine get_mixed_element
+
+   !> Strains by displacements at one point, such that their squares add up to twice the energy of distortion:
+   !> three stretches without their mean, and the shear.
+   pure function get_distortion(root, gradient, hoop, divergence) result(strain)
+      !> Root of twice the shear modulus times the volume, sqrt(J).
+      real(wp), intent(in) :: root
+      !> Derivatives of the shape functions by r and z, 1/m: [9, 2].
+      real(wp), intent(in) :: gradient(n_node, 2)
+      !> Hoop strain by outward displacements, 1/m: [9].
+      real(wp), intent(in) :: hoop(n_node)
+      !> Dilatation by displacements, 1/m: [18].
+      real(wp), intent(in) :: divergence(2*n_node)
+      !> Strains times the root, sqrt(J)/m: [4, 18].
+      real(wp) :: strain(4, 2*n_node)
+
+      strain(:3, :) = spread(-root/3*divergence, 1, 3)
+      strain(1, 1::2) = strain(1, 1::2) + root*gradient(:, 1)
+      strain(2, 2::2) = strain(2, 2::2) + root*gradient(:, 2)
+      strain(3, 1::2) = strain(3, 1::2) + root*hoop
+      strain(4, 1::2) = root/sqrt(2.0_wp)*gradient(:, 2)
+      strain(4, 2::2) = root/sqrt(2.0_wp)*gradient(:, 1)
+   end function get_distortion
 
 end module thud_mixed_element

@@ -249,62 +249,130 @@ contains
       real(wp), intent(inout) :: energy
       !> Gets the power dissipated added, W.
       real(wp), intent(inout) :: power
-      real(wp), dimension(n) :: root, shrink, determinant, excess
-      real(wp), dimension(n, n_symmetric) :: c, half
-      real(wp) :: trace, square, coupling, factor, scale, ratio
-      real(wp) :: inverse(n_symmetric)
-      integer :: g, j, k
+      real(wp), dimension(n) :: excess, root, shrink
+      real(wp), dimension(n, n_symmetric) :: c, inverse, next
+      real(wp) :: ratio
+      integer :: g, k
 
       ratio = min(interval/time, max_steps_over_time)
       do g = 1, n_point
-         call get_inverse_cube_root(n, jacobian(:, g), root)
-         shrink = root**2
-         !$omp simd
-         do j = 1, n
-            c(j, 1) = shrink(j)*(f(j, 1, g)**2 + f(j, 3, g)**2)
-            c(j, 2) = shrink(j)*(f(j, 2, g)**2 + f(j, 4, g)**2)
-            c(j, 3) = shrink(j)*f(j, 5, g)**2
-            c(j, 4) = shrink(j)*(f(j, 1, g)*f(j, 2, g) + f(j, 3, g)*f(j, 4, g))
-         end do
-         half = flow(:, :, g) + (exp(ratio/2) - 1)*c
-         determinant = (half(:, 1)*half(:, 2) - half(:, 4)**2)*half(:, 3)
-         call get_inverse_cube_root(n, determinant, root)
-         !$omp simd private(inverse, trace, square, coupling, factor, scale) reduction(+:energy, power)
-         do j = 1, n
-            ! Inverse of Cv: adjugate over determinant, with the norm of Cv taken out.
-            scale = 1/(root(j)*determinant(j))
-            inverse(1) = scale*half(j, 2)*half(j, 3)
-            inverse(2) = scale*half(j, 1)*half(j, 3)
-            inverse(3) = scale*(half(j, 1)*half(j, 2) - half(j, 4)**2)
-            inverse(4) = -scale*half(j, 4)*half(j, 3)
-            trace = c(j, 1)*inverse(1) + c(j, 2)*inverse(2) + c(j, 3)*inverse(3) + 2*c(j, 4)*inverse(4)
-            excess(j) = trace/3 - 1
-            square = (c(j, 1)*inverse(1) + c(j, 4)*inverse(4))**2 + (c(j, 2)*inverse(2) + c(j, 4)*inverse(4))**2 &
-               + (c(j, 3)*inverse(3))**2 &
-               + 2*(c(j, 1)*inverse(4) + c(j, 4)*inverse(2))*(c(j, 4)*inverse(1) + c(j, 2)*inverse(4))
-            coupling = modulus*shrink(j)
-            factor = -modulus*trace/(3*jacobian(j, g))
-            stress(j, 1, g) = stress(j, 1, g) + coupling*(f(j, 1, g)*inverse(1) + f(j, 2, g)*inverse(4)) &
-               + factor*cofactor(j, 1, g)
-            stress(j, 2, g) = stress(j, 2, g) + coupling*(f(j, 1, g)*inverse(4) + f(j, 2, g)*inverse(2)) &
-               + factor*cofactor(j, 2, g)
-            stress(j, 3, g) = stress(j, 3, g) + coupling*(f(j, 3, g)*inverse(1) + f(j, 4, g)*inverse(4)) &
-               + factor*cofactor(j, 3, g)
-            stress(j, 4, g) = stress(j, 4, g) + coupling*(f(j, 3, g)*inverse(4) + f(j, 4, g)*inverse(2)) &
-               + factor*cofactor(j, 4, g)
-            stress(j, 5, g) = stress(j, 5, g) + coupling*f(j, 5, g)*inverse(3) + factor*cofactor(j, 5, g)
-            energy = energy + weight(j, g)*modulus/2*(trace - 3)
-            power = power + weight(j, g)*modulus/(2*time)*(square - trace**2/3)
-         end do
+         call get_isochoric(n, f(:, :, g), jacobian(:, g), shrink, c)
+         call get_unimodular_inverse(n, flow(:, :, g) + (exp(ratio/2) - 1)*c, inverse)
+         call add_spring_stress(n, modulus, time, weight(:, g), f(:, :, g), cofactor(:, :, g), jacobian(:, g), shrink, c, &
+            inverse, stress(:, :, g), energy, power, excess)
          if (.not. keep) cycle
          ! At large strain the rate of the norm counts too, in the second order of the step.
-         half = flow(:, :, g) + spread(exp(ratio) - 1 + excess*ratio**2/2, 2, n_symmetric)*c
-         determinant = (half(:, 1)*half(:, 2) - half(:, 4)**2)*half(:, 3)
-         call get_inverse_cube_root(n, determinant, root)
+         next = flow(:, :, g) + spread(exp(ratio) - 1 + excess*ratio**2/2, 2, n_symmetric)*c
+         call get_inverse_cube_root(n, (next(:, 1)*next(:, 2) - next(:, 4)**2)*next(:, 3), root)
          do k = 1, n_symmetric
-            flow(:, k, g) = half(:, k)*root
+            flow(:, k, g) = next(:, k)*root
          end do
       end do
    end subroutine add_branch_stress
+
+   !> Isochoric right Cauchy-Green tensors at one Gauss point.
+   pure subroutine get_isochoric(n, f, jacobian, shrink, c)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Deformation gradients: [n, component].
+      real(wp), intent(in) :: f(n, n_component)
+      !> Their determinants: [n].
+      real(wp), intent(in) :: jacobian(n)
+      !> Determinants to the power -2/3: [n].
+      real(wp), intent(out) :: shrink(n)
+      !> The tensors: [n, symmetric].
+      real(wp), intent(out) :: c(n, n_symmetric)
+      real(wp) :: root(n)
+      integer :: j
+
+      call get_inverse_cube_root(n, jacobian, root)
+      shrink = root**2
+      !$omp simd
+      do j = 1, n
+         c(j, 1) = shrink(j)*(f(j, 1)**2 + f(j, 3)**2)
+         c(j, 2) = shrink(j)*(f(j, 2)**2 + f(j, 4)**2)
+         c(j, 3) = shrink(j)*f(j, 5)**2
+         c(j, 4) = shrink(j)*(f(j, 1)*f(j, 2) + f(j, 3)*f(j, 4))
+      end do
+   end subroutine get_isochoric
+
+   !> Inverses of symmetric tensors, these scaled to the determinant 1.
+   pure subroutine get_unimodular_inverse(n, tensor, inverse)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> The tensors: [n, symmetric].
+      real(wp), intent(in) :: tensor(n, n_symmetric)
+      !> Their inverses: [n, symmetric].
+      real(wp), intent(out) :: inverse(n, n_symmetric)
+      real(wp) :: determinant(n), root(n)
+      real(wp) :: scale
+      integer :: j
+
+      determinant = (tensor(:, 1)*tensor(:, 2) - tensor(:, 4)**2)*tensor(:, 3)
+      call get_inverse_cube_root(n, determinant, root)
+      ! Adjugate over determinant, with the norm of the tensor taken out.
+      !$omp simd private(scale)
+      do j = 1, n
+         scale = 1/(root(j)*determinant(j))
+         inverse(j, 1) = scale*tensor(j, 2)*tensor(j, 3)
+         inverse(j, 2) = scale*tensor(j, 1)*tensor(j, 3)
+         inverse(j, 3) = scale*(tensor(j, 1)*tensor(j, 2) - tensor(j, 4)**2)
+         inverse(j, 4) = -scale*tensor(j, 4)*tensor(j, 3)
+      end do
+   end subroutine get_unimodular_inverse
+
+   !> Adds the stresses of the spring of a Maxwell branch at one Gauss point.
+   pure subroutine add_spring_stress(n, modulus, time, weight, f, cofactor, jacobian, shrink, c, inverse, stress, energy, &
+      power, excess)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Shear modulus, Pa.
+      real(wp), intent(in) :: modulus
+      !> Relaxation time, s.
+      real(wp), intent(in) :: time
+      !> Volumes of the points, undeformed, m3: [n].
+      real(wp), intent(in) :: weight(n)
+      !> Deformation gradients: [n, component].
+      real(wp), intent(in) :: f(n, n_component)
+      !> Their cofactors: [n, component].
+      real(wp), intent(in) :: cofactor(n, n_component)
+      !> Their determinants: [n].
+      real(wp), intent(in) :: jacobian(n)
+      !> Determinants to the power -2/3: [n].
+      real(wp), intent(in) :: shrink(n)
+      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
+      real(wp), intent(in) :: c(n, n_symmetric)
+      !> Inverse of the flow Cv: [n, symmetric].
+      real(wp), intent(in) :: inverse(n, n_symmetric)
+      !> Stresses, Pa: [n, component].
+      real(wp), intent(inout) :: stress(n, n_component)
+      !> Gets the energy added, J.
+      real(wp), intent(inout) :: energy
+      !> Gets the power dissipated added, W.
+      real(wp), intent(inout) :: power
+      !> tr(Cbar Cv^-1)/3 - 1: [n].
+      real(wp), intent(out) :: excess(n)
+      real(wp) :: trace, square, coupling, factor
+      integer :: j
+
+      !$omp simd private(trace, square, coupling, factor) reduction(+:energy, power)
+      do j = 1, n
+         associate (i1 => inverse(j, 1), i2 => inverse(j, 2), i3 => inverse(j, 3), i4 => inverse(j, 4))
+            trace = c(j, 1)*i1 + c(j, 2)*i2 + c(j, 3)*i3 + 2*c(j, 4)*i4
+            excess(j) = trace/3 - 1
+            square = (c(j, 1)*i1 + c(j, 4)*i4)**2 + (c(j, 2)*i2 + c(j, 4)*i4)**2 + (c(j, 3)*i3)**2 &
+               + 2*(c(j, 1)*i4 + c(j, 4)*i2)*(c(j, 4)*i1 + c(j, 2)*i4)
+            coupling = modulus*shrink(j)
+            factor = -modulus*trace/(3*jacobian(j))
+            stress(j, 1) = stress(j, 1) + coupling*(f(j, 1)*i1 + f(j, 2)*i4) + factor*cofactor(j, 1)
+            stress(j, 2) = stress(j, 2) + coupling*(f(j, 1)*i4 + f(j, 2)*i2) + factor*cofactor(j, 2)
+            stress(j, 3) = stress(j, 3) + coupling*(f(j, 3)*i1 + f(j, 4)*i4) + factor*cofactor(j, 3)
+            stress(j, 4) = stress(j, 4) + coupling*(f(j, 3)*i4 + f(j, 4)*i2) + factor*cofactor(j, 4)
+            stress(j, 5) = stress(j, 5) + coupling*f(j, 5)*i3 + factor*cofactor(j, 5)
+            energy = energy + weight(j)*modulus/2*(trace - 3)
+            power = power + weight(j)*modulus/(2*time)*(square - trace**2/3)
+         end associate
+      end do
+   end subroutine add_spring_stress
 
 end module thud_rubber

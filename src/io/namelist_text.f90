@@ -163,7 +163,7 @@ contains
 
       allocate (group%assignments(0))
       place = start
-      call find_key(place, key_start, key_end, equals)
+      call find_key(structure(:finish), place, key_start, key_end, equals)
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
          call get_value(clean(start:finish), given%value)
@@ -180,37 +180,34 @@ contains
          end if
          given%key = structure(key_start:key_end)
          place = equals + 1
-         call find_key(place, next_key, key_end, equals)
+         call find_key(structure(:finish), place, next_key, key_end, equals)
          call get_value(clean(place:min(next_key, finish + 1) - 1), given%value)
          group%assignments = [group%assignments, given]
          key_start = next_key
       end do
-
-   contains
-
-      !> The next key and its equals sign; behind the group's end where there is none.
-      subroutine find_key(from, first, last, sign)
-         !> Place to search from.
-         integer, intent(in) :: from
-         !> First character of the key.
-         integer, intent(out) :: first
-         !> Last character of the key.
-         integer, intent(out) :: last
-         !> Place of the equals sign.
-         integer, intent(out) :: sign
-
-         sign = from - 1 + index(structure(from:finish), '=')
-         if (sign < from) then
-            sign = finish + 1
-            first = finish + 1
-            last = finish + 1
-            return
-         end if
-         last = from - 1 + verify(structure(from:sign - 1), blanks, back=.true.)
-         first = from + verify(structure(from:last), name_characters, back=.true.)
-      end subroutine find_key
-
    end subroutine split_group
+
+   !> The next key and its equals sign; all behind the end where there is none.
+   pure subroutine find_key(structure, from, first, last, equals)
+      !> Text without comments and quoted text, up to the group's end.
+      character(len=*), intent(in) :: structure
+      !> Place to search from.
+      integer, intent(in) :: from
+      !> First character of the key.
+      integer, intent(out) :: first
+      !> Last character of the key.
+      integer, intent(out) :: last
+      !> Place of the equals sign.
+      integer, intent(out) :: equals
+
+      first = len(structure) + 1
+      last = first
+      equals = first
+      if (index(structure(from:), '=') == 0) return
+      equals = from - 1 + index(structure(from:), '=')
+      last = from - 1 + verify(structure(from:equals - 1), blanks, back=.true.)
+      first = from + verify(structure(from:last), name_characters, back=.true.)
+   end subroutine find_key
 
    !> Value in one line, without blanks around it and without the comma that may follow.
    pure subroutine get_value(text, value)

@@ -92,16 +92,15 @@ contains
       source%compressing = .true.
       released = .false.
       call record_sample(source, state, 1, history)
-      do i = 2, n_sample
+      march: do i = 2, n_sample
          do j = 1, sampling%substeps
             time = real((i - 2)*sampling%substeps + j - 1, wp)*step
-            call advance(time + step)
-            if (allocated(error) .or. released) exit
+            call advance(source, drop, time + step, time, state, history, released, error)
+            if (allocated(error)) return
+            if (released) exit march
          end do
-         if (allocated(error)) return
-         if (released) exit
          call record_sample(source, state, i, history)
-      end do
+      end do march
       if (.not. released) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration) &
             //' s ends while the source is still in contact; allowed: longer than the contact')
@@ -110,49 +109,60 @@ contains
       history%contact_time = time
       call check_contact_samples(sampling, time, error)
       if (.not. allocated(error)) call finish(source%mass, state, history, error)
-
-   contains
-
-      !> Moves time and state on to the given time; stops short where the phase changes.
-      subroutine advance(end_time)
-         !> Time at the end of the step, s.
-         real(wp), intent(in) :: end_time
-         real(wp) :: new_state(n_state)
-         real(wp) :: parts(size(part_name))
-         real(wp) :: length
-         logical :: valid
-         integer :: component
-
-         do
-            length = end_time - time
-            call rk4_step(source, time, state, length, new_state, valid)
-            if (.not. valid) then
-               length = longest_valid(source, time, state, length)
-               call rk4_step(source, time, state, length, new_state, valid)
-               error = source%get_failure(drop, time + length, new_state)
-               return
-            end if
-            ! Compression ends with the velocity, restitution with the deflection.
-            component = merge(at_velocity, at_deflection, source%compressing)
-            if (new_state(component) > 0.0_wp) then
-               time = end_time
-               state = new_state
-               return
-            end if
-            length = locate_zero(source, time, state, length, component)
-            call rk4_step(source, time, state, length, new_state, valid)
-            time = time + length
-            state = new_state
-            state(component) = 0.0_wp
-            released = .not. source%compressing
-            if (released) return
-            source%compressing = .false.
-            history%max_deflection = state(at_deflection)
-            call source%get_parts(state, parts, history%peak_force)
-         end do
-      end subroutine advance
-
    end subroutine solve_lumped
+
+   !> Moves time and state on to the given time; stops short at release.
+   subroutine advance(source, drop, end_time, time, state, history, released, error)
+      !> The source; it changes its phase at the turning point.
+      class(lumped_type), intent(inout) :: source
+      !> The drop.
+      type(drop_type), intent(in) :: drop
+      !> Time at the end of the step, s.
+      real(wp), intent(in) :: end_time
+      !> Time since first touch, s.
+      real(wp), intent(inout) :: time
+      !> State at that time: [4].
+      real(wp), intent(inout) :: state(:)
+      !> Gets deflection and force at the turning point.
+      type(force_history_type), intent(inout) :: history
+      !> The contact ended at `time`.
+      logical, intent(out) :: released
+      !> The state leaves the domain of the equation.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: new_state(n_state), parts(size(history%part, 2))
+      real(wp) :: length
+      logical :: valid
+      integer :: component
+
+      released = .false.
+      do
+         length = end_time - time
+         call rk4_step(source, time, state, length, new_state, valid)
+         if (.not. valid) then
+            length = longest_valid(source, time, state, length)
+            call rk4_step(source, time, state, length, new_state, valid)
+            error = source%get_failure(drop, time + length, new_state)
+            return
+         end if
+         ! Compression ends with the velocity, restitution with the deflection.
+         component = merge(at_velocity, at_deflection, source%compressing)
+         if (new_state(component) > 0.0_wp) then
+            time = end_time
+            state = new_state
+            return
+         end if
+         length = locate_zero(source, time, state, length, component)
+         call rk4_step(source, time, state, length, new_state, valid)
+         time = time + length
+         state = new_state
+         state(component) = 0.0_wp
+         released = .not. source%compressing
+         if (released) return
+         source%compressing = .false.
+         history%max_deflection = state(at_deflection)
+         call source%get_parts(state, parts, history%peak_force)
+      end do
+   end subroutine advance
 
    !> Writes motion and forces of one instant into the history.
    pure subroutine record_sample(source, state, i, history)

@@ -145,7 +145,7 @@ contains
       left = 0.0_wp
       left_value = get_watched(impacts%states(impacts%now), compressing)
       right = 1.0_wp
-      call try_length(right, right_value)
+      call try_length(impacts, compressing, ends, right, right_value)
       rounding = epsilon(1.0_wp)*abs(right_value - left_value)
       left_moved = .false.
       right_moved = .false.
@@ -154,7 +154,7 @@ contains
          if (.not. any(open)) exit
          length = right - right_value*(right - left)/(right_value - left_value)
          where (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
-         call try_length(length, value)
+         call try_length(impacts, compressing, ends, length, value)
          ! An end that stays twice has its value halved, or regula falsi would creep.
          where (open .and. value > 0.0_wp)
             left = length
@@ -174,23 +174,26 @@ contains
          right_moved = .not. left_moved
       end do
       length = right
-
-   contains
-
-      !> Where a part of the step would lead.
-      subroutine try_length(part, part_value)
-         !> The part: [batch_size].
-         real(wp), intent(in) :: part(batch_size)
-         !> What the end of the phase brings to zero: [batch_size].
-         real(wp), intent(out) :: part_value(batch_size)
-         real(wp), dimension(batch_size) :: elastic_force, floor_force
-         logical :: missed
-
-         call advance(impacts, ends, part, elastic_force, floor_force, missed)
-         part_value = get_watched(impacts%states(3 - impacts%now), compressing)
-      end subroutine try_length
-
    end subroutine locate
+
+   !> Where a part of the step would lead.
+   subroutine try_length(impacts, compressing, goes, length, value)
+      !> The impacts, at the beginning of the step.
+      type(impact_batch_type), intent(inout) :: impacts
+      !> The phase ends with the velocity, not with the deflection.
+      logical, intent(in) :: compressing
+      !> The result for the ball matters: [batch_size].
+      logical, intent(in) :: goes(batch_size)
+      !> The part: [batch_size].
+      real(wp), intent(in) :: length(batch_size)
+      !> What the end of the phase brings to zero: [batch_size].
+      real(wp), intent(out) :: value(batch_size)
+      real(wp), dimension(batch_size) :: elastic_force, floor_force
+      logical :: missed
+
+      call advance(impacts, goes, length, elastic_force, floor_force, missed)
+      value = get_watched(impacts%states(3 - impacts%now), compressing)
+   end subroutine try_length
 
    !> What the end of the phase brings to zero: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)

@@ -85,7 +85,7 @@ contains
       real(wp) :: latest
       integer :: n, first, sample
       logical :: done, undisturbed, strayed
-      logical, dimension(batch_size) :: wanted, goes
+      logical :: goes(batch_size)
 
       undisturbed = .false.
       strayed = .false.
@@ -96,17 +96,7 @@ contains
       call place_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)
       call add_end(impacts, start < never, -0.5_wp*impacts%whole_step, impacts%whole_step/12)
       do n = first, n_step - 1
-         ! A lane has a new series where it begins, where it strayed and, asked at fixed times, where the old
-         ! one will not last: nothing that depends on others.
-         if (n <= latest .or. mod(n, series_steps) == 0 .or. strayed) then
-            wanted = abs(start - n) < 0.5_wp .or. impacts%strayed
-            associate (state => impacts%states(impacts%now), series => impacts%series)
-               if (mod(n, series_steps) == 0) wanted = wanted &
-                  .or. .not. will_last(series%place, series%reach, state%deflection, state%velocity)
-               if (any(wanted)) call place_series(impacts%shell, state, wanted, series)
-            end associate
-            impacts%strayed = .false.
-         end if
+         if (n <= latest .or. mod(n, series_steps) == 0 .or. strayed) call renew_series(impacts, start, n)
          if (.not. undisturbed) goes = start <= n .and. last > n
          sample = n/substeps + 1
          if (undisturbed .and. mod(n, substeps) == 0) then
@@ -125,6 +115,26 @@ contains
       call add_end(impacts, start < never, 0.5_wp*impacts%whole_step, -impacts%whole_step/12)
       where (.not. start < never) last = never
    end subroutine march
+
+   !> A new series for each lane that begins or strayed and, asked at fixed times, where the old one will
+   !> not last: nothing that depends on other lanes.
+   pure subroutine renew_series(impacts, start, n)
+      !> The impacts.
+      type(impact_batch_type), intent(inout) :: impacts
+      !> Step with which each lane begins: [batch_size].
+      real(wp), intent(in) :: start(batch_size)
+      !> Number of the step.
+      integer, intent(in) :: n
+      logical :: wanted(batch_size)
+
+      wanted = abs(start - n) < 0.5_wp .or. impacts%strayed
+      associate (state => impacts%states(impacts%now), series => impacts%series)
+         if (mod(n, series_steps) == 0) wanted = wanted &
+            .or. .not. will_last(series%place, series%reach, state%deflection, state%velocity)
+         if (any(wanted)) call place_series(impacts%shell, state, wanted, series)
+      end associate
+      impacts%strayed = .false.
+   end subroutine renew_series
 
    !> Forces of one sample: those of moving lanes, none after the contact; lanes whose turn is still to
    !> come keep what they have.

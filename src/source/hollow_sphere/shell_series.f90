@@ -264,7 +264,7 @@ contains
             end associate
          end do
       else
-         ! The same without the flux.
+         ! The same without the flux: gfortran does not make two loops of one, which would compute it for s = 0 too.
          !$omp simd private(half, sixth, y2, y3, y4, z2, z3, z4, d1, d2, d3, d4, a1, a2, a3, a4, elastic, whole, outside) &
          !$omp& reduction(+: outsides)
          do i = 1, batch_size

@@ -19,7 +19,8 @@ module thud_modal_ball
    use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
+   use thud_sphere_basis, only: basis_type, new_basis
+   use thud_sphere_modes, only: family_type, get_family, get_static_family
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -41,6 +42,20 @@ module thud_modal_ball
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
    end type modal_ball_type
+
+   !> Motion of the ball.
+   type :: state_type
+      !> Amplitudes of the modes, m sqrt(kg): [n_mode].
+      real(wp), allocatable :: q(:)
+      !> Their rates: [n_mode].
+      real(wp), allocatable :: v(:)
+      !> Height of the centre of mass, m.
+      real(wp) :: height
+      !> Its velocity upwards, m/s.
+      real(wp) :: speed
+      !> Energy that damping has taken, J.
+      real(wp) :: loss = 0.0_wp
+   end type state_type
 
 contains
 
@@ -100,51 +115,14 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> The modes cannot be computed, or the rings cannot be told apart.
       type(error_type), allocatable, intent(out) :: error
-      type(basis_type) :: basis
-      type(family_type) :: family
-      real(wp) :: angle(options%rings)
-      real(wp) :: shape(options%rings, 2)
-      real(wp), allocatable, dimension(:, :) :: value, first, second, response
+      real(wp) :: response(options%rings, options%rings)
       real(wp), allocatable :: zeta(:)
       logical :: failed
-      integer :: n, i, kept, k
+      integer :: i
 
-      angle = get_ring_angles(options%rings)
-      allocate (value(0:options%static_harmonics, options%rings))
-      allocate (first, second, mold=value)
-      do i = 1, options%rings
-         call get_legendre(cos(angle(i)), value(:, i), first(:, i), second(:, i))
-      end do
-      basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
-      allocate (response(options%rings, options%rings), source=interval/ball%mass)
-      allocate (step%omega(0), step%harmonic(0), step%fall(0, options%rings))
-      failed = .false.
-      do n = 0, options%static_harmonics
-         if (n <= options%harmonics) then
-            kept = options%radial_modes
-            associate (static => options%static_families)
-               if (any(nint(static%values(:static%count)) == n)) kept = 0
-            end associate
-            call get_family(basis, n, kept, max_phase/interval, family, failed)
-         else
-            call get_static_family(basis, n, family, failed)
-         end if
-         if (failed) exit
-         ! Fall of the rings' height by unit U and V: P_n cos t and -dP_n/dt sin t.
-         shape(:, 1) = value(n, :)*cos(angle)
-         shape(:, 2) = first(n, :)*sin(angle)**2
-         response = response + matmul(shape, matmul(family%flexibility, transpose(shape)))/interval
-         if (size(family%omega) == 0) cycle
-         step%omega = [step%omega, family%omega]
-         step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
-         step%fall = reshape([transpose(step%fall), matmul(shape, family%surface)], [size(step%omega), options%rings], &
-            order=[2, 1])
-      end do
-      if (failed) then
-         error = numerical_error('&modal_ball: static_harmonics: the modes of harmonic '//to_text(n) &
-            //' cannot be computed; allowed: fewer harmonics, or a thinner wall')
-         return
-      end if
+      response = interval/ball%mass
+      call add_modes(ball, options, interval, step, response, error)
+      if (allocated(error)) return
       allocate (zeta(size(step%omega)), source=options%loss_factor/2)
       if (options%damping_law == 'rising') zeta = zeta*step%omega/(2*pi*options%loss_frequency)
       call set_factors(step, zeta, interval)
@@ -155,6 +133,60 @@ contains
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be told apart; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
+
+   !> Modes of all harmonics, and the static response of the rings to what these leave out.
+   subroutine add_modes(ball, options, interval, step, response, error)
+      !> The ball.
+      type(ball_type), intent(in) :: ball
+      !> Modes and rings.
+      class(modal_ball_options_type), intent(in) :: options
+      !> Length of a step, s.
+      real(wp), intent(in) :: interval
+      !> Gets frequencies, harmonics and falls of the modes.
+      type(mode_step_type), intent(inout) :: step
+      !> Gets the fall of each ring by unit impulse on each added, m/(N s): [n_ring, n_ring].
+      real(wp), intent(inout) :: response(:, :)
+      !> The modes cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(basis_type) :: basis
+      type(family_type) :: family
+      real(wp) :: angle(options%rings), shape(options%rings, 2)
+      real(wp), dimension(0:options%static_harmonics, options%rings) :: value, first, second
+      logical :: failed
+      integer :: n, i, kept, k
+
+      angle = get_ring_angles(options%rings)
+      do i = 1, options%rings
+         call get_legendre(cos(angle(i)), value(:, i), first(:, i), second(:, i))
+      end do
+      basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
+      allocate (step%omega(0), step%harmonic(0), step%fall(0, options%rings))
+      do n = 0, options%static_harmonics
+         if (n <= options%harmonics) then
+            kept = options%radial_modes
+            associate (static => options%static_families)
+               if (any(nint(static%values(:static%count)) == n)) kept = 0
+            end associate
+            call get_family(basis, n, kept, max_phase/interval, family, failed)
+         else
+            call get_static_family(basis, n, family, failed)
+         end if
+         if (failed) then
+            error = numerical_error('&modal_ball: static_harmonics: the modes of harmonic '//to_text(n) &
+               //' cannot be computed; allowed: fewer harmonics, or a thinner wall')
+            return
+         end if
+         ! Fall of the rings' height by unit U and V: P_n cos t and -dP_n/dt sin t.
+         shape(:, 1) = value(n, :)*cos(angle)
+         shape(:, 2) = first(n, :)*sin(angle)**2
+         response = response + matmul(shape, matmul(family%flexibility, transpose(shape)))/interval
+         if (size(family%omega) == 0) cycle
+         step%omega = [step%omega, family%omega]
+         step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
+         step%fall = reshape([transpose(step%fall), matmul(shape, family%surface)], [size(step%omega), options%rings], &
+            order=[2, 1])
+      end do
+   end subroutine add_modes
 
    !> Angles of the rings from the lowest point to the equator.
    pure function get_ring_angles(n_ring) result(angle)
@@ -183,63 +215,40 @@ contains
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
-      real(wp), dimension(size(step%omega)) :: q, v, old_q, old_v, push
-      real(wp), dimension(size(step%fall, 2)) :: gap, height, radius
-      real(wp) :: z, speed, impulse, loss, quiet
-      integer :: i, j, n_step, last, n_mode, n_ring
+      type(state_type) :: state
+      real(wp), dimension(size(step%fall, 2)) :: height, radius
+      real(wp) :: impulse, quiet
+      integer :: i, j, n_step, last
 
-      n_mode = size(step%omega)
-      n_ring = size(step%fall, 2)
-      height = ball%outer_radius*cos(get_ring_angles(n_ring))
-      radius = ball%outer_radius*sin(get_ring_angles(n_ring))
-      q = 0.0_wp
-      v = 0.0_wp
-      z = ball%outer_radius
+      height = ball%outer_radius*cos(get_ring_angles(size(height)))
+      radius = ball%outer_radius*sin(get_ring_angles(size(radius)))
+      allocate (state%q, state%v, source=0*step%omega)
+      state%height = ball%outer_radius
+      state%speed = -history%impact_velocity
       ! The ball has left for good when nothing touched for half a period of its slowest mode: its
       ! surface may touch again while it swings back.
       quiet = 0.0_wp
-      if (n_mode > 0) quiet = pi/minval(step%omega)
-      speed = -history%impact_velocity
-      loss = 0.0_wp
+      if (size(step%omega) > 0) quiet = pi/minval(step%omega)
       last = 0
-      n_step = 0
       samples: do i = 1, size(history%floor_force)
-         call record_motion(ball, step, q, v, z, speed, i, history)
+         call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
-            n_step = n_step + 1
-            old_q = q
-            old_v = v
-            q = step%qq*old_q + step%qv*old_v
-            v = step%vq*old_q + step%vv*old_v
-            push = 0.0_wp
-            z = z + interval*speed
-            gap = z - height
-            if (n_mode > 0) call dgemv('T', n_mode, n_ring, -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
-            call solve_contact(contact, gap, error)
+            n_step = (i - 1)*sampling%substeps + j
+            call take_step(step, interval, ball%mass, height, state, contact, impulse, error)
             if (allocated(error)) return
             if (contact%last > 0) then
                last = n_step
-               impulse = sum(contact%impulse(:contact%last))
-               if (n_mode > 0) call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
-                  0.0_wp, push, 1)
-               q = q - step%qv*push
-               v = v - step%vv*push
-               speed = speed + impulse/ball%mass
-               z = z + interval*impulse/ball%mass
                history%impulse = history%impulse + impulse
                history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
                history%channel(i, 1) = max(history%channel(i, 1), radius(contact%last))
             end if
-            ! What damping takes lies between the impulse at the beginning and the end of the step.
-            loss = loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
-            if (contact%last == n_ring) then
-               error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval) &
-                  //' ms after first touch the ball lies on its equator, its centre sunk by ' &
-                  //to_text(1.0e3_wp*(ball%outer_radius - z)) &
+            if (contact%last == size(height)) then
+               error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
+                  //'on its equator, its centre sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            if (speed > 0.0_wp .and. (n_step - last)*interval > quiet) exit samples
+            if (state%speed > 0.0_wp .and. (n_step - last)*interval > quiet) exit samples
          end do
       end do samples
       if (i > size(history%floor_force)) then
@@ -249,30 +258,81 @@ contains
       end if
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(ball%mass, speed, get_energy(step, q, v) + loss, history, error)
+      if (.not. allocated(error)) call finish(ball%mass, step, state, history, error)
    end subroutine march
 
-   !> Scalars of the impact, and the check of the balances.
-   subroutine finish(mass, speed, energy, history, error)
+   !> One step of the modes, and the impulses of the floor at its beginning.
+   subroutine take_step(step, interval, mass, height, state, contact, impulse, error)
+      !> The modes.
+      type(mode_step_type), intent(in) :: step
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
       !> Mass of the ball, kg.
       real(wp), intent(in) :: mass
-      !> Velocity upwards of the centre of mass after the contact, m/s.
-      real(wp), intent(in) :: speed
-      !> Energy that the modes hold or have lost, J.
-      real(wp), intent(in) :: energy
+      !> Heights of the rings of the undeformed ball below its centre, m: [n_ring].
+      real(wp), intent(in) :: height(:)
+      !> Motion of the ball.
+      type(state_type), intent(inout) :: state
+      !> The rings; get their impulses.
+      type(ring_contact_type), intent(inout) :: contact
+      !> Impulse of all rings, N s.
+      real(wp), intent(out) :: impulse
+      !> The contact cannot be solved.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(size(step%omega)) :: old_q, old_v, push
+      real(wp) :: gap(size(height))
+      integer :: n_mode
+
+      n_mode = size(step%omega)
+      associate (q => state%q, v => state%v)
+         old_q = q
+         old_v = v
+         q = step%qq*old_q + step%qv*old_v
+         v = step%vq*old_q + step%vv*old_v
+         push = 0.0_wp
+         impulse = 0.0_wp
+         state%height = state%height + interval*state%speed
+         gap = state%height - height
+         if (n_mode > 0) call dgemv('T', n_mode, size(height), -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
+         call solve_contact(contact, gap, error)
+         if (allocated(error)) return
+         if (contact%last > 0) then
+            impulse = sum(contact%impulse(:contact%last))
+            if (n_mode > 0) call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
+               0.0_wp, push, 1)
+            q = q - step%qv*push
+            v = v - step%vv*push
+            state%speed = state%speed + impulse/mass
+            state%height = state%height + interval*impulse/mass
+         end if
+         ! What damping takes lies between the impulse at the beginning and the end of the step.
+         state%loss = state%loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
+      end associate
+   end subroutine take_step
+
+   !> Scalars of the impact, and the check of the balances.
+   subroutine finish(mass, step, state, history, error)
+      !> Mass of the ball, kg.
+      real(wp), intent(in) :: mass
+      !> The modes.
+      type(mode_step_type), intent(in) :: step
+      !> Motion of the ball after the contact.
+      type(state_type), intent(in) :: state
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
       !> The balance of energy does not close.
       type(error_type), allocatable, intent(out) :: error
+      real(wp) :: energy
 
+      energy = get_energy(step, state%q, state%v) + state%loss
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
       history%peak_force = maxval(history%floor_force)
       history%peak_floor_force = history%peak_force
-      history%restitution = speed/history%impact_velocity
-      associate (momentum => mass*(history%impact_velocity + speed), initial => mass/2*history%impact_velocity**2)
+      history%restitution = state%speed/history%impact_velocity
+      associate (momentum => mass*(history%impact_velocity + state%speed), initial => mass/2*history%impact_velocity**2)
          history%impulse_residual = abs(history%impulse - momentum)/momentum
-         history%energy_residual = abs(mass/2*speed**2 + energy - initial)/initial
+         history%energy_residual = abs(mass/2*state%speed**2 + energy - initial)/initial
       end associate
       if (.not. history%energy_residual <= max_energy_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
@@ -281,31 +341,25 @@ contains
    end subroutine finish
 
    !> Writes motion and energies of one instant into the history.
-   pure subroutine record_motion(ball, step, q, v, z, speed, i, history)
+   pure subroutine record_motion(ball, step, state, i, history)
       !> The ball.
       type(ball_type), intent(in) :: ball
       !> The modes.
       type(mode_step_type), intent(in) :: step
-      !> Amplitudes of the modes, m sqrt(kg): [n_mode].
-      real(wp), intent(in) :: q(:)
-      !> Their rates: [n_mode].
-      real(wp), intent(in) :: v(:)
-      !> Height of the centre of mass, m.
-      real(wp), intent(in) :: z
-      !> Its velocity upwards, m/s.
-      real(wp), intent(in) :: speed
+      !> Motion of the ball.
+      type(state_type), intent(in) :: state
       !> Number of the sample.
       integer, intent(in) :: i
       !> The history.
       type(force_history_type), intent(inout) :: history
       integer :: k, place
 
-      history%deflection(i) = ball%outer_radius - z
-      history%velocity(i) = -speed
+      history%deflection(i) = ball%outer_radius - state%height
+      history%velocity(i) = -state%speed
       history%max_deflection = max(history%max_deflection, history%deflection(i))
-      do k = 1, size(q)
+      do k = 1, size(state%q)
          place = 2 + min(step%harmonic(k), n_told)
-         history%channel(i, place) = history%channel(i, place) + (v(k)**2 + (step%omega(k)*q(k))**2)/2
+         history%channel(i, place) = history%channel(i, place) + (state%v(k)**2 + (step%omega(k)*state%q(k))**2)/2
       end do
    end subroutine record_motion
 

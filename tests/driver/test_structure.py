@@ -1,0 +1,267 @@
+"""The structure of the sources: folders, names and lengths, and no circle among modules."""
+
+from __future__ import annotations
+
+import ast
+import re
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parents[2]
+SOURCES = REPOSITORY / "src"
+DRIVER = REPOSITORY / "driver"
+
+# Fortran procedures longer than 60 lines, each for its reason.
+LONG = {
+    # Two loops that differ by one term: gfortran does not make two of one, and vectorises none
+    # that holds a condition.
+    "take_step",
+    # Sizes, record and scalars of a case in one flat call, as f2py wants them.
+    "solve",
+    # The same for many drops.
+    "solve_sets",
+    # One parallel loop over batches, whose private variables stand in one place.
+    "solve_ensemble",
+    # Rows are streamed while they are computed: reading, solving and writing alternate.
+    "write_sets",
+}
+
+# Uses of a Fortran folder that comes later.
+KNOWN_USES = {
+    ("case/case.f90", "io/namelist_text.f90"),
+    ("source/hollow_sphere/shell_sets.f90", "ensemble/set_status.f90"),
+}
+
+# Modules of the driver that still import the package they are part of.
+KNOWN_CIRCLES = {
+    "thud.studies.dataset",
+    "thud.studies.evaluation",
+    "thud.studies.run",
+    "thud.studies.study",
+}
+
+# Fortran sources that still name figures of the driver.
+KNOWN_FIGURES = {"io/run.f90"}
+
+
+def fortran_uses(root: Path) -> dict[str, set[str]]:
+    """Return the modules that each Fortran file uses, by paths below the root.
+
+    The two files of `thud_blas_threads`, of which CMake compiles one, count as one.
+    """
+    module_line = re.compile(r"^ *module +(?!procedure\b)(\w+)", re.IGNORECASE | re.MULTILINE)
+    use_line = re.compile(r"^ *use\b[ ,\w]*?(?:::)? *(thud_\w+)", re.IGNORECASE | re.MULTILINE)
+    texts = {path: path.read_text(encoding="utf-8") for path in sorted(root.rglob("*.f90"))}
+    places = {
+        name: path.relative_to(root).as_posix()
+        for path, text in texts.items()
+        for name in module_line.findall(text)
+    }
+    return {
+        path.relative_to(root).as_posix(): {places[name] for name in use_line.findall(text)}
+        for path, text in texts.items()
+    }
+
+
+def folders() -> list[str]:
+    """Return the folders of the Fortran sources in the order of their imports."""
+    text = (SOURCES / "CMakeLists.txt").read_text(encoding="utf-8")
+    found = re.search(r"set\(thud_folders ([a-z ]+)\)", text)
+    assert found
+    return found[1].split()
+
+
+def procedures(text: str) -> list[tuple[str, int]]:
+    """Return the Fortran procedures of a text, with those inside them, and their lines."""
+    prefix = (
+        r"(?:(?:pure|impure|elemental|recursive|module|integer|logical|real|type)(?:\(\w+\))? +)*"
+    )
+    found: list[tuple[str, int]] = []
+    open_ones: list[tuple[str, int]] = []
+    for number, line in enumerate(text.lower().splitlines()):
+        if begin := re.match(rf" *{prefix}(?:subroutine|function) +(\w+)", line):
+            open_ones.append((begin[1], number))
+        elif re.match(r" *end *(subroutine|function)\b", line):
+            name, first = open_ones.pop()
+            found.append((name, number - first + 1))
+    assert not open_ones
+    return found
+
+
+def is_type_checking(node: ast.AST) -> bool:
+    """Whether a node is `if TYPE_CHECKING:`, whose imports never run and so close no circle."""
+    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+
+
+def imported_names(tree: ast.Module, package: str) -> set[str]:
+    """Return the full names that a module imports, at once or late.
+
+    Late are imports inside functions and, of a module with `__getattr__`, the names in its tables.
+    """
+    names: set[str] = set()
+    has_getattr = any(isinstance(n, ast.FunctionDef) and n.name == "__getattr__" for n in tree.body)
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()
+        if is_type_checking(node):
+            assert isinstance(node, ast.If)
+            waiting.extend(node.orelse)
+            continue
+        waiting.extend(ast.iter_child_nodes(node))
+        if isinstance(node, ast.Import):
+            names.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) + 1 - node.level]
+            base = ".".join([*above, node.module or ""] if node.level else [node.module or ""])
+            names.update(f"{base.rstrip('.')}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            called = package + "." + node.value.removeprefix(package + ".").removeprefix(".")
+            if has_getattr or node.value.startswith(package + "."):
+                names.add(called)
+    return names
+
+
+def python_imports(root: Path) -> dict[str, set[str]]:
+    """Return the modules that each Python module below the root imports.
+
+    A module that imports another from a package is not held to import the package: only what it
+    names can close a circle that fails.
+    """
+    files = {}
+    for path in sorted([*root.rglob("*.py"), *root.rglob("*.pyi")]):
+        parts = path.relative_to(root).with_suffix("").parts
+        files[".".join(part for part in parts if part != "__init__")] = path
+    found = {}
+    for module, path in files.items():
+        is_package = path.name == "__init__.py"
+        package = module if is_package else module.rpartition(".")[0]
+        names = imported_names(ast.parse(path.read_text(encoding="utf-8")), package)
+        # `from package import name`: the module of that name, or else the package.
+        owners = {name if name in files else name.rpartition(".")[0] for name in names}
+        found[module] = owners & files.keys() - ({module} if is_package else set())
+    return found
+
+
+def require_no_circle(uses: dict[str, set[str]]) -> None:
+    """Raise CycleError with the circle where modules use each other in one."""
+    TopologicalSorter(uses).prepare()
+
+
+def plant(root: Path, files: dict[str, str]) -> Path:
+    """Write files of a toy."""
+    for name, text in files.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text, encoding="utf-8")
+    return root
+
+
+def test_fortran_modules_make_no_circle() -> None:
+    require_no_circle(fortran_uses(SOURCES))
+
+
+def test_folders_use_those_before_them() -> None:
+    order = folders()
+    place = {name: i for i, name in enumerate(order)} | {"api": order.index("app")}
+    assert {path.split("/")[0] for path in fortran_uses(SOURCES)} == place.keys()
+    wrong = {
+        (path, used)
+        for path, all_used in fortran_uses(SOURCES).items()
+        for used in all_used
+        if path.split("/")[0] != used.split("/")[0]
+        and place[path.split("/")[0]] <= place[used.split("/")[0]]
+    }
+    assert wrong == KNOWN_USES
+
+
+def test_modules_are_named_after_their_files() -> None:
+    named = re.compile(r"^module +(\w+)", re.IGNORECASE | re.MULTILINE)
+    for path in SOURCES.rglob("*.f90"):
+        stem = "blas_threads" if path.stem.startswith("blas_threads_") else path.stem
+        expected = [] if stem == "main" else [f"thud_{stem}"]
+        assert named.findall(path.read_text(encoding="utf-8")) == expected, path
+
+
+def test_fortran_names_no_figures_of_the_driver() -> None:
+    found = {
+        path.relative_to(SOURCES).as_posix()
+        for path in SOURCES.rglob("*.*")
+        if re.search(r"\.(png|svg|gif)\b", path.read_text(encoding="utf-8"))
+    }
+    assert found == KNOWN_FIGURES
+
+
+def test_procedures_are_short() -> None:
+    assert len(LONG) <= 5
+    long = [
+        name
+        for path in SOURCES.rglob("*.f90")
+        for name, lines in procedures(path.read_text(encoding="utf-8"))
+        if lines > 60
+    ]
+    assert sorted(long) == sorted(LONG)
+
+
+def test_python_modules_make_no_circle() -> None:
+    uses = python_imports(DRIVER)
+    assert {name for name in KNOWN_CIRCLES if "thud" in uses.get(name, ())} == KNOWN_CIRCLES
+    require_no_circle(
+        {m: used - {"thud"} if m in KNOWN_CIRCLES else used for m, used in uses.items()}
+    )
+
+
+def test_circles_of_fortran_are_found(tmp_path: Path) -> None:
+    plant(
+        tmp_path,
+        {
+            "a/one.f90": "module thud_one\n   use thud_two, only: x\nend module thud_one\n",
+            "b/two.f90": "module thud_two\n   use, non_intrinsic :: thud_one\nend module\n",
+        },
+    )
+    assert fortran_uses(tmp_path) == {"a/one.f90": {"b/two.f90"}, "b/two.f90": {"a/one.f90"}}
+    with pytest.raises(CycleError):
+        require_no_circle(fortran_uses(tmp_path))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "import toy",
+        "from toy import one",
+        "from . import one",
+        "from .one import x",
+        "def f():\n    from toy.one import x",
+        "class A:\n    def f(self):\n        import toy.one",
+        "_LATE = {'x': 'one'}\ndef __getattr__(name):\n    return _LATE[name]",
+        "import importlib\ndef f():\n    return importlib.import_module('toy.one')",
+    ],
+)
+def test_circles_of_python_are_found(tmp_path: Path, text: str) -> None:
+    files = {
+        "toy/__init__.py": "from toy.one import x",
+        "toy/one.py": "import toy.two",
+        "toy/two.py": text,
+    }
+    with pytest.raises(CycleError):
+        require_no_circle(python_imports(plant(tmp_path, files)))
+
+
+@pytest.mark.parametrize(
+    "text", ["from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import toy.one", "import os"]
+)
+def test_imports_that_never_run_make_no_circle(tmp_path: Path, text: str) -> None:
+    files = {
+        "toy/__init__.py": "from toy.one import x",
+        "toy/one.py": "import toy.two",
+        "toy/two.py": text,
+    }
+    require_no_circle(python_imports(plant(tmp_path, files)))
+
+
+def test_procedures_are_counted_with_those_inside() -> None:
+    inner = "pure function f(x) result(y)\nend function f\n"
+    text = (
+        f"subroutine s(a)\ncontains\n{inner}end subroutine s\nreal(wp) function g()\nend function"
+    )
+    assert procedures(text) == [("f", 2), ("s", 5), ("g", 2)]
