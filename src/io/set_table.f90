@@ -7,7 +7,7 @@ module thud_set_table
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
-   use thud_posix, only: directory_exists
+   use thud_system, only: directory_exists
    use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
    private

@@ -7,12 +7,11 @@ module thud_sets_run
    use thud_shell_sets, only: set_outcome_type, set_type
    use thud_ensemble, only: force_count, new_projections, projections_type, solve_ensemble, verdict_type
    use thud_error, only: error_type, input_error
-   use thud_file, only: check_owner, text_file_type, write_files
+   use thud_file, only: text_file_type
    use thud_hollow_sphere, only: flux_choices
    use thud_kinds, only: wp
-   use thud_atomic_write, only: close_part, open_part, require_directory, write_part
-   use thud_posix, only: directory_exists, lock_directory, lock_type, remove_file, unlock_directory
    use thud_progress, only: report_progress
+   use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
    use thud_run, only: load_case, outcome_type
    use thud_sampling, only: get_sample_count
    use thud_set_report, only: get_band_name, get_set_header, get_set_reason, get_set_rows
@@ -59,8 +58,9 @@ contains
       type(case_type) :: case
       type(set_table_type) :: table
       type(tally_type) :: tally
-      type(lock_type) :: lock
-      logical :: was_there
+      type(text_file_type) :: marker
+      type(result_directory_type) :: results
+      logical :: differs
 
       call load_case(path, case, error)
       if (allocated(error)) return
@@ -73,16 +73,15 @@ contains
       if (allocated(error)) return
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
+      marker = text_file_type(input_file, get_case_text(case))
+      call check_owner(outcome%directory, marker, differs, error)
+      if (allocated(error)) return
+      call open_results(outcome%directory, marker, [result_file], results, error)
+      call write_sets(case, table, threads, results, tally, error)
+      call close_results(results, differs, error)
+      if (allocated(error)) return
       outcome%remark = ''
-      was_there = directory_exists(outcome%directory)
-      call require_directory(outcome%directory, error)
-      if (allocated(error)) return
-      ! All the time, so that no other run takes this one's unfinished file for its own.
-      call lock_directory(outcome%directory, lock)
-      call write_results(case, table, threads, outcome, tally, error)
-      call unlock_directory(lock)
-      if (allocated(error) .and. .not. was_there) call remove_file(outcome%directory)
-      if (allocated(error)) return
+      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
       if (tally%computed < tally%sets) then
          if (outcome%remark /= '') outcome%remark = outcome%remark//'; '
          outcome%remark = outcome%remark//to_text(tally%sets - tally%computed)//' of '//to_text(tally%sets) &
@@ -92,32 +91,6 @@ contains
       outcome%conforms = tally%conforming == tally%sets
       call describe(case, tally, outcome%table)
    end subroutine run_sets
-
-   !> Computes all sets and writes both files, or none, into the locked directory.
-   subroutine write_results(case, table, threads, outcome, tally, error)
-      !> The case.
-      type(case_type), intent(in) :: case
-      !> The table, open.
-      type(set_table_type), intent(inout) :: table
-      !> Number of threads.
-      integer, intent(in) :: threads
-      !> Place of the results; gets a remark.
-      type(outcome_type), intent(inout) :: outcome
-      !> What the sets came to.
-      type(tally_type), intent(out) :: tally
-      !> The run failed; nothing was written.
-      type(error_type), allocatable, intent(out) :: error
-      type(text_file_type) :: input(1)
-      logical :: differs
-
-      input(1)%name = input_file
-      input(1)%content = get_case_text(case)
-      call check_owner(outcome%directory, [character(len=8) :: result_file, input_file], input_file, input(1)%content, &
-         differs, error, locked=.true.)
-      if (.not. allocated(error)) call write_sets(case, table, threads, outcome%directory, tally, error)
-      if (.not. allocated(error)) call write_files(outcome%directory, input, error, ready=result_file)
-      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
-   end subroutine write_results
 
    !> Complains about cases whose sets cannot be computed together.
    subroutine check_case(case, error)
@@ -134,7 +107,7 @@ contains
    end subroutine check_case
 
    !> Computes and writes chunk after chunk.
-   subroutine write_sets(case, table, threads, directory, tally, error)
+   subroutine write_sets(case, table, threads, results, tally, error)
       !> The case.
       type(case_type), intent(in) :: case
       !> The table, open.
@@ -142,11 +115,11 @@ contains
       !> Number of threads.
       integer, intent(in) :: threads
       !> Directory of the results.
-      character(len=*), intent(in) :: directory
+      type(result_directory_type), intent(inout) :: results
       !> What the sets came to.
-      type(tally_type), intent(inout) :: tally
-      !> A value is none, the sampling cannot be used, or the file cannot be written.
-      type(error_type), allocatable, intent(out) :: error
+      type(tally_type), intent(out) :: tally
+      !> What went wrong before; or a value is none, the sampling cannot be used, the file cannot be written.
+      type(error_type), allocatable, intent(inout) :: error
       type(set_type) :: base
       type(set_type), allocatable :: sets(:)
       type(set_outcome_type), allocatable :: outcomes(:)
@@ -156,7 +129,7 @@ contains
       type(band_type), allocatable :: more(:)
       type(text_file_type) :: parts(threads)
       character(len=:), allocatable :: text
-      integer :: unit, n, first_band, first, last, i
+      integer :: n, first_band, first, last, i
 
       base = set_type(case%ball, case%drop, &
          findloc(flux_choices == case%options%hollow_sphere%momentum_flux, .true., dim=1))
@@ -167,10 +140,9 @@ contains
       projections = new_projections(case%sampling%sample_rate, more, get_sample_count(case%sampling))
       allocate (sets(chunk_size), outcomes(chunk_size), verdicts(chunk_size), no_forces(0, 0, 0))
       allocate (levels(octave_count + size(more), force_count, chunk_size))
-      call open_part(directory, result_file, unit, error)
-      if (allocated(error)) return
+      call begin_file(results, result_file, error)
       call get_set_header(table, projections%bands(first_band:), text)
-      call write_part(directory, result_file, unit, text, error)
+      call add_text(results, text, error)
       do while (.not. allocated(error))
          call read_sets(table, base, sets, n, error)
          if (allocated(error) .or. n == 0) exit
@@ -188,13 +160,12 @@ contains
          end do
          !$omp end parallel do
          do i = 1, threads
-            if (.not. allocated(error)) call write_part(directory, result_file, unit, parts(i)%content, error)
+            call add_text(results, parts(i)%content, error)
          end do
          call report_progress(real(tally%sets, wp), 0.0_wp, 'sets')
       end do
       if (.not. allocated(error) .and. tally%sets == 0) error = input_error(trim(table%path) &
          //': the table has no sets; allowed: one in each line below the keys')
-      call close_part(directory, result_file, unit, error)
    end subroutine write_sets
 
    !> Adds sets to a tally.
