@@ -9,6 +9,7 @@ import sys
 import threading
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
@@ -16,6 +17,7 @@ from tqdm import tqdm
 import thud
 from thud._api import call, api, text
 from thud.checks import require_output
+from thud.files import add_files
 from thud.study_commands import FORMATS, add_study_commands
 from thud.tables import aligned
 
@@ -181,10 +183,14 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     # The library pads its answer with blanks; a directory of the user's may end with them.
     folder = Path(output or os.fsdecode(directory.rstrip()))
-    if not options.no_figures:
-        _draw(folder, _case_figures(case, folder))
-    if options.animation and (folder / "motion.pvd").exists():
-        thud.mesh_plot.animate(thud.read_results(folder), folder / "motion.gif")
+    marker = (folder / "effective.nml").read_bytes()
+    with TemporaryDirectory() as name:
+        drawn = Path(name)
+        if not options.no_figures:
+            _draw(drawn, _case_figures(case, folder))
+        if options.animation and (folder / "motion.pvd").exists():
+            thud.mesh_plot.animate(thud.read_results(folder), drawn / "motion.gif")
+        add_files(folder, {path.name: path.read_bytes() for path in drawn.iterdir()}, marker)
     if not options.quiet:
         tqdm.write(f"{text(table)}\n  Results: {folder}\n")
     return bool(conforming)

@@ -111,8 +111,8 @@ contains
       do i = 1, size(order)
          call rename_file(workspace//'/'//trim(order(i)), place//'/'//trim(order(i)), done)
          if (done) cycle
-         error = input_error('--output '//place//': '//trim(order(i))//' cannot be replaced; allowed: a directory that you ' &
-            //'may write to')
+         error = input_error('--output '//place//': '//trim(order(i))//' cannot be replaced; allowed: a directory ' &
+            //'that you may write to')
          return
       end do
    end subroutine move_files
@@ -144,14 +144,15 @@ contains
       !> The names, none without a manifest: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
       character(len=name_length) :: name
+      character(len=256) :: message
       integer :: unit, status, n
 
       allocate (names(64))
       n = 0
-      open (newunit=unit, file=path//'/'//manifest, status='old', action='read', iostat=status)
+      open (newunit=unit, file=path//'/'//manifest, status='old', action='read', iostat=status, iomsg=message)
       if (status == 0) then
          do
-            read (unit, '(a)', iostat=status) name
+            read (unit, '(a)', iostat=status, iomsg=message) name
             if (status /= 0) exit
             if (n == size(names)) names = [names, names]
             n = n + 1

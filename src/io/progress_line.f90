@@ -2,8 +2,8 @@
 module thud_progress_line
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
-   use thud_system, only: is_terminal, standard_error, write_text
    use thud_progress, only: set_progress_handler
+   use thud_system, only: is_terminal, standard_error, write_text
    use thud_text, only: fixed
    implicit none (type, external)
    private

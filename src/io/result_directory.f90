@@ -8,8 +8,8 @@ module thud_result_directory
    use thud_error, only: error_type, input_error, interrupted
    use thud_file, only: read_text_file, text_file_type
    use thud_file_set, only: add_names, clear_workspace, manifest, read_names, replace_set
-   use thud_system, only: can_exchange, close_descriptor, create_file, directory_exists, flush_directory, get_system_message, &
-      keep_interrupts, list_directory, lock_directory, name_length, pass_interrupts, remove_file, &
+   use thud_system, only: can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
+      get_system_message, keep_interrupts, list_directory, lock_directory, name_length, pass_interrupts, remove_file, &
       rename_file, resolve_path, write_text
    use thud_text, only: newline
    implicit none (type, external)
@@ -300,8 +300,8 @@ contains
 
       call lock_directory(directory%place, .false., directory%lock)
       call find_owner(directory%path, directory%marker, owner, error)
-      if (.not. allocated(error) .and. directory%lock < 0 .and. directory_exists(directory%place)) &
-         error = making_error(directory%path)
+      if (allocated(error) .or. directory%lock >= 0) return
+      if (directory_exists(directory%place)) error = making_error(directory%path)
    end subroutine lock_place
 
    !> Puts the files of the workspace in the place of those before.

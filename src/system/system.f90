@@ -8,7 +8,8 @@ module thud_system
    public :: standard_error, standard_output
    public :: can_exchange, close_descriptor, create_file, directory_exists, exchange_directories, flush_directory
    public :: get_free_bytes, get_system_message, is_terminal, keep_interrupts, link_file, list_directory, lock_directory
-   public :: open_descriptor, pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
+   public :: open_descriptor, pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path
+   public :: write_text
 
    !> Descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
