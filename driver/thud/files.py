@@ -128,7 +128,7 @@ def add_files(
         manifest = folder / MANIFEST
         listed = manifest.read_text(encoding="utf-8").splitlines() if manifest.exists() else []
         # Before the files are there: one that is not listed would pass for the user's.
-        names = dict.fromkeys([*listed, PART, *files])
+        names = sorted({*listed, PART, *files})
         for name, content in {MANIFEST: "".join(f"{n}\n" for n in names).encode(), **files}.items():
             _replace(folder / name, content, folder / PART)
 
