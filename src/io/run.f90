@@ -98,7 +98,8 @@ contains
       type(text_file_type) :: input
       logical :: differs
 
-      input = text_file_type(input_file, get_case_text(case))
+      input%name = input_file
+      input%content = get_case_text(case)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
       outcome%remark = ''

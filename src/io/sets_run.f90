@@ -73,7 +73,8 @@ contains
       if (allocated(error)) return
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
-      marker = text_file_type(input_file, get_case_text(case))
+      marker%name = input_file
+      marker%content = get_case_text(case)
       call check_owner(outcome%directory, marker, differs, error)
       if (allocated(error)) return
       call open_results(outcome%directory, marker, [result_file], results, error)
