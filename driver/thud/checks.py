@@ -1,22 +1,19 @@
-"""What several modules need: checks of arguments, and files that are never half written."""
+"""Checks of arguments."""
 
 from __future__ import annotations
 
-import errno
-import fcntl
-import os
-import signal
-import threading
-from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
 from thud.errors import InputError
+from thud.files import lock as lock  # noqa: PLC0414
+from thud.files import replace_file as replace_file  # noqa: PLC0414
+from thud.files import require_own as require_own  # noqa: PLC0414
+from thud.files import uninterrupted as uninterrupted  # noqa: PLC0414
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Mapping
     from types import UnionType
 
 
@@ -81,75 +78,3 @@ def require_output(output: str | None) -> None:
     if output is not None and not output.strip():
         message = "--output has no value; allowed: a directory"
         raise InputError(message)
-
-
-def require_own(path: Path, *, mine: bool) -> None:
-    """Complain about results of another study where those of a study are to be written."""
-    if not mine:
-        message = (
-            f"{path} belongs to another study, or to another version of this one; "
-            f"allowed: another directory, or remove it first"
-        )
-        raise InputError(message)
-
-
-def lock(folder: Path, result: Path) -> int:
-    """Keep other runs away from a directory, until the descriptor that it returns is closed.
-
-    Raises
-    ------
-    InputError
-        Where another run is at work there; names the result that it will write.
-    """
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError as error:
-        os.close(descriptor)
-        message = f"{result} is being computed; allowed: wait, or another directory"
-        raise InputError(message) from error
-    except OSError:
-        # Some disks have no locks.
-        pass
-    return descriptor
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Hold an interrupt back until something short is done: libraries of files leave noise else."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    held: list[int] = []
-    usual = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)
-    if held:
-        raise KeyboardInterrupt
-
-
-def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file under another name, then give it its own: nobody sees half a file.
-
-    Raises
-    ------
-    OSError
-        With the path that was asked for, where it cannot be written.
-    """
-    target = Path(path)
-    try:
-        if target.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
-        part = target.with_name(f".{target.name}.{os.getpid()}.part")
-        try:
-            part.write_bytes(content)
-            part.replace(target)
-        finally:
-            part.unlink(missing_ok=True)
-    except ValueError as error:  # a path that no file system can hold
-        message = f"{path!r} is not allowed; allowed: the path of a file"
-        raise InputError(message) from error
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, str(target)) from error

@@ -5,11 +5,11 @@ module thud_command_line
    use thud_compute, only: results_type
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
-   use thud_posix, only: ignore_signals, print_text, standard_error, standard_output
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
    use thud_schema, only: get_schema
    use thud_sets_run, only: run_sets
+   use thud_system, only: get_system_message, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted
    implicit none (type, external)
    private
@@ -45,7 +45,7 @@ contains
 
    !> Does what the command line asks for.
    subroutine execute(exit_code)
-      !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming.
+      !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted.
       integer, intent(out) :: exit_code
       type(request_type) :: request
       type(case_type), target :: case
@@ -54,7 +54,7 @@ contains
       type(error_type), allocatable :: error
 
       exit_code = 0
-      call ignore_signals()
+      call prepare_process()
       call parse_arguments(request, error)
       if (allocated(error)) then
          call say(standard_error, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)
@@ -80,7 +80,7 @@ contains
       end if
    end subroutine execute
 
-   !> Writes to the screen; a closed or full output is an error, not a crash.
+   !> Writes to the screen; a closed or full output is an error.
    subroutine say(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -88,10 +88,13 @@ contains
       character(len=*), intent(in) :: text
       !> Becomes 1 where the text could not be written.
       integer, intent(inout) :: exit_code
-      logical :: done
+      integer :: status
 
-      call print_text(descriptor, text//newline, done)
-      if (.not. done) exit_code = bad_input
+      call write_text(descriptor, text//newline, status)
+      if (status == 0) return
+      exit_code = bad_input
+      if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
+         //get_system_message(status)//'); allowed: a screen, a pipe that is read, or a disk with space'//newline, status)
    end subroutine say
 
    !> Turns the arguments into a request.
@@ -226,7 +229,8 @@ contains
          //'  --schema           the same and more as JSON, for programs'//newline &
          //'  -h, --help         show this text'//newline &
          //'  --version          show the version'//newline//newline &
-         //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check).'
+         //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check),'//newline &
+         //'130 interrupted.'
    end function help
 
 end module thud_command_line

@@ -4,7 +4,7 @@ module thud_error
    implicit none (type, external)
    private
 
-   public :: error_type, bad_input, numerical_failure, input_error, numerical_error, get_status
+   public :: error_type, bad_input, interrupted, numerical_failure, input_error, numerical_error, get_status
 
    !> The input cannot be used; also the exit code of the executable.
    integer, parameter :: bad_input = 1
@@ -12,9 +12,12 @@ module thud_error
    !> The computation broke down; also the exit code of the executable.
    integer, parameter :: numerical_failure = 2
 
+   !> The user has interrupted the work; also the exit code of the executable.
+   integer, parameter :: interrupted = 130
+
    !> What went wrong, in one sentence for the user.
    type :: error_type
-      !> `bad_input` or `numerical_failure`.
+      !> `bad_input`, `numerical_failure` or `interrupted`.
       integer :: code = numerical_failure
       !> One sentence that names the place, the value and what is allowed.
       character(len=:), allocatable :: message

@@ -1,16 +1,13 @@
-!> Whole files in, whole sets of files out: a set is either written completely or not at all.
+!> Texts of whole files.
 module thud_file
-   use, intrinsic :: iso_c_binding, only: c_intptr_t
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
-   use thud_atomic_write, only: name_part, remove_parts, require_directory, write_whole_part
-   use thud_posix, only: directory_exists, ignore_interrupts, is_empty_directory, lock_directory, lock_type, &
-      remove_file, unlock_directory
-   use thud_text, only: newline, to_text
+   use thud_system, only: directory_exists
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_owner, get_file_stem, read_text_file, text_file_type, write_files
+   public :: get_file_stem, read_text_file, text_file_type
 
    !> Size of the largest input file that is read, bytes.
    integer(int64), parameter :: largest_input = 65536_int64
@@ -78,87 +75,5 @@ contains
       dot = index(stem, '.', back=.true.)
       if (dot > 1) stem = stem(:dot - 1)
    end function get_file_stem
-
-   !> Complains where a directory holds anything else than an earlier run of the same case.
-   subroutine check_owner(directory, names, marker, content, differs, error, locked)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Names of all files that a run may write: [n_file].
-      character(len=*), intent(in) :: names(:)
-      !> Name of the file whose first line tells whose directory it is.
-      character(len=*), intent(in) :: marker
-      !> What this file will hold.
-      character(len=*), intent(in) :: content
-      !> The directory holds the same case with another content of this file.
-      logical, intent(out) :: differs
-      !> The directory belongs to something else.
-      type(error_type), allocatable, intent(out) :: error
-      !> The caller holds the lock on the directory; otherwise, as without this, it is taken here.
-      logical, intent(in), optional :: locked
-      type(error_type), allocatable :: unreadable
-      type(lock_type) :: lock
-      logical :: takes
-      character(len=:), allocatable :: text
-
-      differs = .false.
-      if (.not. directory_exists(directory)) return
-      ! Under the lock, so that nobody is writing the parts.
-      takes = .true.
-      if (present(locked)) takes = .not. locked
-      if (takes) call lock_directory(directory, lock)
-      call remove_parts(directory, names)
-      call unlock_directory(lock)
-      if (is_empty_directory(directory)) return
-      call read_text_file(directory//'/'//marker, text, unreadable)
-      if (.not. allocated(unreadable)) then
-         if (index(text, content(:index(content, newline))) == 1) then
-            differs = text /= content
-            return
-         end if
-      end if
-      error = input_error('--output '//directory//' holds files of something else; allowed: a new or empty directory, ' &
-         //'or results of the same case')
-   end subroutine check_owner
-
-   !> Writes a set of files into a directory, which is made where it is missing.
-   !>
-   !> The directory is locked meanwhile; a process that dies leaves no lock and nothing but files
-   !> named `.<name>.part`, which the next one replaces.
-   subroutine write_files(directory, files, error, ready)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> The files: [n_file].
-      type(text_file_type), intent(in) :: files(:)
-      !> A file could not be written; then none of them was, and older ones are as they were.
-      type(error_type), allocatable, intent(out) :: error
-      !> Name of one more file, whose part is written already; then the caller holds the lock.
-      character(len=*), intent(in), optional :: ready
-      type(lock_type) :: lock
-      integer(c_intptr_t) :: interrupt
-      logical :: was_there
-      integer :: i
-
-      was_there = directory_exists(directory)
-      call require_directory(directory, error)
-      if (allocated(error)) return
-      if (.not. present(ready)) call lock_directory(directory, lock)
-      do i = 1, size(files)
-         call write_whole_part(directory, trim(files(i)%name), files(i)%content, error)
-         if (allocated(error)) exit
-      end do
-      ! Only renaming is left to do.
-      if (.not. allocated(error)) then
-         call ignore_interrupts(.true., interrupt)
-         if (present(ready)) call name_part(directory, ready, error)
-         do i = 1, size(files)
-            call name_part(directory, files(i)%name, error)
-         end do
-         call ignore_interrupts(.false., interrupt)
-      end if
-      if (allocated(error)) call remove_parts(directory, files%name)
-      if (allocated(error) .and. present(ready)) call remove_parts(directory, [ready])
-      call unlock_directory(lock)
-      if (allocated(error) .and. .not. was_there) call remove_file(directory)
-   end subroutine write_files
 
 end module thud_file

@@ -1,13 +1,13 @@
 !> Lines of texts of any size, from files and pipes: the run-time library would take a whole line into memory,
 !> however long.
 module thud_line_reader
-   use thud_posix, only: close_descriptor, open_descriptor, read_bytes
+   use thud_system, only: close_descriptor, open_descriptor, read_bytes
    implicit none (type, external)
    private
 
    public :: close_lines, line_length, line_reader_type, open_lines, read_line
 
-   !> Longest line.
+   !> Maximum length of a line.
    integer, parameter :: line_length = 4096
 
    !> Bytes that are read at a time.
@@ -56,9 +56,9 @@ contains
    subroutine read_line(reader, line, length)
       !> The text.
       type(line_reader_type), intent(inout) :: reader
-      !> The line, as far as there is room.
+      !> The line, as far as it fits.
       character(len=line_length), intent(out) :: line
-      !> Its characters, at most one more than there is room for; -1 at the end of the text, -2 where it cannot
+      !> Its characters, at most one more than fit; -1 at the end of the text, -2 where it cannot
       !> be read.
       integer, intent(out) :: length
       integer :: stop, n

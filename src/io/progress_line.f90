@@ -2,8 +2,8 @@
 module thud_progress_line
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_kinds, only: wp
-   use thud_posix, only: is_terminal, print_text, standard_error
    use thud_progress, only: set_progress_handler
+   use thud_system, only: is_terminal, standard_error, write_text
    use thud_text, only: fixed
    implicit none (type, external)
    private
@@ -31,10 +31,10 @@ contains
 
    !> Shows no progress any more, and wipes the line.
    subroutine end_progress()
-      logical :: done
+      integer :: status
 
       call set_progress_handler()
-      if (shown) call print_text(standard_error, achar(13)//repeat(' ', 60)//achar(13), done)
+      if (shown) call write_text(standard_error, achar(13)//repeat(' ', 60)//achar(13), status)
       shown = .false.
    end subroutine end_progress
 
@@ -47,16 +47,18 @@ contains
       !> What is counted.
       character(len=*), intent(in) :: unit
       integer(int64) :: now
+      integer :: status
 
       call system_clock(now)
       if (real(now - latest, wp) < patience*real(rate, wp)) return
       latest = now
       if (whole > 0.0_wp) then
-         call print_text(standard_error, achar(13)//'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit &
-            //' computed', shown)
+         call write_text(standard_error, achar(13)//'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit &
+            //' computed', status)
       else
-         call print_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', shown)
+         call write_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', status)
       end if
+      shown = status == 0
    end subroutine print_line
 
 end module thud_progress_line

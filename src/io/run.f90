@@ -5,12 +5,13 @@ module thud_run
    use thud_compute, only: compute_case, is_conforming, judge_case, results_type
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
-   use thud_file, only: check_owner, get_file_stem, read_text_file, text_file_type, write_files
+   use thud_file, only: get_file_stem, read_text_file, text_file_type
    use thud_kinds, only: wp
-   use thud_mesh_files, only: estimate_motion_bytes, get_frame_name, get_modes_files, get_motion_files, modes_names, &
+   use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
-   use thud_posix, only: get_free_bytes, remove_file
    use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
+   use thud_result_directory, only: check_owner, write_results
+   use thud_system, only: get_free_bytes
    use thud_table, only: get_modes_table, get_table
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
@@ -26,10 +27,6 @@ module thud_run
 
    !> The full input, which tells whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
-
-   !> Figures that the driver may have added; they show the results that they were drawn from.
-   character(len=15), parameter :: figure_names(*) = [character(len=15) :: 'force.png', 'force.svg', 'levels.png', &
-      'levels.svg', 'motion.png', 'motion.svg', 'motion.gif', 'loss_factor.png', 'loss_factor.svg', 'modes.png', 'modes.svg']
 
    !> What a run leaves for its caller.
    type :: outcome_type
@@ -83,26 +80,22 @@ contains
       !> The run failed; nothing was written.
       type(error_type), allocatable, intent(out) :: error
       type(text_file_type), allocatable :: files(:)
-      character(len=:), allocatable :: input
+      type(text_file_type) :: input
       logical :: differs
 
-      call get_case_text(case, input)
+      input%name = input_file
+      call get_case_text(case, input%content)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
       outcome%remark = ''
-      call check_owner(outcome%directory, [character(len=13) :: file_names, channel_file, input_file, modes_names, &
-         motion_names], input_file, input, differs, error)
+      call check_owner(outcome%directory, input, differs, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
-      if (.not. allocated(error)) call describe(case, results, files, outcome)
-      if (.not. allocated(error)) then
-         files(1)%name = input_file
-         files(1)%content = input
-         call write_files(outcome%directory, files, error)
-      end if
       if (allocated(error)) return
-      call remove_stale(outcome%directory, files, differs)
+      call describe(case, results, files, outcome)
+      call write_results(outcome%directory, input, files, differs, error)
+      if (allocated(error)) return
       if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
    end subroutine store_case
 
@@ -132,14 +125,14 @@ contains
       type(case_type), intent(in) :: case
       !> Its results.
       type(results_type), intent(in) :: results
-      !> The files, behind a first one that is still to be filled: [n_file].
+      !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> Gets table and verdict.
       type(outcome_type), intent(inout) :: outcome
       integer :: at
 
-      allocate (files(1 + count_files(case, results)))
-      at = 1
+      allocate (files(count_files(case, results)))
+      at = 0
       outcome%table = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
       outcome%table = outcome%table//newline
@@ -182,34 +175,6 @@ contains
       if (allocated(results%history%channel)) n_file = n_file + 1
       if (results%history%motion%n_frame > 0) n_file = n_file + results%history%motion%n_frame + size(motion_names)
    end function count_files
-
-   !> Removes files that an earlier run of the case has left and this one has not replaced.
-   subroutine remove_stale(directory, files, differs)
-      !> The directory.
-      character(len=*), intent(in) :: directory
-      !> Files that were just written: [n_file].
-      type(text_file_type), intent(in) :: files(:)
-      !> The input was another one; figures show its results.
-      logical, intent(in) :: differs
-      character(len=16) :: known(size(file_names) + 1 + size(modes_names) + size(motion_names))
-      integer :: i
-      logical :: done
-
-      known = [character(len=16) :: file_names, channel_file, modes_names, motion_names]
-      do i = 1, size(known)
-         if (.not. any(files%name == known(i))) call remove_file(directory//'/'//trim(known(i)))
-      end do
-      i = count(index(files%name, 'motion_') == 1)
-      do
-         i = i + 1
-         call remove_file(directory//'/'//trim(get_frame_name(i)), done)
-         if (.not. done) exit
-      end do
-      if (.not. differs) return
-      do i = 1, size(figure_names)
-         call remove_file(directory//'/'//trim(figure_names(i)))
-      end do
-   end subroutine remove_stale
 
    !> Reads a case from a namelist file.
    subroutine load_case(path, case, error)

@@ -8,7 +8,7 @@ module thud_set_table
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_many, only: column_type, find_columns
-   use thud_posix, only: directory_exists
+   use thud_system, only: directory_exists
    use thud_text, only: join_quoted, lower_case, quoted, to_text
    implicit none (type, external)
    private

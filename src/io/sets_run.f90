@@ -1,18 +1,17 @@
 !> A run of many drops from end to end: case and table in, one row of results per drop out, a chunk at a time, so
 !> that the memory does not grow with the table.
 module thud_sets_run
-   use thud_atomic_write, only: close_part, open_part, require_directory, write_part
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
    use thud_case, only: case_type
    use thud_case_text, only: get_case_text
    use thud_compute, only: get_judged_force
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
-   use thud_file, only: check_owner, text_file_type, write_files
+   use thud_file, only: text_file_type
    use thud_kinds, only: wp
    use thud_many, only: many_type, new_many, solve_many
-   use thud_posix, only: directory_exists, lock_directory, lock_type, remove_file, unlock_directory
    use thud_progress, only: report_progress
+   use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
    use thud_run, only: load_case, outcome_type
    use thud_set_report, only: get_set_header, get_set_rows
    use thud_set_table, only: open_set_table, read_sets, set_table_type
@@ -54,8 +53,9 @@ contains
       type(case_type), target :: case
       type(set_table_type) :: table
       type(tally_type) :: tally
-      type(lock_type) :: lock
-      logical :: was_there
+      type(text_file_type) :: marker
+      type(result_directory_type) :: results
+      logical :: differs
 
       call load_case(path, case, error)
       if (allocated(error)) return
@@ -65,16 +65,16 @@ contains
       if (allocated(error)) return
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
+      marker%name = input_file
+      call get_case_text(case, marker%content)
+      call check_owner(outcome%directory, marker, differs, error)
+      if (allocated(error)) return
+      call open_results(outcome%directory, marker, [result_file], results, error)
+      call write_sets(case, table, threads, results, tally, error)
+      call close_results(results, differs, error)
+      if (allocated(error)) return
       outcome%remark = ''
-      was_there = directory_exists(outcome%directory)
-      call require_directory(outcome%directory, error)
-      if (allocated(error)) return
-      ! All the time, so that no other run takes this one's unfinished file for its own.
-      call lock_directory(outcome%directory, lock)
-      call write_results(case, table, threads, outcome, tally, error)
-      call unlock_directory(lock)
-      if (allocated(error) .and. .not. was_there) call remove_file(outcome%directory)
-      if (allocated(error)) return
+      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
       if (tally%computed < tally%sets) then
          if (outcome%remark /= '') outcome%remark = outcome%remark//'; '
          outcome%remark = outcome%remark//to_text(tally%sets - tally%computed)//' of '//to_text(tally%sets) &
@@ -85,34 +85,8 @@ contains
       call describe(case, tally, outcome%table)
    end subroutine run_sets
 
-   !> Computes all sets and writes both files, or none, into the locked directory.
-   subroutine write_results(case, table, threads, outcome, tally, error)
-      !> The case.
-      type(case_type), intent(in), target :: case
-      !> The table, open.
-      type(set_table_type), intent(inout) :: table
-      !> Number of threads.
-      integer, intent(in) :: threads
-      !> Place of the results; gets a remark.
-      type(outcome_type), intent(inout) :: outcome
-      !> What the sets came to.
-      type(tally_type), intent(out) :: tally
-      !> The run failed; nothing was written.
-      type(error_type), allocatable, intent(out) :: error
-      type(text_file_type) :: input(1)
-      logical :: differs
-
-      input(1)%name = input_file
-      call get_case_text(case, input(1)%content)
-      call check_owner(outcome%directory, [character(len=8) :: result_file, input_file], input_file, input(1)%content, &
-         differs, error, locked=.true.)
-      if (.not. allocated(error)) call write_sets(case, table, threads, outcome%directory, tally, error)
-      if (.not. allocated(error)) call write_files(outcome%directory, input, error, ready=result_file)
-      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
-   end subroutine write_results
-
    !> Computes and writes chunk after chunk.
-   subroutine write_sets(case, table, threads, directory, tally, error)
+   subroutine write_sets(case, table, threads, results, tally, error)
       !> The case.
       type(case_type), intent(in), target :: case
       !> The table, open.
@@ -120,23 +94,22 @@ contains
       !> Number of threads.
       integer, intent(in) :: threads
       !> Directory of the results.
-      character(len=*), intent(in) :: directory
+      type(result_directory_type), intent(inout) :: results
       !> What the sets came to.
-      type(tally_type), intent(inout) :: tally
-      !> A value is none, the sampling cannot be used, or the file cannot be written.
-      type(error_type), allocatable, intent(out) :: error
+      type(tally_type), intent(out) :: tally
+      !> What went wrong before; or a value is none, the sampling cannot be used, the file cannot be written.
+      type(error_type), allocatable, intent(inout) :: error
       type(many_type) :: many
       type(text_file_type) :: parts(threads)
       real(wp), allocatable :: values(:, :)
       character(len=:), allocatable :: text
-      integer :: unit, n, i
+      integer :: n, i
 
       call new_many(case, .true., many)
       allocate (values(size(table%columns), get_chunk_size(many%cost, threads)))
-      call open_part(directory, result_file, unit, error)
-      if (allocated(error)) return
+      call begin_file(results, result_file, error)
       call get_set_header(table, many, text)
-      call write_part(directory, result_file, unit, text, error)
+      call add_text(results, text, error)
       do while (.not. allocated(error))
          call read_sets(table, values, n, error)
          if (allocated(error) .or. n == 0) exit
@@ -150,13 +123,12 @@ contains
          !$omp end parallel do
          call add(tally, many, get_judged_force(case))
          do i = 1, threads
-            if (.not. allocated(error)) call write_part(directory, result_file, unit, parts(i)%content, error)
+            call add_text(results, parts(i)%content, error)
          end do
          call report_progress(real(tally%sets, wp), 0.0_wp, 'sets')
       end do
       if (.not. allocated(error) .and. tally%sets == 0) error = input_error(trim(table%path) &
          //': the table has no sets; allowed: one in each line below the keys')
-      call close_part(directory, result_file, unit, error)
    end subroutine write_sets
 
    !> Sets that are read, computed and written at a time: about half a second of work for each thread.

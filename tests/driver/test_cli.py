@@ -30,6 +30,7 @@ def test_run_writes_results_and_figures(
 ) -> None:
     assert cli.main(["run", str(case_file(MINIMAL, "ball.nml"))]) == 0
     assert sorted(path.name for path in (tmp_path / "outputs/ball").iterdir()) == [
+        ".thud",
         "effective.nml",
         "force.csv",
         "force.png",

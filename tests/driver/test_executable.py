@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     Run = Callable[..., subprocess.CompletedProcess[str]]
     CaseFile = Callable[..., Path]
 
-FILES = ["effective.nml", "force.csv", "levels.csv", "summary.nml"]
+FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
 
 
 def read_bytes(directory: Path) -> dict[str, bytes]:
@@ -210,84 +210,6 @@ def test_closing_shell_is_a_numerical_failure(run: Run, case_file: CaseFile) -> 
     assert "&drop: height = 5000.0 m closes the shell" in result.stderr
 
 
-def test_case_of_another_name_is_not_overwritten(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    run(case_file(MINIMAL, "one.nml"), "-o", "out")
-    before = read_bytes(tmp_path / "out")
-    result = run(case_file(MINIMAL, "two.nml"), "-o", "out")
-    assert result.returncode == 1
-    assert "--output out holds files of something else" in result.stderr
-    assert read_bytes(tmp_path / "out") == before
-
-
-def test_files_of_somebody_else_are_not_joined(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    result = run(case_file(MINIMAL), "-o", ".")
-    assert result.returncode == 1
-    assert [path.name for path in tmp_path.iterdir()] == ["case.nml"]
-
-
-def test_changed_input_of_the_same_case_replaces_its_results(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    run(case_file(MINIMAL))
-    result = run(case_file("&ball mass = 2.4 / &drop / &model /"))
-    assert result.returncode == 0
-    assert "mass" in (tmp_path / "outputs/case/effective.nml").read_text()
-    assert "2.4 " in (tmp_path / "outputs/case/effective.nml").read_text()
-    # Not silently: another input of the same name may have been meant.
-    assert "replaces" in result.stderr
-
-
-@pytest.mark.parametrize("place", ["/dev/null/out", "case.nml/out", "case.nml", "/proc/out"])
-def test_directory_that_cannot_be_made_is_told(run: Run, case_file: CaseFile, place: str) -> None:
-    result = run(case_file(MINIMAL), "-o", place)
-    assert result.returncode == 1
-    assert f"--output {place}" in result.stderr
-    assert "; allowed: " in result.stderr
-
-
-def test_stale_figures_do_not_stand_beside_new_results(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    run(case_file(MINIMAL))
-    figure = tmp_path / "outputs/case/force.png"
-    figure.write_text("drawn from the old results")
-    run(case_file(MINIMAL))
-    assert figure.exists()
-    run(case_file("&ball mass = 2.4 / &drop / &model /"))
-    assert not figure.exists()
-
-
-def test_killed_run_does_not_lock_its_directory(
-    run: Run, case_file: CaseFile, tmp_path: Path
-) -> None:
-    left = tmp_path / "outputs/case/.force.csv.part"
-    left.parent.mkdir(parents=True)
-    left.write_text("half a fi")
-    assert run(case_file(MINIMAL)).returncode == 0
-    assert sorted(path.name for path in left.parent.iterdir()) == FILES
-
-
-def test_runs_into_one_directory_do_not_mix(
-    executable: str, case_file: CaseFile, tmp_path: Path
-) -> None:
-    for height in ("1.0", "0.3"):
-        (tmp_path / height).mkdir()
-        case_file(f"&ball / &drop height = {height} / &model /", f"{height}/case.nml")
-    for _ in range(20):
-        running = [
-            subprocess.Popen([executable, f"{height}/case.nml", "-q", "-o", "o"], cwd=tmp_path)
-            for height in ("1.0", "0.3")
-        ]
-        assert [process.wait() for process in running] == [0, 0]
-        height = f90nml.read(tmp_path / "o/effective.nml")["drop"]["height"]
-        summary = f90nml.read(tmp_path / "o/summary.nml")
-        assert summary["verdict"]["value"][-1] == height
-
-
 def test_pipe_as_input_is_told(run: Run, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     result = run("pipe")
@@ -303,38 +225,47 @@ def test_closed_pipe_is_an_error_without_a_crash(executable: str, tmp_path: Path
     assert result.returncode == 1
 
 
-def test_full_disk_leaves_nothing(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
-    def limit_file_size() -> None:
-        # Files may grow to 100 kB, force.csv needs more; the write fails as on a full disk.
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
-
-    result = run(case_file(MINIMAL), preexec_fn=limit_file_size)
-    assert result.returncode == 1
-    assert "cannot be written" in result.stderr
-    assert not (tmp_path / "outputs/case").exists()
-
-
-@pytest.mark.skipif(os.geteuid() == 0, reason="everything is writable for root")
-def test_unwritable_directory_is_told(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
-    (tmp_path / "locked").mkdir(mode=0o500)
-    result = run(case_file(MINIMAL), "-o", "locked/out")
-    assert result.returncode == 1
-    assert "--output locked/out cannot be made" in result.stderr
-
-
-def test_full_screen_is_an_error_without_a_crash(
-    executable: str, case_file: CaseFile, tmp_path: Path
+@pytest.mark.parametrize("argument", ["case.nml", "--help"])
+def test_full_screen_is_told(
+    executable: str, case_file: CaseFile, tmp_path: Path, argument: str
 ) -> None:
+    case_file(MINIMAL)
     with Path("/dev/full").open("w") as full:
         result = subprocess.run(
-            [executable, str(case_file(MINIMAL))],
+            [executable, argument],
             cwd=tmp_path,
             stdout=full,
             stderr=subprocess.PIPE,
+            text=True,
             check=False,
         )
     assert result.returncode == 1
+    sentence = "thud: standard output cannot be written (No space left on device); allowed: "
+    assert result.stderr.startswith(sentence)
+
+
+def test_closed_screen_is_told(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    result = run(case_file(MINIMAL), preexec_fn=lambda: os.close(1))
+    assert result.returncode == 1
+    assert "thud: standard output cannot be written" in result.stderr
+    # No file of the results had its number.
+    assert "Results" not in (tmp_path / "outputs/case/effective.nml").read_text()
+
+
+@pytest.mark.parametrize("ignored", [False, True], ids=["usual", "in the background"])
+def test_interrupted_run_says_so(
+    executable: str, case_file: CaseFile, tmp_path: Path, *, ignored: bool
+) -> None:
+    case = case_file(f"{MINIMAL}&sampling sample_rate = 2e5 duration = 1 substeps = 40 /")
+    trap = "trap '' INT;" if ignored else ""
+    command = ["/bin/sh", "-c", f"{trap} exec {executable} {case} -q"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)
+        said = process.communicate()[1]
+    assert said == ("" if ignored else "thud: interrupted; nothing was written\n")
+    assert process.returncode == (0 if ignored else 130)
+    assert (tmp_path / "outputs/case").exists() == ignored
 
 
 def test_characters_that_no_screen_shows_are_replaced(run: Run, case_file: CaseFile) -> None:

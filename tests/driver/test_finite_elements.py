@@ -102,7 +102,7 @@ def test_modes_alone_need_no_drop(
 ) -> None:
     assert cli.main(["run", str(case_file(MODES)), "--check"]) == 0
     assert sorted(path.name for path in (tmp_path / "outputs/case").iterdir()) == [
-        "effective.nml", "modes.csv", "modes.png", "modes.svg", "modes.vtu",
+        ".thud", "effective.nml", "modes.csv", "modes.png", "modes.svg", "modes.vtu",
     ]  # fmt: skip
     assert "free modes" in capsys.readouterr().out
     effective = f90nml.read("outputs/case/effective.nml")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import resource
+import signal
 import subprocess
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     Run = Callable[..., subprocess.CompletedProcess[str]]
 
+FILES = [".thud", "sets.csv", "sets.nml"]
 CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
 &model name = 'hollow_sphere' /
 """
@@ -213,7 +215,7 @@ def test_nothing_is_written_where_results_have_no_place(
     assert result.returncode == 1
     assert "sets.csv is a directory; allowed: a file of this name" in result.stderr
     assert (tmp_path / "o/sets.nml").read_bytes() == before
-    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == ["sets.csv", "sets.nml"]
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
 
 
 def test_results_of_single_drops_and_of_sets_are_kept_apart(
@@ -236,7 +238,7 @@ def at_work(executable: str, case: Path, tmp_path: Path) -> Iterator[subprocess.
     (tmp_path / "short.csv").write_text("height\n1\n")
     command = [executable, case, "--sets", "long.csv", "-q", "-o", "o"]
     with subprocess.Popen(command, cwd=tmp_path) as process:
-        while not (tmp_path / "o/.sets.csv.part").exists():
+        while not (tmp_path / ".o.part/sets.csv").exists():
             assert process.poll() is None
         yield process
 
@@ -247,7 +249,7 @@ def test_runs_in_one_directory_wait_for_each_other(
     assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0
     assert at_work.wait() == 0
     assert len(rows_of(tmp_path / "o/sets.csv")) == 1
-    assert not (tmp_path / "o/.sets.csv.part").exists()
+    assert not (tmp_path / ".o.part").exists()
 
 
 def test_run_after_a_killed_one_clears_up(
@@ -255,5 +257,17 @@ def test_run_after_a_killed_one_clears_up(
 ) -> None:
     at_work.kill()
     at_work.wait()
+    assert (tmp_path / ".o.part").exists()
     assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0
-    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == ["sets.csv", "sets.nml"]
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
+    assert not (tmp_path / ".o.part").exists()
+
+
+def test_interrupted_sets_leave_nothing(
+    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
+) -> None:
+    at_work.send_signal(signal.SIGINT)
+    assert at_work.wait() == 130
+    assert not (tmp_path / "o").exists()
+    assert not (tmp_path / ".o.part").exists()
+    assert run(case, "--sets", "short.csv", "-q", "-o", "o").returncode == 0

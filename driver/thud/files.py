@@ -1,0 +1,173 @@
+"""Files that are never half written, and directories that one run at a time may write to."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import signal
+import threading
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+# The file that lists which files of a result directory are not the user's.
+MANIFEST = ".thud"
+# A file of a result directory while it is written; also listed, so that nobody keeps it.
+PART = ".thud.new"
+
+
+def require_own(path: Path, *, mine: bool) -> None:
+    """Raise InputError where the results of another study stand."""
+    if not mine:
+        message = (
+            f"{path} belongs to another study, or to another version of this one; "
+            f"allowed: another directory, or remove it first"
+        )
+        raise InputError(message)
+
+
+def lock(folder: Path, result: Path) -> int:
+    """Keep other runs away from a directory until the descriptor is closed that it returns.
+
+    Raises
+    ------
+    InputError
+        Where another run is at work there; names the result that it will write.
+    """
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(descriptor)
+        message = f"{result} is being computed; allowed: wait, or another directory"
+        raise InputError(message) from error
+    except OSError:
+        # Some disks have no locks.
+        pass
+    return descriptor
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Hold an interrupt back until something short is done: libraries of files leave noise else."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if held:
+        raise KeyboardInterrupt
+
+
+def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file under another name, then give it its own: nobody sees half a file.
+
+    Parameters
+    ----------
+    path
+        Path of the file; an older one is replaced.
+    content
+        All of it.
+
+    Raises
+    ------
+    OSError
+        With the path that was asked for, where it cannot be written.
+    """
+    try:
+        target = Path(path)
+        _replace(target, content, target.with_name(f".{target.name}.{os.getpid()}.part"))
+    except ValueError as error:  # a path that no file system can hold
+        message = f"{path!r} is not allowed; allowed: the path of a file"
+        raise InputError(message) from error
+
+
+def add_files(
+    directory: str | os.PathLike[str], files: Mapping[str, bytes], marker: bytes | None = None
+) -> None:
+    """Add files, such as figures, to the results of a run.
+
+    They stay as long as the input does: a run of another input of the same case removes them.
+
+    Parameters
+    ----------
+    directory
+        Directory of the results.
+    files
+        Contents by name; older ones are replaced.
+    marker
+        What the file that says whose results these are, ``effective.nml`` or ``sets.nml``, held
+        when the new files were made.
+
+    Raises
+    ------
+    InputError
+        Where another run has replaced the results since then.
+    OSError
+        Where a file cannot be written.
+    """
+    if not files:
+        return
+    folder = Path(directory)
+    with _locked(folder):
+        if marker is not None and marker not in _markers(folder):
+            message = (
+                f"{folder} holds results of another input by now; allowed: to run the case again"
+            )
+            raise InputError(message)
+        manifest = folder / MANIFEST
+        listed = manifest.read_text(encoding="utf-8").splitlines() if manifest.exists() else []
+        # Before the files are there: one that is not listed would pass for the user's.
+        names = sorted({*listed, PART, *files})
+        for name, content in {MANIFEST: "".join(f"{n}\n" for n in names).encode(), **files}.items():
+            _replace(folder / name, content, folder / PART)
+
+
+def _markers(folder: Path) -> Iterator[bytes]:
+    """Yield the contents of the files that say whose results a directory holds."""
+    for name in ("effective.nml", "sets.nml"):
+        with suppress(OSError):
+            yield (folder / name).read_bytes()
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Wait until no run switches or adds to a result directory, and keep others waiting."""
+    while True:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        # Some disks have no locks.
+        with suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        # Whoever had the lock may have put another directory in its place.
+        with suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(descriptor), folder.stat()):
+                break
+        os.close(descriptor)
+    try:
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _replace(target: Path, content: bytes, part: Path) -> None:
+    """Write a file by way of another one beside it."""
+    try:
+        if target.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+        try:
+            part.write_bytes(content)
+            part.replace(target)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error

@@ -1,0 +1,345 @@
+!> Directories of results: a set of files replaces the one before it as a whole, or not at all.
+!>
+!> A writer works in a workspace `.<name>.part` beside the directory `<name>`, or in the directory itself where the two
+!> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes writers wait for each
+!> other; what a dead one has left there is removed. The lock on the directory is for the moments of its check and of the
+!> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
+module thud_result_directory
+   use thud_error, only: error_type, input_error, interrupted
+   use thud_file, only: read_text_file, text_file_type
+   use thud_file_set, only: add_names, clear_workspace, manifest, read_names, replace_set
+   use thud_system, only: can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
+      get_system_message, keep_interrupts, list_directory, lock_directory, name_length, pass_interrupts, remove_file, &
+      rename_file, resolve_path, write_text
+   use thud_text, only: newline
+   implicit none (type, external)
+   private
+
+   public :: add_text, begin_file, check_owner, close_results, open_results, result_directory_type, write_results
+
+   !> Name of a workspace in the directory itself.
+   character(len=*), parameter :: inner_workspace = '.thud.part'
+
+   !> Whose results a directory holds: it is free, or they are of the same case with the same or another input.
+   integer, parameter :: nobody = 0, same_input = 1, other_input = 2
+
+   !> A directory while its results are written.
+   type :: result_directory_type
+      private
+      !> Its path as the user gives it, the same without links, and the path of the workspace.
+      character(len=:), allocatable :: path, place, workspace
+      !> The file that says whose results these are.
+      type(text_file_type) :: marker
+      !> Names of all files of the set: [n_file].
+      character(len=name_length), allocatable :: names(:)
+      !> Name of the file that is being written.
+      character(len=name_length) :: name = ''
+      !> Descriptors of that file, and of the locks on workspace and directory; negative where there is none.
+      integer :: file = -1, workspace_lock = -1, lock = -1
+      !> The directory was missing and is made already.
+      logical :: is_new = .false.
+   end type result_directory_type
+
+contains
+
+   !> Refuses a directory that holds anything else than results of the same case.
+   subroutine check_owner(path, marker, differs, error)
+      !> The directory.
+      character(len=*), intent(in) :: path
+      !> The file that will say whose results it holds.
+      type(text_file_type), intent(in) :: marker
+      !> It holds the same case with another input.
+      logical, intent(out) :: differs
+      !> It belongs to something else, or is no directory.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: owner
+
+      call find_owner(path, marker, owner, error)
+      differs = owner == other_input
+   end subroutine check_owner
+
+   !> Writes a set of files into a directory, completely or not at all.
+   subroutine write_results(path, marker, files, differs, error)
+      !> The directory, which is made where it is missing.
+      character(len=*), intent(in) :: path
+      !> The file that says whose results these are.
+      type(text_file_type), intent(in) :: marker
+      !> The other files: [n_file].
+      type(text_file_type), intent(in) :: files(:)
+      !> They replace results of the same case with another input.
+      logical, intent(out) :: differs
+      !> They cannot be written; the directory is as it was.
+      type(error_type), allocatable, intent(out) :: error
+      type(result_directory_type) :: directory
+      integer :: i
+
+      call open_results(path, marker, files%name, directory, error)
+      do i = 1, size(files)
+         call write_file(directory, files(i), error)
+      end do
+      call close_results(directory, differs, error)
+   end subroutine write_results
+
+   !> Waits for other writers of a directory and begins to write.
+   subroutine open_results(path, marker, names, directory, error)
+      !> The directory, which is made where it is missing.
+      character(len=*), intent(in) :: path
+      !> The file that says whose results these are.
+      type(text_file_type), intent(in) :: marker
+      !> Names of the other files: [n_file].
+      character(len=*), intent(in) :: names(:)
+      !> The directory, to be closed in any case.
+      type(result_directory_type), intent(out) :: directory
+      !> It belongs to something else, or cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: owner, i
+
+      directory%path = path
+      directory%marker = marker
+      directory%names = [character(len=name_length) :: names, marker%name]
+      call take_workspace(directory, error)
+      if (.not. allocated(error)) call lock_place(directory, owner, error)
+      call close_descriptor(directory%lock)
+      if (allocated(error)) return
+      do i = 1, size(directory%names)
+         if (directory_exists(directory%place//'/'//trim(directory%names(i)))) error = input_error('--output '//path//': ' &
+            //trim(directory%names(i))//' is a directory; allowed: a file of this name')
+      end do
+      if (allocated(error)) return
+      call clear_workspace(directory%workspace, directory%place)
+      call add_names(directory%workspace, directory%names, error)
+   end subroutine open_results
+
+   !> Ends the writing: all files stand in the directory, or none.
+   subroutine close_results(directory, differs, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> The files replace results of the same case with another input.
+      logical, intent(out) :: differs
+      !> What went wrong before, or now; then the directory is as it was.
+      type(error_type), allocatable, intent(inout) :: error
+      logical :: moved
+
+      differs = .false.
+      moved = .false.
+      call end_file(directory, error)
+      call write_file(directory, directory%marker, error)
+      if (.not. allocated(error)) call publish(directory, differs, moved, error)
+      ! Where the workspace has moved, another one of its name is somebody else's.
+      if (directory%workspace_lock >= 0 .and. .not. moved) then
+         call clear_workspace(directory%workspace, directory%place)
+         call remove_file(directory%workspace)
+      end if
+      if (directory%is_new .and. allocated(error)) call remove_file(directory%place)
+      call close_descriptor(directory%lock)
+      call close_descriptor(directory%workspace_lock)
+      call pass_interrupts()
+   end subroutine close_results
+
+   !> Begins a file.
+   subroutine begin_file(directory, name, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> Name of the file, one of those given before.
+      character(len=*), intent(in) :: name
+      !> What went wrong before, or now.
+      type(error_type), allocatable, intent(inout) :: error
+      integer :: status
+
+      call end_file(directory, error)
+      if (allocated(error)) return
+      directory%name = name
+      call create_file(directory%workspace//'/'//trim(name), directory%file, status)
+      call require_written(directory, status, error)
+   end subroutine begin_file
+
+   !> Adds to the file that was begun last.
+   subroutine add_text(directory, text, error)
+      !> The directory.
+      type(result_directory_type), intent(in) :: directory
+      !> The text.
+      character(len=*), intent(in) :: text
+      !> What went wrong before, or now.
+      type(error_type), allocatable, intent(inout) :: error
+      integer :: status
+
+      if (allocated(error)) return
+      call write_text(directory%file, text, status)
+      call require_written(directory, status, error)
+   end subroutine add_text
+
+   !> Ends the file that was begun last.
+   subroutine end_file(directory, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> What went wrong before, or now.
+      type(error_type), allocatable, intent(inout) :: error
+      integer :: status
+
+      if (directory%file < 0) return
+      call close_descriptor(directory%file, status)
+      call require_written(directory, status, error)
+   end subroutine end_file
+
+   !> Writes a whole file.
+   subroutine write_file(directory, file, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> The file.
+      type(text_file_type), intent(in) :: file
+      !> What went wrong before, or now.
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call begin_file(directory, file%name, error)
+      call add_text(directory, file%content, error)
+      call end_file(directory, error)
+   end subroutine write_file
+
+   !> Refuses to go on where a file was not written.
+   subroutine require_written(directory, status, error)
+      !> The directory.
+      type(result_directory_type), intent(in) :: directory
+      !> 0, the number of the system's error, or negative after an interrupt.
+      integer, intent(in) :: status
+      !> What went wrong before, or now.
+      type(error_type), allocatable, intent(inout) :: error
+
+      if (status == 0 .or. allocated(error)) return
+      if (status < 0) then
+         error = error_type(interrupted, 'interrupted; nothing was written')
+      else
+         error = input_error('--output '//directory%path//': '//trim(directory%name)//' cannot be written (' &
+            //get_system_message(status)//'); allowed: a directory that you may write to, with space on its disk')
+      end if
+   end subroutine require_written
+
+   !> Finds out whose results a directory holds.
+   subroutine find_owner(path, marker, owner, error)
+      !> The directory.
+      character(len=*), intent(in) :: path
+      !> The file that will say whose results it holds.
+      type(text_file_type), intent(in) :: marker
+      !> `nobody`, `same_input` or `other_input`.
+      integer, intent(out) :: owner
+      !> It belongs to something else, or is no directory.
+      type(error_type), allocatable, intent(out) :: error
+      type(error_type), allocatable :: unreadable
+      character(len=name_length), allocatable :: found(:), listed(:)
+      character(len=:), allocatable :: text
+      logical :: there
+
+      owner = nobody
+      if (.not. directory_exists(path)) then
+         inquire (file=path, exist=there)
+         if (there) error = making_error(path)
+         return
+      end if
+      call list_directory(path, found)
+      if (all(found == inner_workspace)) return
+      call read_text_file(path//'/'//trim(marker%name), text, unreadable)
+      if (.not. allocated(unreadable)) then
+         if (index(text, marker%content(:index(marker%content, newline))) == 1) owner = merge(same_input, other_input, &
+            text == marker%content)
+         if (owner /= nobody) return
+      else if (.not. any(found == marker%name)) then
+         ! Whoever was killed while files were moved one by one has left the manifest without the marker.
+         call read_names(path, listed)
+         if (any(listed == marker%name)) return
+      end if
+      error = input_error('--output '//path//' holds files of something else; allowed: a new or empty directory, or ' &
+         //'results of the same case')
+   end subroutine find_owner
+
+   !> Takes the workspace of a directory. Interrupts are kept from then on.
+   subroutine take_workspace(directory, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> It cannot be made.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=name_length), allocatable :: found(:)
+      integer :: slash, made
+      logical :: done
+
+      call resolve_path(directory%path, directory%place, done)
+      if (done) then
+         slash = index(directory%place, '/', back=.true.)
+         directory%workspace = directory%place(:slash)//'.'//directory%place(slash + 1:)//'.part'
+         call lock_directory(directory%workspace, .true., directory%workspace_lock)
+         if (directory%workspace_lock >= 0) then
+            done = can_exchange(directory%workspace, directory%place)
+            if (.not. done) call remove_file(directory%workspace)
+            if (.not. done) call close_descriptor(directory%workspace_lock)
+         end if
+         if (directory%workspace_lock < 0) then
+            directory%is_new = .not. directory_exists(directory%place)
+            call lock_directory(directory%place, .true., made)
+            call close_descriptor(made)
+            directory%workspace = directory%place//'/'//inner_workspace
+            call lock_directory(directory%workspace, .true., directory%workspace_lock)
+         end if
+         call keep_interrupts()
+      end if
+      if (directory%workspace_lock < 0) error = making_error(directory%path)
+      if (allocated(error)) return
+      call list_directory(directory%workspace, found)
+      if (size(found) == 0 .or. any(found == manifest)) return
+      error = input_error('--output '//directory%path//': '//directory%workspace//' is in the way; allowed: another ' &
+         //'directory, or remove it first')
+      call close_descriptor(directory%workspace_lock)
+   end subroutine take_workspace
+
+   !> Locks a directory that is there, and finds out whose results it holds.
+   subroutine lock_place(directory, owner, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> `nobody`, `same_input` or `other_input`.
+      integer, intent(out) :: owner
+      !> It belongs to something else, or cannot be written.
+      type(error_type), allocatable, intent(out) :: error
+
+      call lock_directory(directory%place, .false., directory%lock)
+      call find_owner(directory%path, directory%marker, owner, error)
+      if (allocated(error) .or. directory%lock >= 0) return
+      if (directory_exists(directory%place)) error = making_error(directory%path)
+   end subroutine lock_place
+
+   !> Puts the files of the workspace in the place of those before.
+   subroutine publish(directory, differs, moved, error)
+      !> The directory.
+      type(result_directory_type), intent(inout) :: directory
+      !> The files replace results of the same case with another input.
+      logical, intent(out) :: differs
+      !> The workspace itself has become the directory.
+      logical, intent(out) :: moved
+      !> The directory belongs to something else by now, or its files cannot be replaced.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: owner, status
+
+      moved = .false.
+      call lock_place(directory, owner, error)
+      differs = owner == other_input
+      if (allocated(error)) return
+      call flush_directory(directory%workspace, status)
+      call require_written(directory, status, error)
+      if (allocated(error)) return
+      if (directory%lock < 0) then
+         call rename_file(directory%workspace, directory%place, moved)
+         if (.not. moved) error = making_error(directory%path)
+      else
+         call replace_set(directory%workspace, directory%place, directory%names, owner == same_input, &
+            directory%workspace /= directory%place//'/'//inner_workspace, error)
+      end if
+   end subroutine publish
+
+   !> Error of a directory that cannot be made or written.
+   pure function making_error(path) result(error)
+      !> The directory.
+      character(len=*), intent(in) :: path
+      !> The error.
+      type(error_type) :: error
+
+      error = input_error('--output '//path//' cannot be made; allowed: a directory that you may write to')
+   end function making_error
+
+end module thud_result_directory

@@ -1,0 +1,237 @@
+// The calls of the operating system that Fortran lacks, with the system's own headers.
+// Functions return 0, or the number of the error, where nothing else is said.
+#define _GNU_SOURCE
+#include <dirent.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/statvfs.h>
+#include <unistd.h>
+
+static volatile sig_atomic_t deferred = 0, interrupted = 0;
+static const char interruption[] = "\nthud: interrupted; nothing was written\n";
+
+static void interrupt(int number)
+{
+   (void)number;
+   if (deferred && !interrupted) {
+      interrupted = 1;
+      return;
+   }
+
+   // The terminal has shown ^C, perhaps behind a line of progress.
+   const char *text = isatty(STDERR_FILENO) ? interruption : interruption + 1;
+
+   if (write(STDERR_FILENO, text, strlen(text)) < 0) _exit(130);
+   _exit(130);
+}
+
+// Prepares the process of the executable: a write to a full file or a closed pipe is an error and not the end, no
+// file gets the number of a closed screen, and an interrupt ends the process with a sentence.
+void thud_prepare_process(void)
+{
+   struct sigaction action = {.sa_handler = SIG_IGN}, before;
+
+   for (int i = 0; i <= STDERR_FILENO; i++)
+      if (fcntl(i, F_GETFD) < 0 && open("/dev/null", i == STDIN_FILENO ? O_WRONLY : O_RDONLY) < 0) return;
+   sigaction(SIGPIPE, &action, NULL);
+   sigaction(SIGXFSZ, &action, NULL);
+   action.sa_handler = interrupt;
+   action.sa_flags = SA_RESTART;
+   if (sigaction(SIGINT, NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(SIGINT, &action, NULL);
+}
+
+// From now on an interrupt is kept for `thud_write`.
+void thud_keep_interrupts(void)
+{
+   deferred = 1;
+}
+
+// From now on an interrupt ends the process.
+void thud_pass_interrupts(void)
+{
+   deferred = 0;
+}
+
+// Sentence of an error, at most `length` bytes with the zero at its end.
+void thud_get_error_text(int number, char *text, size_t length)
+{
+   snprintf(text, length, "%s", strerror(number));
+}
+
+// A descriptor to read from; negative where there is none.
+int thud_open(const char *path)
+{
+   return open(path, O_RDONLY | O_CLOEXEC);
+}
+
+// Bytes that were read; 0 at the end, negative after an error.
+ssize_t thud_read(int descriptor, char *bytes, size_t length)
+{
+   ssize_t count;
+
+   do count = read(descriptor, bytes, length);
+   while (count < 0 && errno == EINTR);
+   return count;
+}
+
+// A descriptor to write to a new or emptied file, or minus the number of the error.
+int thud_create(const char *path)
+{
+   int descriptor = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+
+   return descriptor < 0 ? -errno : descriptor;
+}
+
+// Writes all of a text; -1 after an interrupt that was kept.
+int thud_write(int descriptor, const char *bytes, size_t length)
+{
+   while (length > 0) {
+      if (deferred && interrupted) return -1;
+      ssize_t count = write(descriptor, bytes, length);
+
+      if (count < 0 && errno == EINTR) continue;
+      if (count < 0) return errno;
+      bytes += count;
+      length -= (size_t)count;
+   }
+   return 0;
+}
+
+// Closes a file; some disks are found to be full only then.
+int thud_close(int descriptor)
+{
+   return close(descriptor) == 0 ? 0 : errno;
+}
+
+// Brings all files of a directory to the disk, at once where the system can: one by one takes ten times as long.
+int thud_flush(const char *path)
+{
+   int descriptor = open(path, O_RDONLY | O_CLOEXEC), error = 0;
+
+   if (descriptor < 0) return errno;
+#if defined __linux__
+   if (syncfs(descriptor) != 0) error = errno;
+#else
+   sync();
+#endif
+   close(descriptor);
+   return error;
+}
+
+// Waits for the lock on a directory and takes it, by a descriptor; makes the directory where that is asked for.
+// Minus the number of the error where this user cannot write there. File systems without locks go without.
+int thud_lock_directory(const char *path, int make)
+{
+   for (;;) {
+      struct stat locked, named;
+      int descriptor;
+
+      if (make && mkdir(path, 0777) != 0 && errno != EEXIST) return -errno;
+      descriptor = open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+      if (descriptor < 0 && make && errno == ENOENT) continue;
+      if (descriptor < 0) return -errno;
+      if (faccessat(descriptor, ".", W_OK | X_OK, AT_EACCESS) != 0) {
+         int error = errno;
+
+         close(descriptor);
+         return -error;
+      }
+      while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) continue;
+      // Whoever had the lock may have renamed or removed the directory.
+      if (fstat(descriptor, &locked) == 0 && lstat(path, &named) == 0 && locked.st_dev == named.st_dev
+          && locked.st_ino == named.st_ino)
+         return descriptor;
+      close(descriptor);
+   }
+}
+
+// The path without links, of `length` bytes at most; makes the directories above.
+int thud_resolve(const char *path, char *resolved, size_t length)
+{
+   char above[PATH_MAX], *found, *end;
+   const char *name = strrchr(path, '/') ? strrchr(path, '/') + 1 : path;
+   size_t used = (size_t)snprintf(above, sizeof above, "%s", path);
+
+   if (used >= sizeof above) return ENAMETOOLONG;
+   for (end = above; *end && (end = strchr(end + 1, '/')); *end = '/') {
+      *end = 0;
+      if (mkdir(above, 0777) != 0) continue;
+   }
+   found = realpath(path, NULL);
+   if (found) {
+      used = (size_t)snprintf(resolved, length, "%s", found);
+   } else {
+      above[name - path] = 0;
+      found = errno == ENOENT ? realpath(*above ? above : ".", NULL) : NULL;
+      if (!found) return errno;
+      used = (size_t)snprintf(resolved, length, "%s/%s", found[1] ? found : "", name);
+   }
+   free(found);
+   return used < length ? 0 : ENAMETOOLONG;
+}
+
+// 1 where `thud_exchange` has a chance: the target is missing, or on the same mount and not the working directory.
+int thud_can_exchange(const char *path, const char *target)
+{
+   struct stat here, there;
+   char from[PATH_MAX + 16], to[PATH_MAX + 16];
+
+   if (stat(target, &there) != 0) return 1;
+   if (stat(".", &here) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino) return 0;
+   snprintf(from, sizeof from, "%s/..missing", path);
+   snprintf(to, sizeof to, "%s/..missing", target);
+   // There is no such file; where the mounts differ, that is the error.
+   return rename(from, to) != 0 && errno != EXDEV;
+}
+
+// Exchanges two directories in one step; the first gets owner and permissions of the second.
+int thud_exchange(const char *path, const char *target)
+{
+   struct stat there;
+
+   if (stat(target, &there) != 0 || chown(path, there.st_uid, there.st_gid) != 0) return errno;
+   if (chmod(path, there.st_mode & 07777) != 0) return errno;
+#if defined RENAME_EXCHANGE
+   return renameat2(AT_FDCWD, path, AT_FDCWD, target, RENAME_EXCHANGE) == 0 ? 0 : errno;
+#elif defined RENAME_SWAP
+   return renamex_np(path, target, RENAME_SWAP) == 0 ? 0 : errno;
+#else
+   return ENOTSUP;
+#endif
+}
+
+// Length of the next name in an open directory, `.` and `..` left out; 0 at the end.
+size_t thud_next_name(DIR *directory, char *name, size_t length)
+{
+   struct dirent *entry;
+
+   do entry = readdir(directory);
+   while (entry && (strcmp(entry->d_name, ".") == 0 || strcmp(entry->d_name, "..") == 0));
+   if (!entry) return 0;
+   snprintf(name, length, "%s", entry->d_name);
+   return strlen(name);
+}
+
+// Bytes that this user may write to the disk of a directory, or of the next one above that is there; negative where
+// the system does not say.
+double thud_get_free_bytes(const char *path)
+{
+   struct statvfs disk;
+   char place[PATH_MAX], *end;
+
+   snprintf(place, sizeof place, "%s", path);
+   while (statvfs(place, &disk) != 0) {
+      if (strcmp(place, ".") == 0 || strcmp(place, "/") == 0) return -1.0;
+      end = strrchr(place, '/');
+      if (end) end[end == place] = 0;
+      else strcpy(place, ".");
+   }
+   return (double)disk.f_frsize * (double)disk.f_bavail;
+}

@@ -1,0 +1,377 @@
+!> The calls of the operating system that Fortran lacks; `system.c` holds them.
+module thud_system
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_intptr_t, c_null_char, c_ptr, c_size_t
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: standard_error, standard_output
+   public :: can_exchange, close_descriptor, create_file, directory_exists, exchange_directories, flush_directory
+   public :: get_free_bytes, get_system_message, is_terminal, keep_interrupts, link_file, list_directory, lock_directory
+   public :: open_descriptor, pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path
+   public :: write_text
+
+   !> Descriptors of the process.
+   integer, parameter :: standard_output = 1, standard_error = 2
+
+   !> Maximum length of the name of a file, and of a path.
+   integer, parameter, public :: name_length = 255, path_length = 4096
+
+   abstract interface
+      function path_call(path) bind(c) result(status)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int) :: status
+      end function path_call
+
+      function two_path_call(path, other) bind(c) result(status)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*), other(*)
+         integer(c_int) :: status
+      end function two_path_call
+
+      function number_call(number) bind(c) result(status)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int), value :: number
+         integer(c_int) :: status
+      end function number_call
+   end interface
+
+   procedure(path_call), bind(c, name='thud_open') :: c_open
+   procedure(path_call), bind(c, name='thud_create') :: c_create
+   procedure(path_call), bind(c, name='remove') :: c_remove
+   procedure(two_path_call), bind(c, name='rename') :: c_rename
+   procedure(two_path_call), bind(c, name='link') :: c_link
+   procedure(two_path_call), bind(c, name='thud_can_exchange') :: c_can_exchange
+   procedure(two_path_call), bind(c, name='thud_exchange') :: c_exchange
+   procedure(path_call), bind(c, name='thud_flush') :: c_flush
+   procedure(number_call), bind(c, name='thud_close') :: c_close
+   procedure(number_call), bind(c, name='isatty') :: c_isatty
+
+   interface
+      !> Makes errors of full and closed outputs, which would end the process, and a sentence of an interrupt.
+      subroutine prepare_process() bind(c, name='thud_prepare_process')
+         implicit none (type, external)
+      end subroutine prepare_process
+
+      !> Keeps an interrupt from now on; it ends `write_text`.
+      subroutine keep_interrupts() bind(c, name='thud_keep_interrupts')
+         implicit none (type, external)
+      end subroutine keep_interrupts
+
+      !> Lets an interrupt end the process from now on.
+      subroutine pass_interrupts() bind(c, name='thud_pass_interrupts')
+         implicit none (type, external)
+      end subroutine pass_interrupts
+
+      subroutine c_get_error_text(number, text, length) bind(c, name='thud_get_error_text')
+         import :: c_char, c_int, c_size_t
+         implicit none (type, external)
+         integer(c_int), value :: number
+         character(kind=c_char), intent(out) :: text(*)
+         integer(c_size_t), value :: length
+      end subroutine c_get_error_text
+
+      function c_read(descriptor, bytes, length) bind(c, name='thud_read') result(count)
+         import :: c_char, c_int, c_intptr_t, c_size_t
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         character(kind=c_char), intent(out) :: bytes(*)
+         integer(c_size_t), value :: length
+         integer(c_intptr_t) :: count
+      end function c_read
+
+      function c_write(descriptor, bytes, length) bind(c, name='thud_write') result(status)
+         import :: c_char, c_int, c_size_t
+         implicit none (type, external)
+         integer(c_int), value :: descriptor
+         character(kind=c_char), intent(in) :: bytes(*)
+         integer(c_size_t), value :: length
+         integer(c_int) :: status
+      end function c_write
+
+      function c_lock_directory(path, make) bind(c, name='thud_lock_directory') result(descriptor)
+         import :: c_char, c_int
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: make
+         integer(c_int) :: descriptor
+      end function c_lock_directory
+
+      function c_resolve(path, resolved, length) bind(c, name='thud_resolve') result(status)
+         import :: c_char, c_int, c_size_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         character(kind=c_char), intent(out) :: resolved(*)
+         integer(c_size_t), value :: length
+         integer(c_int) :: status
+      end function c_resolve
+
+      function c_opendir(path) bind(c, name='opendir') result(directory)
+         import :: c_char, c_ptr
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr) :: directory
+      end function c_opendir
+
+      function c_next_name(directory, name, length) bind(c, name='thud_next_name') result(used)
+         import :: c_char, c_ptr, c_size_t
+         implicit none (type, external)
+         type(c_ptr), value :: directory
+         character(kind=c_char), intent(out) :: name(*)
+         integer(c_size_t), value :: length
+         integer(c_size_t) :: used
+      end function c_next_name
+
+      function c_closedir(directory) bind(c, name='closedir') result(status)
+         import :: c_int, c_ptr
+         implicit none (type, external)
+         type(c_ptr), value :: directory
+         integer(c_int) :: status
+      end function c_closedir
+
+      function c_get_free_bytes(path) bind(c, name='thud_get_free_bytes') result(bytes)
+         import :: c_char, c_double
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         real(c_double) :: bytes
+      end function c_get_free_bytes
+   end interface
+
+contains
+
+   !> What the system says of an error.
+   function get_system_message(status) result(text)
+      !> Number of the error.
+      integer, intent(in) :: status
+      !> Its sentence.
+      character(len=:), allocatable :: text
+      character(len=128) :: buffer
+
+      call c_get_error_text(int(status, c_int), buffer, len(buffer, c_size_t))
+      text = buffer(:index(buffer, c_null_char) - 1)
+   end function get_system_message
+
+   !> Whether somebody sees what is written.
+   function is_terminal(descriptor) result(yes)
+      !> `standard_output` or `standard_error`.
+      integer, intent(in) :: descriptor
+      !> The descriptor is a terminal.
+      logical :: yes
+
+      yes = c_isatty(int(descriptor, c_int)) == 1
+   end function is_terminal
+
+   !> Opens a file, pipe or device to be read.
+   function open_descriptor(path) result(descriptor)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> The descriptor; negative where it cannot be opened.
+      integer :: descriptor
+
+      descriptor = int(c_open(path//c_null_char))
+   end function open_descriptor
+
+   !> Reads what there is, at most as much as the buffer holds.
+   subroutine read_bytes(descriptor, buffer, count)
+      !> The descriptor.
+      integer, intent(in) :: descriptor
+      !> The bytes.
+      character(len=*), intent(out) :: buffer
+      !> Their number; 0 at the end, negative where they cannot be read.
+      integer, intent(out) :: count
+
+      count = int(c_read(int(descriptor, c_int), buffer, len(buffer, c_size_t)))
+   end subroutine read_bytes
+
+   !> Closes a descriptor; a lock that it holds is free then.
+   subroutine close_descriptor(descriptor, status)
+      !> The descriptor; negative where it is closed.
+      integer, intent(inout) :: descriptor
+      !> 0, or the number of the error.
+      integer, intent(out), optional :: status
+      integer :: found
+
+      found = 0
+      if (descriptor >= 0) found = int(c_close(int(descriptor, c_int)))
+      descriptor = -1
+      if (present(status)) status = found
+   end subroutine close_descriptor
+
+   !> Makes a file, or empties it.
+   subroutine create_file(path, descriptor, status)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> Its descriptor.
+      integer, intent(out) :: descriptor
+      !> 0, or the number of the error.
+      integer, intent(out) :: status
+
+      descriptor = int(c_create(path//c_null_char))
+      status = max(-descriptor, 0)
+   end subroutine create_file
+
+   !> Writes all of a text to a file or to the screen.
+   subroutine write_text(descriptor, text, status)
+      !> The descriptor.
+      integer, intent(in) :: descriptor
+      !> The text.
+      character(len=*), intent(in) :: text
+      !> 0, the number of the error, or negative after an interrupt.
+      integer, intent(out) :: status
+
+      status = int(c_write(int(descriptor, c_int), text, len(text, c_size_t)))
+   end subroutine write_text
+
+   !> Brings all files of a directory to the disk.
+   subroutine flush_directory(path, status)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> 0, or the number of the error.
+      integer, intent(out) :: status
+
+      status = int(c_flush(path//c_null_char))
+   end subroutine flush_directory
+
+   !> Whether a directory of that name is there.
+   function directory_exists(path) result(there)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> It exists and can be read.
+      logical :: there
+      type(c_ptr) :: directory
+
+      directory = c_opendir(path//c_null_char)
+      there = c_associated(directory)
+      if (there) there = c_closedir(directory) == 0
+   end function directory_exists
+
+   !> Names in a directory.
+   subroutine list_directory(path, names)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> The names, none where it cannot be read: [n_name].
+      character(len=name_length), allocatable, intent(out) :: names(:)
+      character(len=name_length + 1) :: name
+      type(c_ptr) :: directory
+      integer :: n, length
+
+      allocate (names(64))
+      n = 0
+      directory = c_opendir(path//c_null_char)
+      if (c_associated(directory)) then
+         do
+            length = int(c_next_name(directory, name, len(name, c_size_t)))
+            if (length == 0) exit
+            if (n == size(names)) names = [names, names]
+            n = n + 1
+            names(n) = name(:length)
+         end do
+         if (c_closedir(directory) /= 0) n = 0
+      end if
+      names = names(:n)
+   end subroutine list_directory
+
+   !> The path without links; the directories above are made.
+   subroutine resolve_path(path, resolved, done)
+      !> Path of a directory, which may be missing.
+      character(len=*), intent(in) :: path
+      !> The same from the root on.
+      character(len=:), allocatable, intent(out) :: resolved
+      !> There can be such a directory.
+      logical, intent(out) :: done
+      character(len=path_length) :: buffer
+      integer :: stop
+
+      stop = max(verify(path, '/', back=.true.), 1)
+      done = c_resolve(path(:stop)//c_null_char, buffer, len(buffer, c_size_t)) == 0
+      if (done) resolved = buffer(:index(buffer, c_null_char) - 1)
+   end subroutine resolve_path
+
+   !> Waits for the lock on a directory and takes it, until its descriptor is closed.
+   subroutine lock_directory(path, make, descriptor)
+      !> Path of the directory.
+      character(len=*), intent(in) :: path
+      !> To make it where it is missing.
+      logical, intent(in) :: make
+      !> The descriptor; negative where there is no such directory, or where this user cannot write to it.
+      integer, intent(out) :: descriptor
+
+      descriptor = int(c_lock_directory(path//c_null_char, merge(1_c_int, 0_c_int, make)))
+   end subroutine lock_directory
+
+   !> Whether `exchange_directories` has a chance.
+   function can_exchange(path, other) result(yes)
+      !> Path of a directory.
+      character(len=*), intent(in) :: path
+      !> Path of another one.
+      character(len=*), intent(in) :: other
+      !> The other is missing, or on the same mount and not the working directory.
+      logical :: yes
+
+      yes = c_can_exchange(path//c_null_char, other//c_null_char) == 1
+   end function can_exchange
+
+   !> Exchanges the names of two directories in one step; owner and permissions stay with the second name.
+   subroutine exchange_directories(path, other, done)
+      !> Path of a directory.
+      character(len=*), intent(in) :: path
+      !> Path of another one.
+      character(len=*), intent(in) :: other
+      !> They are exchanged.
+      logical, intent(out) :: done
+
+      done = c_exchange(path//c_null_char, other//c_null_char) == 0
+   end subroutine exchange_directories
+
+   !> Gives a file another name; a file that has that name is replaced in the same instant.
+   subroutine rename_file(old_path, new_path, done)
+      !> Path of the file.
+      character(len=*), intent(in) :: old_path
+      !> New path in the same file system.
+      character(len=*), intent(in) :: new_path
+      !> The file has its new name.
+      logical, intent(out) :: done
+
+      done = c_rename(old_path//c_null_char, new_path//c_null_char) == 0
+   end subroutine rename_file
+
+   !> Gives a file a second name, unless something else has it.
+   subroutine link_file(path, new_path, done)
+      !> Path of the file.
+      character(len=*), intent(in) :: path
+      !> New path in the same file system.
+      character(len=*), intent(in) :: new_path
+      !> The file has both names.
+      logical, intent(out) :: done
+
+      done = c_link(path//c_null_char, new_path//c_null_char) == 0
+   end subroutine link_file
+
+   !> Removes a file or an empty directory if it is there.
+   subroutine remove_file(path, done)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> There was something, and it is gone.
+      logical, intent(out), optional :: done
+      integer(c_int) :: status
+
+      status = c_remove(path//c_null_char)
+      if (present(done)) done = status == 0
+   end subroutine remove_file
+
+   !> Free space on the disk of a directory, or of the next one above that is there.
+   function get_free_bytes(path) result(bytes)
+      !> Path.
+      character(len=*), intent(in) :: path
+      !> Bytes that this user may write; huge where the system does not say.
+      real(wp) :: bytes
+
+      bytes = real(c_get_free_bytes(path//c_null_char), wp)
+      if (bytes < 0.0_wp) bytes = huge(bytes)
+   end function get_free_bytes
+
+end module thud_system

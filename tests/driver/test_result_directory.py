@@ -1,0 +1,348 @@
+"""Directories of results: one whole set of files at a time; other files are the user's."""
+
+from __future__ import annotations
+
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from typing import TYPE_CHECKING
+
+import f90nml
+import pytest
+from conftest import MINIMAL
+
+import thud
+from thud.files import add_files
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+    CaseFile = Callable[..., Path]
+
+FILES = [".thud", "effective.nml", "force.csv", "levels.csv", "summary.nml"]
+OTHER = "&ball mass = 2.4 / &drop / &model / &mesh polar_elements = 8 / &modes count = 1 /"
+
+
+def read_bytes(directory: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in directory.iterdir()}
+
+
+def names_in(directory: Path) -> list[str]:
+    return sorted(path.name for path in directory.iterdir())
+
+
+@pytest.fixture
+def two_inputs(run: Run, case_file: CaseFile, tmp_path: Path) -> dict[str, dict[str, bytes]]:
+    """Return the sets of files of two inputs of one name, a/case.nml and b/case.nml."""
+    found = {}
+    for name, text in (("a", MINIMAL), ("b", OTHER)):
+        (tmp_path / name).mkdir()
+        case_file(text, f"{name}/case.nml")
+        assert run(f"{name}/case.nml", "-o", f"only_{name}").returncode == 0
+        found[name] = read_bytes(tmp_path / f"only_{name}")
+    # One of them has a file that the other one has not.
+    assert set(found["a"]) < set(found["b"])
+    return found
+
+
+def test_case_of_another_name_is_not_overwritten(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    run(case_file(MINIMAL, "one.nml"), "-o", "out")
+    before = read_bytes(tmp_path / "out")
+    result = run(case_file(MINIMAL, "two.nml"), "-o", "out")
+    assert result.returncode == 1
+    assert "--output out holds files of something else" in result.stderr
+    assert read_bytes(tmp_path / "out") == before
+
+
+def test_files_of_somebody_else_are_not_joined(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    result = run(case_file(MINIMAL), "-o", ".")
+    assert result.returncode == 1
+    assert names_in(tmp_path) == ["case.nml"]
+
+
+def test_changed_input_of_the_same_case_replaces_its_results(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    for name in "abba":
+        result = run(f"{name}/case.nml")
+        assert result.returncode == 0
+        assert read_bytes(tmp_path / "outputs/case") == two_inputs[name]
+    # Not silently: another input of the same name may have been meant.
+    assert "a/case.nml: replaces the results of another input of the same name" in result.stderr
+
+
+@pytest.mark.parametrize("place", ["/dev/null/out", "case.nml/out", "case.nml", "/proc/out"])
+def test_directory_that_cannot_be_made_is_told(run: Run, case_file: CaseFile, place: str) -> None:
+    result = run(case_file(MINIMAL), "-o", place)
+    assert result.returncode == 1
+    assert f"--output {place} cannot be made; allowed: " in result.stderr
+
+
+@pytest.mark.parametrize("place", ["deep/er/out", "out/", ".//out///", "link", "link/", "link/out"])
+def test_any_path_of_a_directory_works(
+    run: Run,
+    two_inputs: dict[str, dict[str, bytes]],
+    tmp_path: Path,
+    place: str,
+) -> None:
+    (tmp_path / "behind/it").mkdir(parents=True)
+    (tmp_path / "link").symlink_to("behind/it")
+    for name in "ab":
+        assert run(f"{name}/case.nml", "-q", "-o", place).returncode == 0
+        assert read_bytes(tmp_path / place) == two_inputs[name]
+    assert (tmp_path / "link").is_symlink()
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def test_working_directory_works(
+    run: Run, executable: str, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    folder = tmp_path / "out"
+    folder.mkdir()
+    before = folder.stat().st_ino
+    for name in "abba":
+        command = [executable, tmp_path / f"{name}/case.nml", "-q", "-o", "."]
+        assert subprocess.run(command, cwd=folder, check=False).returncode == 0
+        assert read_bytes(folder) == two_inputs[name]
+    # Whoever stands in it still does.
+    assert folder.stat().st_ino == before
+    assert run("a/case.nml", "-q", "-o", "out").returncode == 0
+
+
+@pytest.mark.parametrize("folder", [False, True], ids=["exchanged", "moved"])
+def test_files_of_the_user_survive(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path, *, folder: bool
+) -> None:
+    out = tmp_path / "outputs/case"
+    assert run("a/case.nml").returncode == 0
+    mine = {"notes.txt": b"mine", "force.png": b"drawn by hand"}
+    for name, content in mine.items():
+        (out / name).write_bytes(content)
+    if folder:
+        (out / "more/notes").mkdir(parents=True)
+    for name in "baab":
+        assert run(f"{name}/case.nml").returncode == 0
+        if folder:
+            (out / "more/notes").rmdir()
+            (out / "more").rmdir()
+        assert read_bytes(out) == {**two_inputs[name], **mine}
+        if folder:
+            (out / "more/notes").mkdir(parents=True)
+    assert names_in(out.parent) == ["case"]
+
+
+def test_permissions_of_the_directory_stay(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir(mode=0o700)
+    for _ in range(2):
+        assert run(case_file(MINIMAL), "-o", "out").returncode == 0
+        assert (tmp_path / "out").stat().st_mode & 0o777 == 0o700
+
+
+def test_stale_figures_do_not_stand_beside_new_results(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("a/case.nml")
+    add_files(out, {"force.png": b"drawn from the old results"})
+    assert {".thud.new", "force.png"} < set((out / ".thud").read_text().split())
+    for _ in range(2):
+        run("a/case.nml")
+        assert (out / "force.png").exists()
+    run("b/case.nml")
+    assert read_bytes(out) == two_inputs["b"]
+
+
+def test_figures_are_not_added_to_results_of_another_input(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("b/case.nml")
+    with pytest.raises(thud.InputError, match="another input by now; allowed: "):
+        add_files(out, {"force.png": b""}, two_inputs["a"]["effective.nml"])
+    assert read_bytes(out) == two_inputs["b"]
+    add_files(out, {"force.png": b""}, two_inputs["b"]["effective.nml"])
+    assert names_in(out) == sorted([*two_inputs["b"], "force.png"])
+    with pytest.raises(FileNotFoundError):
+        add_files(tmp_path / "nowhere", {"force.png": b""})
+
+
+def test_killed_run_does_not_lock_its_directory(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    left = tmp_path / "outputs/.case.part"
+    left.mkdir(parents=True)
+    (left / ".thud").write_text("force.csv\n")
+    (left / "force.csv").write_text("half a fi")
+    assert run(case_file(MINIMAL)).returncode == 0
+    assert names_in(tmp_path / "outputs/case") == FILES
+    assert names_in(tmp_path / "outputs") == ["case"]
+
+
+def test_runs_into_one_directory_do_not_mix(
+    executable: str, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    mine: dict[str, bytes] = {}
+    for i in range(15):
+        running = [
+            subprocess.Popen([executable, f"{name}/case.nml", "-q", "-o", "o"], cwd=tmp_path,
+                             stderr=subprocess.DEVNULL)
+            for name in "aba"
+        ]  # fmt: skip
+        assert [process.wait() for process in running] == [0, 0, 0]
+        found = read_bytes(tmp_path / "o")
+        assert found in [{**files, **mine} for files in two_inputs.values()]
+        mine[f"notes_{i}"] = b"mine"
+        (tmp_path / f"o/notes_{i}").write_bytes(b"mine")
+    assert not (tmp_path / ".o.part").exists()
+
+
+def test_figures_are_added_while_others_write(
+    executable: str, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    subprocess.run([executable, "a/case.nml", "-q", "-o", "o"], cwd=tmp_path, check=True)
+    command = f"for i in 1 2 3 4 5 6 7 8 9; do {executable} a/case.nml -q -o o; done"
+    added = 0
+    with subprocess.Popen(["/bin/sh", "-c", command], cwd=tmp_path) as process:
+        while process.poll() is None:
+            add_files(tmp_path / "o", {f"{added}.png": b"figure"})
+            added += 1
+    assert process.returncode == 0
+    figures = [f"{i}.png" for i in range(added)]
+    assert names_in(tmp_path / "o") == sorted([*two_inputs["a"], *figures])
+
+
+@pytest.fixture
+def chance() -> random.Random:
+    return random.Random(1)  # noqa: S311 - nothing secret
+
+
+@pytest.mark.parametrize("place", ["exchanged", "moved"])
+def test_killed_runs_leave_files_of_one_input(
+    executable: str,
+    two_inputs: dict[str, dict[str, bytes]],
+    tmp_path: Path,
+    place: str,
+    chance: random.Random,
+) -> None:
+    out = tmp_path / "o"
+    out.mkdir()
+    where = tmp_path if place == "exchanged" else out
+    command = [executable, "", "-q", "-o", os.path.relpath(out, where)]
+    command[1] = os.path.relpath(tmp_path / "a/case.nml", where)
+    start = time.perf_counter()
+    subprocess.run(command, cwd=where, check=True)
+    usual = time.perf_counter() - start
+    for i in range(80):
+        command[1] = os.path.relpath(tmp_path / f"{'ab'[i % 2]}/case.nml", where)
+        with subprocess.Popen(command, cwd=where, stderr=subprocess.DEVNULL) as process:
+            time.sleep(usual * chance.random())
+            process.kill()
+        found = read_bytes(out) if place == "exchanged" else results_of(out)
+        if place == "exchanged":
+            assert found in two_inputs.values()
+        else:
+            assert any(found.items() <= files.items() for files in two_inputs.values())
+    subprocess.run(command, cwd=where, check=True)
+    assert read_bytes(out) == two_inputs["b"]
+    assert not list(tmp_path.rglob("*.part"))
+
+
+def results_of(folder: Path) -> dict[str, bytes]:
+    """Return the files of a directory without the manifest and the workspace."""
+    return {
+        path.name: path.read_bytes()
+        for path in folder.iterdir()
+        if path.is_file() and path.name != ".thud"
+    }
+
+
+def test_full_disk_leaves_nothing(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    def limit_file_size() -> None:
+        # Files may grow to 100 kB, force.csv needs more; the write fails as on a full disk.
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+    result = run(case_file(MINIMAL), preexec_fn=limit_file_size)
+    assert result.returncode == 1
+    assert "--output outputs/case: force.csv cannot be written (File too large)" in result.stderr
+    assert names_in(tmp_path / "outputs") == []
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """Return a disk of 600 kB, enough for one set of files."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    command = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(place)]
+    if (
+        os.geteuid() != 0
+        or not shutil.which("mount")
+        or subprocess.run(command, capture_output=True, check=False).returncode
+    ):
+        pytest.skip("no disk can be mounted here")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)  # noqa: S607
+
+
+def test_full_disk_keeps_the_results_before(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], small_disk: Path
+) -> None:
+    assert run("a/case.nml", "-o", small_disk / "out").returncode == 0
+    result = run("b/case.nml", "-o", small_disk / "out")
+    assert result.returncode == 1
+    assert "cannot be written (No space left on device); allowed: " in result.stderr
+    assert read_bytes(small_disk / "out") == two_inputs["a"]
+    assert names_in(small_disk) == ["out"]
+
+
+def test_mounted_disk_works_as_directory(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], small_disk: Path
+) -> None:
+    assert run("a/case.nml", "-o", small_disk).returncode == 0
+    assert read_bytes(small_disk) == two_inputs["a"]
+    assert run("b/case.nml", "-o", small_disk).returncode == 1
+    assert read_bytes(small_disk) == two_inputs["a"]
+    assert not (small_disk.parent / ".disk.part").exists()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="everything is writable for root")
+def test_unwritable_directories_are_told(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    case = case_file(MINIMAL)
+    assert run(case, "-o", "locked/out").returncode == 0
+    before = read_bytes(tmp_path / "locked/out")
+    (tmp_path / "locked").chmod(0o500)
+    result = run(case, "-o", "locked/new")
+    assert result.returncode == 1
+    assert "--output locked/new cannot be made" in result.stderr
+    # The directory itself may be written to.
+    assert run(case, "-o", "locked/out").returncode == 0
+    (tmp_path / "locked").chmod(0o700)
+    (tmp_path / "locked/out").chmod(0o500)
+    result = run(case, "-o", "locked/out")
+    assert result.returncode == 1
+    assert "--output locked/out cannot be made" in result.stderr
+    assert read_bytes(tmp_path / "locked/out") == before
+    assert names_in(tmp_path / "locked") == ["out"]
+
+
+def test_results_of_an_older_version_keep_their_case(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("a/case.nml")
+    (out / ".thud").unlink()
+    (out / "force.png").write_bytes(b"figure")
+    result = run("b/case.nml")
+    assert result.returncode == 0
+    assert read_bytes(out) == {**two_inputs["b"], "force.png": b"figure"}
+    assert f90nml.read(out / "effective.nml")["ball"]["mass"] == 2.4
