@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import f90nml
 import numpy as np
 
-from thud._api import call, api, text
+from thud._api import api, call, text
 from thud.checks import LARGEST, replace_file, require_kind, shown
 from thud.errors import InputError
 from thud.models import LISTS, MODELS, FiniteElement, HollowSphere, ModelOptions, group_of

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call, api
+from thud._api import api, call
 from thud.case import Ball, Case, Modes, case_text
 from thud.checks import require_kind
 from thud.errors import InputError

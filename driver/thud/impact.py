@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call, api, words
+from thud._api import api, call, words
 from thud.case import Ball, Case, Drop, Sampling, case_text
 from thud.checks import require_kind
 from thud.errors import InputError

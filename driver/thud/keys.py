@@ -37,6 +37,10 @@ _RANGE = re.compile(
 )
 
 
+# Keys whose upper end is another key.
+_DEPENDENT = {"wall_thickness": "outer_radius"}
+
+
 @dataclass(frozen=True)
 class Key:
     """One key of the input.
@@ -51,8 +55,8 @@ class Key:
         ``"real"``, ``"whole"``, ``"choice"``, ``"flag"`` or ``"list"`` (of numbers).
     choices : tuple of str
         What a choice may be.
-    lower, upper : float
-        Ends of the allowed range of numbers.
+    lower, upper : float or str
+        Ends of the allowed range of numbers; a text names the key that is the end.
     """
 
     group: str
@@ -61,8 +65,8 @@ class Key:
     unit: str = ""
     kind: Kind = "real"
     choices: tuple[str, ...] = ()
-    lower: float = -math.inf
-    upper: float = math.inf
+    lower: float | str = -math.inf
+    upper: float | str = math.inf
 
 
 # Keys of studies alone: they act on the mass and on the modulus of elasticity of the ball.
@@ -98,8 +102,19 @@ def _key(group: str, name: str, meaning: str, allowed: str) -> Key:
         kind = "flag"
     elif limits and limits["whole"]:
         kind = "whole"
-    ends = (float(limits["lower"]), float(limits["upper"])) if limits else ()
+    ends: tuple[float | str, ...] = ()
+    if limits:
+        upper = _DEPENDENT.get(name)
+        ends = (float(limits["lower"]), upper or float(limits["upper"]))
     return Key(group, name, meaning, unit, kind, tuple(re.findall(r"'(\w+)'", allowed)), *ends)
+
+
+def limits(key: Key, case: Case) -> tuple[float, float]:
+    """Return the range of a number; ends that are other keys have their values in a case."""
+    lower, upper = (
+        getattr(case.ball, end) if isinstance(end, str) else end for end in (key.lower, key.upper)
+    )
+    return lower, upper
 
 
 @cache
@@ -157,7 +172,7 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
             if entry > len(entries):
                 message = (
                     f"{name} does not exist; allowed: an entry of the {len(entries)} "
-                    f"that the base case has"
+                    f"that the case has"
                 )
                 raise InputError(message)
             entries[entry - 1] = value

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-import thud
+from thud._api import version
 from thud.case import Ball, Case, Drop, Levels
+from thud.ensemble import solve_many
 from thud.errors import InputError, ThudError
 from thud.impact import FORCES, solve_case
 from thud.keys import put
@@ -26,9 +27,9 @@ if TYPE_CHECKING:
 # By name: unit and meaning of the numbers that each set has.
 SCALARS = {
     "contact_time": ("s", "contact time"),
-    "peak_force": ("N", "largest elastic force"),
-    "peak_floor_force": ("N", "largest force on the floor"),
-    "max_deflection": ("m", "largest deflection"),
+    "peak_force": ("N", "maximum elastic force"),
+    "peak_floor_force": ("N", "maximum force on the floor"),
+    "max_deflection": ("m", "maximum deflection"),
     "restitution": ("1", "coefficient of restitution"),
     "impulse": ("N s", "time integral of the force on the floor"),
 }
@@ -52,7 +53,7 @@ class Block:
     ----------
     start : int
         The first of them.
-    base : Case
+    case : Case
         The case from which they differ.
     columns : dict of str to ndarray, shape (n_set,)
         Their values by the names of keys.
@@ -61,7 +62,7 @@ class Block:
     """
 
     start: int
-    base: Case
+    case: Case
     columns: Columns
     version: str
 
@@ -81,7 +82,7 @@ def evaluate(block: Block, threads: int = 1) -> Columns:
     dict of str to ndarray, shape (n_set,) or (n_set, 5)
         The `SCALARS`; ``elastic_level`` and ``floor_level`` of each octave, dB, and where the case
         wants them ``elastic_third_level`` and ``floor_third_level``; ``margin``, the
-        least distance of the judged force's levels to a limit, dB; ``conforms``; ``status``, 0 or
+        minimum distance of the judged force's levels to a limit, dB; ``conforms``; ``status``, 0 or
         the exit code of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
 
     Raises
@@ -89,28 +90,28 @@ def evaluate(block: Block, threads: int = 1) -> Columns:
     InputError
         Where this is another version of thud.
     """
-    if block.version != thud.__version__:
+    if block.version != version():
         message = (
-            f"thud {thud.__version__} is asked for sets of thud {block.version}; "
+            f"thud {version()} is asked for sets of thud {block.version}; "
             f"allowed: the same version everywhere"
         )
         raise InputError(message)
-    if _suits_ensemble(block.base, block.columns):
-        return _by_ensemble(block.base, block.columns, threads)
-    return _one_by_one(block.base, block.columns)
+    if _suits_ensemble(block.case, block.columns):
+        return _by_ensemble(block.case, block.columns, threads)
+    return _one_by_one(block.case, block.columns)
 
 
-def _one_by_one(base: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
+def _one_by_one(case: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
     """Compute sets by the single solver."""
     size = len(next(iter(columns.values())))
-    found = _empty(size, base)
+    found = _empty(size, case)
     for i in range(size):
         try:
-            case = put(base, {name: values[i].item() for name, values in columns.items()})
-            impact = solve_case(case)
+            one = put(case, {name: values[i].item() for name, values in columns.items()})
+            impact = solve_case(one)
             levels = {
                 name: impact.levels(bands=bands, force=force)
-                for name, (force, bands) in level_names(base).items()
+                for name, (force, bands) in level_names(case).items()
             }
             verdict = impact.conformity()
         except ThudError as error:
@@ -127,21 +128,21 @@ def _one_by_one(base: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
     return found
 
 
-def level_names(base: Case) -> dict[str, tuple[str, str]]:
+def level_names(case: Case) -> dict[str, tuple[str, str]]:
     """Return force and bands of the levels that each set has, by their names.
 
     The octaves serve the verdict also where the case wants thirds only.
     """
     names = {f"{force}_level": (force, "octave") for force in FORCES}
-    if base.levels.bands != "octave":
+    if case.levels.bands != "octave":
         names |= {f"{force}_third_level": (force, "third") for force in FORCES}
     return names
 
 
-def _empty(size: int, base: Case) -> Columns:
+def _empty(size: int, case: Case) -> Columns:
     """Return columns for the results of sets: not a number, not conforming, no error."""
     found: Columns = {name: np.full(size, np.nan) for name in (*SCALARS, "margin")}
-    for name, (_, bands) in level_names(base).items():
+    for name, (_, bands) in level_names(case).items():
         found[name] = np.full((size, len(get_bands(bands).nominal)), np.nan)
     found["conforms"] = np.zeros(size, dtype=bool)
     found["status"] = np.zeros(size, dtype=np.int8)
@@ -149,47 +150,47 @@ def _empty(size: int, base: Case) -> Columns:
     return found
 
 
-def block_size(base: Case) -> int:
+def block_size(case: Case) -> int:
     """Return how many sets are computed together: the same wherever they are computed."""
-    usual = _ENSEMBLE_TIME if _has_ensemble(base) else _USUAL_TIME
-    return max(1, round(_BLOCK_TIME / _SET_TIME.get(base.model.name, usual)))  # type: ignore[union-attr]
+    usual = _ENSEMBLE_TIME if _has_ensemble(case) else _USUAL_TIME
+    return max(1, round(_BLOCK_TIME / _SET_TIME.get(case.model.name, usual)))  # type: ignore[union-attr]
 
 
-def _has_ensemble(base: Case) -> bool:
+def _has_ensemble(case: Case) -> bool:
     """Return whether the library computes many sets of a case at once."""
-    exact = base.levels.method == Levels.method
-    return isinstance(base.model, HollowSphere) and exact
+    exact = case.levels.method == Levels.method
+    return isinstance(case.model, HollowSphere) and exact
 
 
-def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
+def _suits_ensemble(case: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
     """Return whether the library computes these sets at once."""
-    return _has_ensemble(base) and set(columns) <= _ENSEMBLE_KEYS
+    return _has_ensemble(case) and set(columns) <= _ENSEMBLE_KEYS
 
 
-def _by_ensemble(base: Case, columns: Columns, threads: int) -> Columns:
+def _by_ensemble(case: Case, columns: Columns, threads: int) -> Columns:
     """Compute sets by the ensemble of the shell model."""
-    shared = vars(base.ball) | vars(base.drop) | vars(base.model)
-    source = base.limits.source
-    names = level_names(base)
+    shared = vars(case.ball) | vars(case.drop) | vars(case.model)
+    source = case.limits.source
+    names = level_names(case)
     widest = "third" if "elastic_third_level" in names else "octave"
-    ensemble = thud.solve_many(
-        shared | columns, threads=threads, bands=widest, source=source, **vars(base.sampling)
+    ensemble = solve_many(
+        shared | columns, threads=threads, bands=widest, source=source, **vars(case.sampling)
     )
-    found = _empty(len(next(iter(columns.values()))), base)
+    found = _empty(len(next(iter(columns.values()))), case)
     for name in SCALARS:
         found[name][:] = getattr(ensemble, name)
-    judged_by_floor = base.levels.force == "floor"
+    judged_by_floor = case.levels.force == "floor"
     found["conforms"][:] = ensemble.floor_conforms if judged_by_floor else ensemble.conforms
     for name, (force, bands) in names.items():
         kind = "octaves" if bands == "octave" else "levels"
         found[name][:] = getattr(ensemble, f"{force}_{kind}")
     lower, upper = octave_limits(source)
-    judged = found[f"{base.levels.force}_level"]
+    judged = found[f"{case.levels.force}_level"]
     found["margin"][:] = np.minimum(judged - lower, upper - judged).min(axis=1)
     # The single solver has the sentences.
     failed = np.flatnonzero(np.asarray(ensemble.status))
     if failed.size:
-        again = _one_by_one(base, {name: values[failed] for name, values in columns.items()})
+        again = _one_by_one(case, {name: values[failed] for name, values in columns.items()})
         for name, values in again.items():
             found[name][failed] = values
     return found

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.studies.axes import Which
-    from thud.studies.conformity import DesignMap
-    from thud.studies.influence import Sensitivity
-    from thud.studies.tolerances import Uncertainty
+    from thud.studies.design_map import DesignMap
+    from thud.studies.sensitivity import Sensitivity
+    from thud.studies.uncertainty import Uncertainty
 
     Values = NDArray[np.float64]
 

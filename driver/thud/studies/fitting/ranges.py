@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import require_kind, require_number
+from thud.checks import require_kind
 from thud.errors import InputError
-from thud.keys import key_table, put
+from thud.keys import key_table, limits, put
 from thud.models import LISTS, group_of
+from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
     from thud.case import Case
     from thud.keys import Key
+    from thud.studies.parameter import Parameter
 
 # A start that lies on a limit is moved away from it by this part of itself.
 INSIDE = 0.01
@@ -26,23 +28,6 @@ SPREAD = 2.0
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """What is known of a parameter before the fit, SI units.
-
-    Attributes
-    ----------
-    start : float or None
-        Where the search starts; by default the value of the base case.
-    lower, upper : float or None
-        Limits of the search; by default those of the input (``thud --keys``).
-    """
-
-    start: float | None = None
-    lower: float | None = None
-    upper: float | None = None
-
-
-@dataclass(frozen=True)
 class Range:
     """A parameter with everything that the search needs, SI units.
 
@@ -50,7 +35,7 @@ class Range:
     ----------
     name, unit : str
         Name of the key, with the place in brackets where it takes a list; its unit.
-    start, lower, upper : float
+    start, low, high : float
         Start and limits of the search.
     scale : float
         What the parameter is measured in: its start, or a tenth of the range where that is 0.
@@ -61,8 +46,8 @@ class Range:
     name: str
     unit: str
     start: float
-    lower: float
-    upper: float
+    low: float
+    high: float
     scale: float
     spread: tuple[float, float]
 
@@ -74,7 +59,7 @@ def known_parameters(case: Case) -> dict[str, tuple[str, Key, float]]:
     """
     model = case.model
     if model is None:
-        message = "&model is missing; allowed: a base case with a source model"
+        message = "&model is missing; allowed: a case with a source model"
         raise InputError(message)
     places = [
         *(("ball", "ball", option.name) for option in fields(case.ball)),
@@ -100,28 +85,34 @@ def with_values(case: Case, values: Mapping[str, float]) -> Case:
     return put(case, {name: float(value) for name, value in values.items()})
 
 
-def require_known(case: Case, name: str, where: str) -> Key:
-    """Return the key of a parameter or complain with the list of those that are known."""
-    known = known_parameters(case)
-    if name not in known:
-        model = case.model.name if case.model else ""
-        message = (
-            f"{where}{name} is not a parameter of {model} that can be fitted; "
-            f"allowed: {', '.join(known)}"
-        )
-        raise InputError(message)
-    return known[name][1]
-
-
-def get_ranges(
-    case: Case, parameters: Iterable[str] | Mapping[str, Parameter | float | None]
-) -> list[Range]:
-    """Return start, limits and scale of the parameters of a fit.
+def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
+    """Return a parameter of a fit.
 
     Raises
     ------
     InputError
-        Where a parameter is not known, or its start and limits do not fit together.
+        Where it cannot be fitted; lists those that can.
+    """
+    known = known_parameters(case)
+    if name not in known:
+        model = case.model.name if case.model else ""
+        message = (
+            f"[parameters] {name} is not a parameter of {model} that can be fitted; "
+            f"allowed: {', '.join(known)}"
+        )
+        raise InputError(message)
+    return fitted(name, given, case.model.name)  # type: ignore[union-attr]
+
+
+def bound_parameters(
+    case: Case, parameters: Iterable[str] | Mapping[str, Parameter | float | None]
+) -> tuple[Parameter, ...]:
+    """Return the parameters that a fit is called with.
+
+    Raises
+    ------
+    InputError
+        Where there is none, or one cannot be fitted.
     """
     require_kind("parameters", parameters, Iterable)
     if isinstance(parameters, str):
@@ -131,44 +122,51 @@ def get_ranges(
     if not parameters:
         message = f"parameters: none is given; allowed: {', '.join(known_parameters(case))}"
         raise InputError(message)
-    found = []
-    for name, given in parameters.items():
-        require_known(case, name, "parameters: ")
-        wish = given if isinstance(given, Parameter) else Parameter(given)
-        for word, value in vars(wish).items():
-            if value is not None:
-                require_number(f"{name}: {word}", value)
-        found.append(_get_range(case, name, wish))
-    return found
+    return tuple(fitted_parameter(name, given, case) for name, given in parameters.items())
 
 
-def _get_range(case: Case, name: str, wish: Parameter) -> Range:
-    """Return start, limits and scale of one parameter."""
-    _, key, value = known_parameters(case)[name]
-    start = float(value if wish.start is None else wish.start)
-    scale = abs(start) or ((wish.upper or key.upper) - (wish.lower or key.lower)) / 10
-    lower = key.lower if wish.lower is None else float(wish.lower)
-    upper = key.upper if wish.upper is None else float(wish.upper)
-    if not key.lower <= lower < upper <= key.upper:
+def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
+    """Return start, limits and scale of the parameters of a fit.
+
+    Raises
+    ------
+    InputError
+        Where start and limits do not fit together.
+    """
+    found = list(parameters)
+    # Ends of ranges that are other keys are those at the start.
+    begin = with_values(case, {p.name: p.start for p in found if p.start is not None})
+    return [_get_range(begin, parameter) for parameter in found]
+
+
+def _get_range(case: Case, given: Parameter) -> Range:
+    """Return start, limits and scale of one parameter of a case that has the starts."""
+    name, key = given.name, given.key
+    start = float(known_parameters(case)[name][2])
+    lower, upper = limits(key, case)
+    scale = abs(start) or ((given.high or upper) - (given.low or lower)) / 10
+    low = lower if given.low is None else given.low
+    high = upper if given.high is None else given.high
+    if not lower <= low < high <= upper:
         message = (
-            f"parameters: {name}: lower = {lower:g} and upper = {upper:g} are not allowed; "
-            f"allowed: {key.lower:g} <= lower < upper <= {key.upper:g} {key.unit}".rstrip()
+            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed; "
+            f"allowed: {lower:g} <= low < high <= {upper:g} {key.unit}".rstrip()
         )
         raise InputError(message)
-    if not lower <= start <= upper:
+    if not low <= start <= high:
         message = (
-            f"parameters: {name}: start = {start:g} is not allowed; "
-            f"allowed: {lower:g} <= start <= {upper:g} {key.unit}".rstrip()
+            f"[parameters] {name}: start = {start:g} is not allowed; "
+            f"allowed: {low:g} <= start <= {high:g} {key.unit}".rstrip()
         )
         raise InputError(message)
     spread = (
-        max(lower, start - scale / SPREAD) if wish.lower is None else lower,
-        min(upper, start + scale * (SPREAD - 1)) if wish.upper is None else upper,
+        max(low, start - scale / SPREAD) if given.low is None else low,
+        min(high, start + scale * (SPREAD - 1)) if given.high is None else high,
     )
-    if wish.upper is None and upper > FAR * scale:
-        upper = np.inf
-    if wish.lower is None and lower < -FAR * scale:
-        lower = -np.inf
-    room = min(INSIDE * scale, (upper - lower) / 4)
-    start = min(max(start, lower + room), upper - room)
-    return Range(name, key.unit, start, lower, upper, scale, spread)
+    if given.high is None and high > FAR * scale:
+        high = np.inf
+    if given.low is None and low < -FAR * scale:
+        low = -np.inf
+    margin = min(INSIDE * scale, (high - low) / 4)
+    start = min(max(start, low + margin), high - margin)
+    return Range(name, key.unit, start, low, high, scale, spread)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.errors import InputError
-from thud.fitting.misfit import numbers, require_choice, require_positive
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
 from thud.models import FiniteElement, ModalBall
+from thud.studies.fitting.misfit import numbers, require_choice, require_positive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +31,7 @@ class LevelTarget:
     levels : sequence of float, shape (n_band,)
         Force exposure levels, dB.
     uncertainty : float or sequence of float or None
-        Standard deviations of the levels, dB; None: one for all, told from the residual.
+        Standard deviations of the levels, dB; None: one for all, estimated from the residual.
     bands : str
         ``"octave"`` or ``"third"``.
     frequencies : sequence of float or None

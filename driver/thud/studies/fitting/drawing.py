@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, NullLocator
 from scipy import stats
 
-from thud.fitting.force_target import ForceMisfit
 from thud.keys import plain_words
 from thud.plot import COLOURS, SIZE, WIDTH, dress, legend_above
+from thud.studies.fitting.force_target import ForceMisfit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
-    from thud.fitting.result import Estimates
+    from thud.studies.fitting.result import Fit
 
 # More parameters than that are drawn as a table of correlations.
 MAX_PANELS = 5
@@ -34,7 +34,7 @@ VISIBLE = 0.003
 BEFORE, AFTER = 0.15, 0.4
 
 
-def target_and_fit(fit: Estimates) -> Figure:
+def target_and_fit(fit: Fit) -> Figure:
     """Draw target and model, and below it their difference over the uncertainty.
 
     Parameters
@@ -61,7 +61,7 @@ def target_and_fit(fit: Estimates) -> Figure:
     return figure
 
 
-def _draw_force(fit: Estimates, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
+def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
     """Draw record, fit and residual."""
     column = misfit.history_columns(fit.impact, fit.time_shift)
     time = 1e3 * column["time_s"]
@@ -92,7 +92,7 @@ def _draw_force(fit: Estimates, misfit: ForceMisfit, above: Axes, below: Axes) -
     legend_above(above, 2, "lower right")
 
 
-def _draw_levels(fit: Estimates, above: Axes, below: Axes) -> None:
+def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     """Draw levels with their uncertainty, and whatever else was compared in the residuals."""
     column = fit.misfit.columns(fit.impact, 0.0)
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
@@ -140,7 +140,7 @@ def _draw_levels(fit: Estimates, above: Axes, below: Axes) -> None:
     above.legend(fontsize=SIZE - 1, frameon=False)
 
 
-def confidence(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> Figure:
+def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
     """Draw joint confidence regions of pairs of parameters, or their correlations.
 
     Parameters
@@ -180,7 +180,7 @@ def confidence(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> Figure
 
 
 def _draw_pair(
-    fit: Estimates, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
+    fit: Fit, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
 ) -> None:
     """Draw the joint confidence region of two parameters around their values."""
     factor = np.array([units[fit.names[i]][1] for i in pair])
@@ -188,7 +188,9 @@ def _draw_pair(
     block = fit.covariance[np.ix_(pair, pair)] / np.outer(factor, factor)
     freedom = fit.degrees_of_freedom
     square = (
-        stats.chi2.ppf(fit.level, 2) if fit.known_noise else 2 * stats.f.ppf(fit.level, 2, freedom)
+        stats.chi2.ppf(fit.confidence, 2)
+        if fit.known_noise
+        else 2 * stats.f.ppf(fit.confidence, 2, freedom)
     )
     _add_ellipse(axes, centre, square * block)
     axes.plot(*centre, color=COLOURS[1], marker="+", markersize=6)
@@ -226,7 +228,7 @@ def _add_ellipse(axes: Axes, centre: NDArray[np.float64], block: NDArray[np.floa
     )
 
 
-def _draw_correlation(fit: Estimates) -> Figure:
+def _draw_correlation(fit: Fit) -> Figure:
     """Draw the correlations of all parameters as a table of colours."""
     figure = Figure(figsize=(WIDTH, WIDTH), dpi=300, layout="constrained")
     axes = figure.add_subplot()
