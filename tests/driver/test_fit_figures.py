@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import thud
-from thud.fitting import drawing
+from thud.studies.fitting import drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,7 +9,15 @@ from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case
-from thud.checks import refuse_old_words, require_kind, require_number, require_words, shown
+from thud.checks import (
+    LARGEST_SEED,
+    refuse_old_words,
+    require_kind,
+    require_number,
+    require_whole,
+    require_words,
+    shown,
+)
 from thud.columns import read_table
 from thud.errors import FitWarning, InputError
 from thud.recording import Recording
@@ -19,7 +27,7 @@ from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.level_target import LevelTarget
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.result import Fit
-from thud.studies.fitting.search import Effort, search
+from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.parameter import quantity
 from thud.studies.study import Study, table_of, with_density
@@ -37,12 +45,14 @@ if TYPE_CHECKING:
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
 
-CONFIDENCE = 0.95
+# Options of a search, and their defaults.
+OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
+# More starts, or steps of a search, than this come to no end.
+_MAXIMUM = 100_000
 # What [target] may hold, and the units of its numbers.
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
 LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
 TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
-_EFFORT = tuple(f.name for f in fields(Effort))
 
 
 @refuse_old_words
@@ -51,10 +61,10 @@ def fit(  # noqa: PLR0913 - what there is to choose
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],
     case: Case | None = None,
     *,
-    confidence: float = CONFIDENCE,
-    starts: int = Effort.starts,
-    seed: int = Effort.seed,
-    max_steps: int = Effort.max_steps,
+    confidence: float = 0.95,
+    starts: int = 1,
+    seed: int = 0,
+    max_steps: int = 100,
     progress: bool = False,
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
@@ -106,15 +116,23 @@ def fit(  # noqa: PLR0913 - what there is to choose
     """
     case = Case() if case is None else case
     require_kind("case", case, Case)
-    require_confidence(confidence)
-    effort = Effort(starts, seed, max_steps)
+    options = {"confidence": confidence, "starts": starts, "seed": seed, "max_steps": max_steps}
+    _require_options(options)
     ranges = get_ranges(case, bound_parameters(case, parameters))
     if not isinstance(target, ForceTarget | LevelTarget):
         target = ForceTarget(target)
-    found = search(case, ranges, target.misfit(), confidence, effort, progress=progress)
+    found = search(case, ranges, target.misfit(), options, progress=progress)
     for sentence in found.warnings:
         warnings.warn(sentence, FitWarning, stacklevel=3)
     return found
+
+
+def _require_options(options: Mapping[str, Any]) -> None:
+    """Raise InputError where an option of a search cannot be used."""
+    require_confidence(options["confidence"])
+    require_whole("starts", options["starts"], 1, _MAXIMUM)
+    require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
+    require_whole("seed", options["seed"], 0, LARGEST_SEED)
 
 
 @dataclass(frozen=True)
@@ -127,16 +145,13 @@ class FitStudy(Study):
         What is fitted.
     tables : dict
         The file as JSON holds it.
-    confidence : float
-        Confidence of the intervals.
-    effort : Effort
-        How long the search goes on.
+    options : dict
+        Confidence of the intervals, starts, seed and maximum number of steps.
     """
 
     target: ForceTarget | LevelTarget = field(default_factory=lambda: LevelTarget(()))
     tables: dict[str, Any] = field(default_factory=dict)
-    confidence: float = CONFIDENCE
-    effort: Effort = field(default_factory=Effort)
+    options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
 
     @property
     def units(self) -> dict[str, tuple[str, float]]:
@@ -150,8 +165,7 @@ class FitStudy(Study):
         return {
             **{f"[target] {key}": f"{value!r}" for key, value in self.tables["target"].items()},
             "numbers of [target]": hashlib.sha256(vector.tobytes()).hexdigest()[:16],
-            "confidence": f"{self.confidence!r}",
-            **{name: f"{value!r}" for name, value in vars(self.effort).items()},
+            **{name: f"{value!r}" for name, value in self.options.items()},
         }
 
 
@@ -159,7 +173,7 @@ class FitKind(Kind[FitStudy, Fit]):
     """Fits as a kind of study."""
 
     name = "fit"
-    words = ("target", "confidence", *_EFFORT)
+    words = ("target", *OPTIONS)
 
     def new_parameter(self, name: str, given: object, case: Case, centre: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
@@ -177,15 +191,14 @@ class FitKind(Kind[FitStudy, Fit]):
         if study.density is not None:
             case = with_density(case, study.density)
         target = _read_target(table_of(given, "target"), folder)
-        confidence = given.get("confidence", CONFIDENCE)
-        require_confidence(confidence)
-        effort = Effort(**{name: given[name] for name in _EFFORT if name in given})
+        options = {name: given.get(name, default) for name, default in OPTIONS.items()}
+        _require_options(options)
         get_ranges(case, study.parameters)
         target.misfit()
         # JSON knows neither dates nor infinity.
         tables = json.loads(json.dumps(given, default=str), parse_constant=str)
         head = {**vars(study), "case": case}
-        return FitStudy(**head, target=target, tables=tables, confidence=confidence, effort=effort)
+        return FitStudy(**head, target=target, tables=tables, options=options)
 
     def compute(self, study: FitStudy, directory: Directory | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
         """Return the fit."""
@@ -193,8 +206,7 @@ class FitKind(Kind[FitStudy, Fit]):
             study.case,
             get_ranges(study.case, study.parameters),
             study.target.misfit(),
-            study.confidence,
-            study.effort,
+            study.options,
             progress=how.get("progress", False),
         )
 

@@ -104,15 +104,7 @@ class SetKind(Kind[SetStudy, R]):
 
     def compute(self, study: SetStudy, directory: Directory | None, **how: Unpack[How]) -> R:
         """Return what the sets of a study tell."""
-        dataset = compute_sets(
-            study,
-            directory,
-            backend=how.get("backend"),
-            workers=how.get("workers"),
-            scheduler=how.get("scheduler"),
-            progress=how.get("progress", False),
-        )
-        return self.conclude(study, dataset)
+        return self.conclude(study, compute_sets(study, directory, how))
 
     @abstractmethod
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
@@ -166,15 +158,7 @@ class SetKind(Kind[SetStudy, R]):
         return {study.name: self.draw(result)} if self.succeeded(result) else {}
 
 
-def compute_sets(  # noqa: PLR0913 - a study has a place, a backend and a face
-    study: SetStudy,
-    directory: Directory | None = None,
-    *,
-    backend: str | None = None,
-    workers: int | None = None,
-    scheduler: str | None = None,
-    progress: bool = False,
-) -> xr.Dataset:
+def compute_sets(study: SetStudy, directory: Directory | None, how: How) -> xr.Dataset:
     """Compute every set of a study; one that was interrupted goes on in its directory.
 
     Parameters
@@ -183,8 +167,8 @@ def compute_sets(  # noqa: PLR0913 - a study has a place, a backend and a face
         The study.
     directory
         Where results are kept; None: they are not written.
-    backend, workers, scheduler, progress
-        See `How`.
+    how
+        Backend and progress.
 
     Returns
     -------
@@ -214,10 +198,15 @@ def compute_sets(  # noqa: PLR0913 - a study has a place, a backend and a face
             blocks.open()
         starts = [start for start in range(0, total, size) if not (blocks and blocks.has(start))]
         left = sum(min(size, total - start) for start in starts)
+        hidden = not how.get("progress", False)
         with tqdm(
-            total=total, initial=total - left, unit="set", disable=not progress, file=sys.stderr
+            total=total, initial=total - left, unit="set", disable=hidden, file=sys.stderr
         ) as bar:
-            run_blocks(_blocks(study, starts, size), keep, backend, workers, scheduler)
+            run_blocks(
+                _blocks(study, starts, size),
+                keep,
+                *checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler")),
+            )
     if blocks:
         blocks.finish()
         return read_sweep(blocks.path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +10,6 @@ from scipy import stats
 from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
-from thud.checks import LARGEST_SEED, require_whole
 from thud.errors import InputError, NumericalError, ThudError
 from thud.studies.fitting.inference import (
     Inference,
@@ -25,7 +24,7 @@ from thud.studies.fitting.result import SHIFT, Fit
 from thud.units import handy_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -33,8 +32,6 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
-# More starts, or steps of a search, than this come to no end.
-_MAXIMUM = 100_000
 # Where steps and gains are this small, relative, the search ends.
 TOLERANCE = 1e-8
 # A parameter this close to a limit, relative, lies at it.
@@ -45,39 +42,8 @@ WIDE = 0.5
 UNLIKELY = 1e-3
 
 
-@dataclass(frozen=True)
-class Effort:
-    """How long a search goes on.
-
-    Attributes
-    ----------
-    starts : int
-        Number of starts.
-    seed : int
-        Seed of all but the first.
-    max_steps : int
-        Maximum number of steps from each.
-    """
-
-    starts: int = 1
-    seed: int = 0
-    max_steps: int = 100
-
-    def __post_init__(self) -> None:
-        """Raise InputError where a number cannot be used."""
-        require_whole("starts", self.starts, 1, _MAXIMUM)
-        require_whole("max_steps", self.max_steps, 1, _MAXIMUM)
-        require_whole("seed", self.seed, 0, LARGEST_SEED)
-
-
-def search(  # noqa: PLR0913 - what there is to choose
-    case: Case,
-    ranges: list[Range],
-    misfit: Misfit,
-    confidence: float,
-    how: Effort,
-    *,
-    progress: bool,
+def search(
+    case: Case, ranges: list[Range], misfit: Misfit, options: Mapping[str, Any], *, progress: bool
 ) -> Fit:
     """Return the best fit of the parameters of a case.
 
@@ -89,20 +55,17 @@ def search(  # noqa: PLR0913 - what there is to choose
         The parameters.
     misfit
         The target.
-    confidence
-        Confidence of the intervals.
-    how
-        Starts, seed and steps.
+    options
+        Confidence of the intervals, starts, seed and maximum number of steps.
     progress
         Show how many impacts were computed.
     """
     _require_data(misfit, len(ranges) + misfit.free_shift)
-    bar: tqdm[Any] = tqdm(unit="impact", disable=not progress, leave=False)
-    with bar:
+    with tqdm(unit="impact", disable=not progress, leave=False) as bar:
         objective = Objective(case, ranges, misfit, bar)
-        starts = _spread(ranges, how.starts, how.seed)
-        place, converged = _search(objective, starts, how.max_steps)
-        return _conclude(objective, place, confidence, converged=converged)
+        starts = _spread(ranges, int(options["starts"]), options["seed"])
+        place, converged = _search(objective, starts, int(options["max_steps"]))
+        return _conclude(objective, place, options["confidence"], converged=converged)
 
 
 def _require_data(misfit: Misfit, count: int) -> None:
