@@ -82,9 +82,8 @@ def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> 
         words[0] += f", {key['unit']}" if key["unit"] else ""
         words += [allowed(key)] if allowed(key) else []
         words += [f"group ``&{key['group']}``"] if key["group"] != group else []
-        lines.append(
-            f"    {key['name']} : {python_type(key).replace('Sequence[', 'sequence of ').rstrip(']')}"
-        )
+        type_name = python_type(key).replace("Sequence[", "sequence of ").rstrip("]")
+        lines.append(f"    {key['name']} : {type_name}")
         indent = " " * 8
         lines += textwrap.wrap(
             "; ".join(words) + ".", 99, initial_indent=indent, subsequent_indent=indent
@@ -126,6 +125,8 @@ def python_module(schema: Entry) -> str:
         table("Groups that every model uses.", "GROUPS",
               [f"{quoted(group)}: {class_name(group)}" for group in groups]),
         table("Unit and meaning of the numbers that describe an impact.", "SCALARS", scalars),
+        "\n# Those of them that describe each of many drops.\n",
+        f"OUTCOMES = tuple(SCALARS)[:{schema['outcomes']}]\n",
         "\n# Every key, in the order of an input file.\nKEYS = (\n",
         *(f"    {python_key(key)},\n" for key in keys),
         ")\n",
@@ -145,7 +146,7 @@ def python_key(key: Entry) -> str:
     if key["choices"] or "lower" in key:
         parts.append(tuple(key["choices"]))
     if "lower" in key:
-        parts += [key["lower"], key["upper"]]
+        parts += [key["lower"], key["upper"], *([True] if key["whole"] else [])]
     return f"Key({', '.join(quoted(p) if isinstance(p, str) else repr(p) for p in parts)})"
 
 

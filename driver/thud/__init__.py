@@ -23,6 +23,7 @@ from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get
 from thud.motion import Motion
 from thud.recording import Recording
 from thud.results import read_results
+from thud.studies import kinds
 
 __version__ = version()
 
@@ -61,26 +62,14 @@ _LATE = {
     "plot": None,
     "comparison": None,
     "compare": "comparison",
-    "fitting": None,
-    "Fit": "fitting",
-    "ForceTarget": "fitting",
-    "LevelTarget": "fitting",
-    "Parameter": "fitting",
-    "fit": "fitting",
     "read_all": "comparison",
-    "studies": None,
-    "Study": "studies",
-    "design_map": "studies",
-    "read_study": "studies",
-    "read_sweep": "studies",
-    "sensitivity": "studies",
-    "sweep": "studies",
-    "uncertainty": "studies",
 }
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it
     """Import modules that take their time when they are first asked for."""
+    if name in kinds.PUBLIC:
+        return getattr(kinds.load(kinds.PUBLIC[name]), name)
     if name in _LATE:
         module = importlib.import_module(f"thud.{_LATE[name] or name}")
         return getattr(module, name) if _LATE[name] else module

@@ -23,8 +23,9 @@ from thud._schema import (
     Modes,
     Sampling,
 )
-from thud.checks import LARGEST, replace_file, require_kind, shown
+from thud.checks import LARGEST, require_kind, shown
 from thud.errors import InputError
+from thud.files import replace_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

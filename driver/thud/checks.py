@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, get_args
+import inspect
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_args
 
 import numpy as np
 
 from thud.errors import InputError
-from thud.files import lock as lock  # noqa: PLC0414
-from thud.files import replace_file as replace_file  # noqa: PLC0414
-from thud.files import require_own as require_own  # noqa: PLC0414
-from thud.files import uninterrupted as uninterrupted  # noqa: PLC0414
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Callable, Iterable
     from types import UnionType
 
 
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# What studies called otherwise before.
+OLD_WORDS = {"base": "case", "lower": "low", "upper": "high", "level": "confidence"}
 # Longer values are told by their kind.
 LONGEST_SHOWN = 80
 # No key takes a larger number, and Python does not print the largest ones.
@@ -26,7 +29,7 @@ LARGEST_SEED = 2**32 - 1
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Complain about an argument of another kind."""
+    """Raise InputError where an argument is of another kind."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
@@ -35,18 +38,18 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         raise InputError(message)
 
 
-def require_whole(name: str, value: Any, least: int, most: int) -> None:  # noqa: ANN401
-    """Complain about what is not a whole number between two others."""
+def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
+    """Raise InputError where a value is no whole number between two others."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not whole or not least <= value <= most:
+    if not whole or not low <= value <= high:
         message = (
-            f"{name} = {shown(value)} is not allowed; allowed: whole numbers from {least} to {most}"
+            f"{name} = {shown(value)} is not allowed; allowed: whole numbers from {low} to {high}"
         )
         raise InputError(message)
 
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
-    """Complain about what is not a finite number."""
+    """Raise InputError where a value is no finite number."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
         value, bool
     )
@@ -64,17 +67,32 @@ def shown(value: object) -> str:
     return text if fits else f"an object of {type(value).__name__}"
 
 
-def require_words(place: str, given: Mapping[str, object], known: Iterable[str]) -> None:
-    """Complain about words that mean nothing."""
+def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> None:
+    """Raise InputError where a word is not known; names the new word for an old one."""
     allowed = list(known)
     for word in given:
         if word not in allowed:
-            message = f"{place}: {word!r} is not known; allowed: {', '.join(allowed)}"
+            new = OLD_WORDS.get(word)
+            what = f"is now {new!r}" if new in allowed else "is not known"
+            message = f"{place}: {word!r} {what}; allowed: {', '.join(allowed)}"
             raise InputError(message)
 
 
+def refuse_old_words(function: Callable[P, R]) -> Callable[P, R]:
+    """Let a function raise InputError where it is called by an old word for one of its keywords."""
+    known = list(inspect.signature(function).parameters)
+
+    @wraps(function)
+    def checked(*arguments: P.args, **keywords: P.kwargs) -> R:
+        old = [word for word in keywords if OLD_WORDS.get(word) in known and word not in known]
+        require_words(f"{function.__name__}()", old, known)
+        return function(*arguments, **keywords)
+
+    return checked
+
+
 def require_output(output: str | None) -> None:
-    """Complain about a directory of the command line that has no name."""
+    """Raise InputError where the directory of a command line has no name."""
     if output is not None and not output.strip():
         message = "--output has no value; allowed: a directory"
         raise InputError(message)

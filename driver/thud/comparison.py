@@ -14,8 +14,9 @@ from plotly.subplots import make_subplots
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import replace_file, require_kind
+from thud.checks import require_kind
 from thud.errors import InputError, ThudError
+from thud.files import replace_file
 from thud.impact import Impact, solve_case
 from thud.levels import get_bands, octave_limits
 from thud.plot.comparison import comparison_page

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -12,12 +11,13 @@ import numpy as np
 from tqdm import tqdm
 
 from thud._api import call, collect, ensemble_api, text
-from thud._schema import KEYS, SCALARS, HollowSphere, Levels, Limits, Sampling
+from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_kind, require_whole
 from thud.errors import InputError
+from thud.impact import FORCES
 from thud.keys import find_key
-from thud.levels import get_bands
+from thud.levels import BANDWIDTHS, get_bands
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -30,9 +30,6 @@ MAX_THREADS = 1024
 _CALL_TIME = 1.0
 # Most sets of one call, whose results the library holds.
 _MAX_CALL = 2**17
-
-# The library keeps matrices from call to call, and one call uses all threads anyway.
-_ONE_AT_A_TIME = threading.Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +54,15 @@ class Ensemble:
         Velocity at release over velocity at first touch.
     impulse : ndarray, shape (n_set,)
         Impulse given to the floor, N s.
-    elastic_levels, floor_levels : ndarray, shape (n_set, n_band)
-        Force exposure levels of the elastic force and of the force on the floor, dB.
-    elastic_octaves, floor_octaves : ndarray, shape (n_set, 5)
-        The same in octaves, which the verdict is passed on.
-    conforms, floor_conforms : ndarray of bool, shape (n_set,)
-        Verdict of the standards, judged by the elastic force or by that on the floor.
+    levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
+        Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, which the verdict
+        is passed on, and in other bands where the case asks for them.
+    margin : ndarray, shape (n_set,)
+        Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
+    conforms : ndarray of bool, shape (n_set,)
+        Verdict of the standards by the force that the case judges.
+    elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
+        The same by the elastic force and by that on the floor.
     elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
         Forces, N, where they were asked for.
     sample_rate : float
@@ -78,11 +78,10 @@ class Ensemble:
     max_deflection: NDArray[np.float64]
     restitution: NDArray[np.float64]
     impulse: NDArray[np.float64]
-    elastic_levels: NDArray[np.float64]
-    floor_levels: NDArray[np.float64]
-    elastic_octaves: NDArray[np.float64]
-    floor_octaves: NDArray[np.float64]
+    levels: dict[tuple[str, str], NDArray[np.float64]]
+    margin: NDArray[np.float64]
     conforms: NDArray[np.bool_]
+    elastic_conforms: NDArray[np.bool_]
     floor_conforms: NDArray[np.bool_]
     elastic_force: NDArray[np.float64] | None
     floor_force: NDArray[np.float64] | None
@@ -92,6 +91,16 @@ class Ensemble:
         """Return the number of sets."""
         return len(self.status)
 
+    @property
+    def elastic_octaves(self) -> NDArray[np.float64]:
+        """Octave levels of the elastic force, dB, shape (n_set, 5)."""
+        return self.levels["elastic", BANDWIDTHS[0]]
+
+    @property
+    def floor_octaves(self) -> NDArray[np.float64]:
+        """Octave levels of the force on the floor, dB, shape (n_set, 5)."""
+        return self.levels["floor", BANDWIDTHS[0]]
+
 
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
     parameters: Mapping[str, ArrayLike],
@@ -99,7 +108,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     *,
     model: str | None = None,
     threads: int | None = None,
-    bands: str | None = "octave",
+    levels: bool = True,
+    bands: str | None = None,
     forces: bool = False,
     sample_rate: float | None = None,
     duration: float | None = None,
@@ -124,9 +134,10 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Source model, with its default options where it is not that of the case.
     threads
         Threads to use; all processors by default.
+    levels
+        Compute levels and verdicts too; without them it takes less time.
     bands
-        ``"octave"`` or ``"third"``: the bands of the levels; None: neither levels nor verdicts,
-        which takes less time.
+        Bands of the levels besides octaves, such as ``"third"``; by default those of the case.
     forces
         Keep the force histories: 16 bytes per sample and set.
     sample_rate, duration, substeps
@@ -161,7 +172,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
             sampling.duration if duration is None else duration,
             sampling.substeps if substeps is None else substeps,
         ),
-        levels=replace(base.levels, bands=bands or Levels.bands),
+        levels=replace(base.levels, bands=bands or base.levels.bands),
         limits=Limits(str(source)) if source is not None else base.limits,
     )
     if base.model is None or (model is not None and model != base.model.name):
@@ -176,26 +187,38 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
         for start in range(0, len(numbers), work):
             place = slice(start, min(start + work, len(numbers)))
-            _compute(content, columns, numbers[place], width, bands, results, place)
+            _compute(content, columns, numbers[place], width, results, place, judged=levels)
             bar.update(place.stop - place.start)
-    levels, octaves = results["level"], len(get_bands().nominal)
-    wanted = levels[:, :, int(sizes["first_band"]) - 1 :] if bands else levels[:, :, :0]
     force = results["force"]
     return Ensemble(
         columns,
         results["status"],
         results["reason"],
-        **dict(zip(SCALARS, results["outcome"].T, strict=False)),
-        elastic_levels=wanted[:, 0],
-        floor_levels=wanted[:, 1],
-        elastic_octaves=levels[:, 0, :octaves],
-        floor_octaves=levels[:, 1, :octaves],
-        conforms=results["conforms"][:, 0],
+        **dict(zip(OUTCOMES, results["outcome"].T, strict=True)),
+        levels=_by_bands(results["level"], base.levels.bands),
+        margin=results["margin"],
+        conforms=results["verdict"],
+        elastic_conforms=results["conforms"][:, 0],
         floor_conforms=results["conforms"][:, 1],
         elastic_force=force[:, 0] if forces else None,
         floor_force=force[:, 1] if forces else None,
         sample_rate=base.sampling.sample_rate,
     )
+
+
+def _by_bands(
+    level: NDArray[np.float64], wanted: str
+) -> dict[tuple[str, str], NDArray[np.float64]]:
+    """Return levels by force and bands: octaves first, then what else is wanted."""
+    found = {}
+    start = 0
+    for bands in BANDWIDTHS:
+        if bands in {BANDWIDTHS[0], wanted} or wanted == "both":
+            stop = start + len(get_bands(bands).nominal)
+            for i, force in enumerate(FORCES):
+                found[force, bands] = level[:, i, start:stop]
+            start = stop
+    return found
 
 
 def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[Any]]:
@@ -210,6 +233,8 @@ def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[A
             "outcome": np.empty((count, outcome)),
             "level": np.empty((count, force, band)),
             "conforms": np.zeros((count, force), dtype=bool),
+            "margin": np.empty(count),
+            "verdict": np.zeros(count, dtype=bool),
             "force": np.empty((count if forces else 1, force, sample if forces else 1)),
         }
     except MemoryError as error:
@@ -223,36 +248,43 @@ def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
     columns: Mapping[str, Any],
     numbers: NDArray[np.float64],
     threads: int,
-    bands: str | None,
     results: dict[str, NDArray[Any]],
     place: slice,
+    *,
+    judged: bool,
 ) -> None:
     """Compute some sets and put their results in their place."""
     _, force_count, band = results["level"].shape
     sample = results["force"].shape[-1]
     forces = sample > 1
-    with _ONE_AT_A_TIME:
-        status, outcome, level, conforms, force, *left = ensemble_api.drop_many(
-            content,
-            ",".join(columns).encode("ascii", "replace"),
-            numbers.T,
-            threads,
-            int(bands is not None),
-            results["outcome"].shape[1],
-            band,
-            force_count,
-            sample,
-            len(numbers) if forces else 1,
-        )
+    status, outcome, level, conforms, margin, verdict, force, *left = ensemble_api.drop_many(
+        content,
+        ",".join(columns).encode("ascii", "replace"),
+        numbers.T,
+        threads,
+        int(judged),
+        results["outcome"].shape[1],
+        band,
+        force_count,
+        sample,
+        len(numbers) if forces else 1,
+    )
     reasons = collect(*left)
     results["status"][place] = status
     results["outcome"][place] = outcome.T
     results["level"][place] = np.moveaxis(level, -1, 0).swapaxes(1, 2)
     results["conforms"][place] = conforms.T != 0
+    results["margin"][place] = margin
+    results["verdict"][place] = verdict != 0
     if forces:
         results["force"][place] = np.moveaxis(force, -1, 0).swapaxes(1, 2)
     for number, reason in reasons.items():
         results["reason"][place.start + int(number) - 1] = text(reason)
+
+
+def get_cost(case: Case) -> float:
+    """Return about the time that one drop of many takes on one core, s."""
+    return float(call(ensemble_api.size_many, case_text(case))["cost"])
 
 
 def _columns(

@@ -63,6 +63,8 @@ class Impact:
         Velocity at release over velocity at first touch.
     impulse : float
         Time integral of the force on the floor, N s.
+    exact_contact_time : float
+        Contact time between samples, s, of models that find it in whole steps.
     touch_time : float
         Time of first touch in the record, s.
     impulse_residual, energy_residual : float
@@ -87,6 +89,7 @@ class Impact:
     max_deflection: float
     restitution: float
     impulse: float
+    exact_contact_time: float
     touch_time: float
     impulse_residual: float
     energy_residual: float

@@ -30,6 +30,8 @@ class Key:
     lower, upper : float or str
         Ends of the allowed range of numbers; an end that depends on other keys of the group is a
         product or quotient of numbers and their names.
+    whole : bool
+        It takes whole numbers.
     """
 
     owner: str
@@ -41,3 +43,4 @@ class Key:
     choices: tuple[str, ...] = ()
     lower: float | str = -math.inf
     upper: float | str = math.inf
+    whole: bool = False

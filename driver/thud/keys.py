@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
 Value = float | int | str | bool
 
-# What says which files a run writes does nothing for a set.
-_OF_FILES = "output"
+# The group that says which files a run writes does nothing for a set.
+OF_FILES = "output"
 
 # Keys of studies alone: they act on the mass and on the modulus of elasticity of the ball.
 DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
@@ -33,8 +33,7 @@ def known_keys(model: str) -> Mapping[str, Key]:
     known = {
         key.name: key
         for key in KEYS
-        if (key.owner == model or (not key.owner and key.group in GROUPS))
-        and key.group != _OF_FILES
+        if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != OF_FILES
     }
     return MappingProxyType(known | {key.name: key for key in (DENSITY, TEMPERATURE)})
 
@@ -84,7 +83,7 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
             if entry > len(entries):
                 message = (
                     f"{name} does not exist; allowed: an entry of the {len(entries)} "
-                    f"that the base case has"
+                    f"that the case has"
                 )
                 raise InputError(message)
             entries[entry - 1] = value

@@ -12,6 +12,7 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "s": {"s": 0, "ms": -3, "us": -6},
     "Hz": {"Hz": 0, "kHz": 3},
     "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm2": 6, "N/m2": 0, "hPa": 2, "bar": 5},
+    "N": {"N": 0, "kN": 3},
     "kg": {"kg": 0, "g": -3},
     "kg/m3": {"kg/m3": 0, "g/cm3": 3},
     "m/s2": {"m/s2": 0},

@@ -66,7 +66,7 @@ contains
 
    !> The full input of a namelist file.
    subroutine effective_case(path, status, handle, n_byte, n_value)
-      !f2py threadsafe
+      ! Not threadsafe: functions of its texts keep their lengths in static memory.
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> Status; this and the next three as in `leave`.
@@ -252,7 +252,7 @@ contains
 
    !> Runs a namelist file as the executable does, and keeps what it has computed.
    subroutine run(path, output, progress, status, handle, n_byte, n_value)
-      !f2py threadsafe
+      ! Not threadsafe: functions of its texts keep their lengths in static memory.
       !> Path of the file.
       character(len=*), intent(in) :: path
       !> Output directory, empty for the default.

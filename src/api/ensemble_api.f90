@@ -6,16 +6,13 @@ module thud_ensemble_api
    use thud_error, only: error_type
    use thud_force_history, only: force_count, outcome_count
    use thud_kinds, only: int64, wp
-   use thud_many, only: column_type, find_columns, many_type, new_many, solve_many
+   use thud_many, only: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
    use thud_sampling, only: get_sample_count
    use thud_text, only: split, to_text
    implicit none (type, external)
    private
 
    public :: drop_many, size_many
-
-   !> Results of the latest call; Python lets one call in at a time.
-   type(many_type) :: many
 
 contains
 
@@ -34,6 +31,7 @@ contains
       integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
+      type(many_type) :: many
       type(error_type), allocatable :: error
 
       allocate (bundle)
@@ -52,7 +50,7 @@ contains
 
    !> Outcomes, levels and verdicts of drops of a case that differ in some keys.
    subroutine drop_many(text, names, n_column, n_drop, values, threads, judged, n_outcome, n_band, n_force, n_sample, &
-      n_kept, drop_status, outcome, level, conforms, force, status, handle, n_byte, n_value)
+      n_kept, drop_status, outcome, level, conforms, margin, verdict, force, status, handle, n_byte, n_value)
       !f2py threadsafe
       !> Text of a namelist file.
       character(len=*), intent(in) :: text
@@ -86,6 +84,10 @@ contains
       real(wp), intent(out) :: level(n_band, n_force, n_drop)
       !> 1 where the source conforms by that force, else 0: [n_force, n_drop].
       integer, intent(out) :: conforms(n_force, n_drop)
+      !> Minimum distance of an octave level of the judged force to its limits, dB: [n_drop].
+      real(wp), intent(out) :: margin(n_drop)
+      !> 1 where the source conforms by the judged force, else 0: [n_drop].
+      integer, intent(out) :: verdict(n_drop)
       !> Forces, N: [n_sample, n_force, n_kept].
       real(wp), intent(out) :: force(n_sample, n_force, n_kept)
       !> Status; this and the next three as in `leave`.
@@ -99,6 +101,7 @@ contains
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(column_type), allocatable :: columns(:)
+      type(many_type), allocatable :: many
       type(error_type), allocatable :: error
       integer :: i
 
@@ -106,6 +109,7 @@ contains
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
+         call take_many(many)
          call new_many(case, judged /= 0, many)
          call solve_many(case, columns, values, threads, n_kept == n_drop .and. n_sample > 1, many, error)
       end if
@@ -114,11 +118,13 @@ contains
          outcome = many%outcome
          level = many%level
          conforms = merge(1, 0, many%conforms)
+         margin = many%margin
+         verdict = merge(1, 0, many%verdict)
          if (size(many%force) > 0) force = many%force
          do i = 1, n_drop
             if (allocated(many%reason(i)%text)) call bundle%add_text(to_text(i), many%reason(i)%text)
          end do
-         deallocate (many%force, many%level, many%outcome)
+         call leave_many(many)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine drop_many

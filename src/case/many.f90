@@ -5,7 +5,7 @@
 module thud_many
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, check_case, get_active_fields, get_model_number
-   use thud_compute, only: compute_case, judge_case, results_type, verdict_type
+   use thud_compute, only: compute_case, get_judged_force, judge_case, results_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, key_length, list_type
@@ -16,12 +16,12 @@ module thud_many
    use thud_sampling, only: get_sample_count
    use thud_set_status, only: set_is_fine
    use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
-   use thud_source_limits, only: conforms
+   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type
    use thud_text, only: join_quoted, quoted
    implicit none (type, external)
    private
 
-   public :: column_type, find_columns, many_type, new_many, solve_many
+   public :: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
 
    !> Groups in whose keys drops may not differ: names, and what a run writes.
    character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: 'case', 'model', 'modes', 'output']
@@ -65,9 +65,16 @@ module thud_many
       real(wp), allocatable :: level(:, :, :)
       !> The source conforms by each force: [force_count, n_drop].
       logical, allocatable :: conforms(:, :)
+      !> Minimum distance of an octave level of the judged force to its limits, dB, positive inside: [n_drop].
+      real(wp), allocatable :: margin(:)
+      !> The source conforms by the judged force: [n_drop].
+      logical, allocatable :: verdict(:)
       !> Forces, N, of no size where they are not wanted: [n_sample, force_count, n_drop].
       real(wp), allocatable :: force(:, :, :)
    end type many_type
+
+   !> What an earlier call has prepared for the next one; threads take it in turns.
+   type(many_type), allocatable :: kept
 
 contains
 
@@ -130,6 +137,28 @@ contains
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
    end subroutine new_many
+
+   !> Takes what an earlier call has left, or begins anew.
+   subroutine take_many(many)
+      !> The results of an earlier call, or none.
+      type(many_type), allocatable, intent(out) :: many
+
+      !$omp critical (thud_many)
+      call move_alloc(kept, many)
+      !$omp end critical (thud_many)
+      if (.not. allocated(many)) allocate (many)
+   end subroutine take_many
+
+   !> Leaves what the next call can use.
+   subroutine leave_many(many)
+      !> The results, which are given up.
+      type(many_type), allocatable, intent(inout) :: many
+
+      if (allocated(many%outcome)) deallocate (many%outcome, many%level, many%force)
+      !$omp critical (thud_many)
+      call move_alloc(many, kept)
+      !$omp end critical (thud_many)
+   end subroutine leave_many
 
    !> Computes drops.
    subroutine solve_many(case, columns, values, threads, forces, many, error)
@@ -197,12 +226,15 @@ contains
       !> Samples of the forces that are wanted.
       integer, intent(in) :: n_sample
 
-      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms)
+      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms, many%margin, many%verdict)
       if (allocated(many%outcome)) deallocate (many%outcome, many%level, many%force)
       allocate (many%status(n_drop), many%reason(n_drop), many%outcome(outcome_count, n_drop), &
-         many%level(size(many%bands), force_count, n_drop), many%conforms(force_count, n_drop), &
+         many%level(size(many%bands), force_count, n_drop), many%conforms(force_count, n_drop), many%margin(n_drop), &
+         many%verdict(n_drop), &
          many%force(n_sample, force_count, merge(n_drop, 0, n_sample > 0)))
       many%conforms = .false.
+      many%verdict = .false.
+      many%margin = not_a_number
    end subroutine set_size
 
    !> One drop by the single solver.
@@ -248,7 +280,27 @@ contains
       if (.not. many%judged) return
       many%level(:, :, drop) = results%verdict%level
       many%conforms(:, drop) = all(conforms(results%verdict%criteria), dim=1)
+      call judge(case, results%verdict%criteria(:octave_count, get_judged_force(case)), drop, many)
    end subroutine solve_one
+
+   !> Verdict by the judged force.
+   subroutine judge(case, octaves, drop, many)
+      !> The case of the drop.
+      type(case_type), intent(in) :: case
+      !> Criteria of the octaves: [octave_count].
+      type(criterion_type), intent(in) :: octaves(:)
+      !> Number of the drop, whose levels are known.
+      integer, intent(in) :: drop
+      !> Gets margin and verdict.
+      type(many_type), intent(inout) :: many
+      integer :: force
+
+      force = get_judged_force(case)
+      many%verdict(drop) = many%conforms(force, drop)
+      associate (level => many%level(:octave_count, force, drop))
+         many%margin(drop) = minval(min(level - octaves%lower, octaves%upper - level))
+      end associate
+   end subroutine judge
 
    !> Whether drops can be computed in batches: by the shell model, with exact levels, if they differ in nothing
    !> but ball, drop and the options of the model.
@@ -288,18 +340,26 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(set_type), allocatable :: sets(:)
       type(set_outcome_type), allocatable :: outcomes(:)
+      type(source_limits_type) :: limits
+      type(criterion_type) :: criteria(criterion_count)
+      real(wp) :: nothing(octave_count)
       integer :: i
 
       allocate (sets(size(values, 2)), outcomes(size(values, 2)))
       call fill_sets(case, columns, values, sets)
       call solve_ensemble(sets, case%sampling, trim(case%source), threads, many%judged, many%projections, outcomes, &
          many%level, many%conforms, many%force, error)
+      if (.not. allocated(error)) call get_source_limits(case%source, limits, error)
+      if (allocated(error)) return
+      nothing = 0.0_wp
+      criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
       do i = 1, size(sets)
          associate (found => outcomes(i))
             many%status(i) = merge(0, 1, found%status == set_is_fine)
             many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_floor_force, found%max_deflection, &
                found%restitution, found%impulse]
          end associate
+         if (many%judged .and. many%status(i) == 0) call judge(case, criteria(:octave_count), i, many)
       end do
    end subroutine solve_batch
 

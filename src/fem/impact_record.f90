@@ -4,7 +4,7 @@ module thud_impact_record
    use thud_ball, only: ball_type
    use thud_constants, only: recorded_band
    use thud_error, only: error_type, numerical_error
-   use thud_force_history, only: force_history_type, new_force_history
+   use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
    use thud_impact_run, only: get_mean_height, get_mean_velocity, impact_run_type
    use thud_kinds, only: wp
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -120,6 +120,7 @@ contains
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
       history%peak_floor_force = history%peak_force
+      call continue_to_zero(history)
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)
          history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'computed_time', 'shortest_step', &

@@ -5,7 +5,7 @@ module thud_schema
    use thud_case, only: case_type, get_fields, new_case
    use thud_constants, only: version
    use thud_field, only: field_type
-   use thud_force_history, only: scalar_fields
+   use thud_force_history, only: outcome_count, scalar_fields
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_registry, only: model_names
@@ -38,7 +38,7 @@ contains
                //', "meaning": '//text_value(field%meaning)//'}'//trim(merge(',', ' ', i < size(scalar_fields)))
          end associate
       end do
-      text = text//'],'//newline//'"keys": ['
+      text = text//'],'//newline//'"outcomes": '//to_text(outcome_count)//','//newline//'"keys": ['
       do i = 1, size(fields)
          call describe(fields(i), entry)
          text = text//newline//entry//trim(merge(',', ' ', i < size(fields)))

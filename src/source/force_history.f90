@@ -6,7 +6,7 @@ module thud_force_history
    implicit none (type, external)
    private
 
-   public :: force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
+   public :: continue_to_zero, force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
    public :: outcome_count, part_name_length, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
@@ -56,6 +56,8 @@ module thud_force_history
       real(wp) :: touch_time = 0.0_wp
       !> Time from first touch to release, s.
       real(wp) :: contact_time = 0.0_wp
+      !> The same between steps, of models that find it in whole steps, s; 0 where `contact_time` is exact.
+      real(wp) :: exact_contact_time = 0.0_wp
       !> Largest elastic force, N; of models whose spikes no force plate records, of the part that it does.
       real(wp) :: peak_force = 0.0_wp
       !> Largest force on the floor, N, likewise.
@@ -86,7 +88,7 @@ module thud_force_history
    integer, parameter :: outcome_count = 6
 
    !> The numbers that describe an impact, in the order of `get_scalars`.
-   type(scalar_field_type), parameter :: scalar_fields(11) = [ &
+   type(scalar_field_type), parameter :: scalar_fields(12) = [ &
       scalar_field_type('contact_time', 's', 'contact time'), &
       scalar_field_type('peak_force', 'N', 'largest elastic force'), &
       scalar_field_type('peak_floor_force', 'N', 'largest force on the floor'), &
@@ -94,6 +96,7 @@ module thud_force_history
       scalar_field_type('restitution', '', 'coefficient of restitution'), &
       scalar_field_type('impulse', 'N s', 'time integral of the force on the floor'), &
       scalar_field_type('impact_velocity', 'm/s', 'velocity at first touch'), &
+      scalar_field_type('exact_contact_time', 's', 'contact time between steps'), &
       scalar_field_type('touch_time', 's', 'time of first touch in the record'), &
       scalar_field_type('sample_rate', 'Hz', 'samples per second'), &
       scalar_field_type('impulse_residual', '', 'what the balance of momentum misses, relative'), &
@@ -109,9 +112,27 @@ contains
       real(wp) :: values(size(scalar_fields))
 
       values = [history%contact_time, history%peak_force, history%peak_floor_force, history%max_deflection, &
-         history%restitution, history%impulse, history%impact_velocity, history%touch_time, history%sample_rate, &
-         history%impulse_residual, history%energy_residual]
+         history%restitution, history%impulse, history%impact_velocity, &
+         merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
+         history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
    end function get_scalars
+
+   !> Finds the contact time between samples: the force goes on to zero in a straight line from the last two
+   !> samples of the contact.
+   pure subroutine continue_to_zero(history)
+      !> The history; gets its exact contact time.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: part
+      integer :: last
+
+      last = findloc(abs(history%floor_force) > 0.0_wp, .true., dim=1, back=.true.)
+      if (last < 2) return
+      associate (before => history%floor_force(last - 1), end => history%floor_force(last))
+         part = 1.0_wp
+         if (before > end) part = min(1.0_wp, end/(before - end))
+      end associate
+      history%exact_contact_time = (last - 1 + part)/history%sample_rate - history%touch_time
+   end subroutine continue_to_zero
 
    !> A history of zero force.
    pure function new_force_history(sample_rate, n_sample, part_name) result(history)

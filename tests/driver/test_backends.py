@@ -16,10 +16,9 @@ from distributed import Client, LocalCluster
 
 import thud
 from thud import cli
-from thud.studies import sets
 from thud.studies.backends import run_blocks
+from thud.studies.blocks import Blocks
 from thud.studies.evaluation import Block, block_size, evaluate
-from thud.studies.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,7 +58,7 @@ def cluster() -> Iterator[LocalCluster]:
 def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     one = thud.sweep(STUDY, workers=1)
     assert set(one["status"].values) == {0, 1, 2}
-    assert one.sizes["set"] > block_size(thud.read_study(STUDY).base)
+    assert one.sizes["set"] > block_size(thud.read_study(STUDY).case)
     for how in (
         {"workers": 3},
         {"backend": "processes", "workers": 2},
@@ -79,10 +78,9 @@ def test_threads_of_a_block_do_not_matter() -> None:
 def modal_blocks() -> list[Block]:
     """Return blocks that take long enough to lose their worker."""
     study = thud.read_study({"parameters": {"height": {"low": 1, "high": 2, "count": 20}}})
-    base = thud.Case(model=thud.ModalBall())
+    case = thud.Case(model=thud.ModalBall())
     return [
-        Block(20 * i, base, sets.parameter_columns(study, 0, 20), thud.__version__)
-        for i in range(BLOCKS)
+        Block(20 * i, case, study.parameter_columns(0, 20), thud.__version__) for i in range(BLOCKS)
     ]
 
 
@@ -119,15 +117,15 @@ def test_killed_worker_of_dask_leaves_no_gap_on_disk(
     study = {**STUDY, "fixed": {"model": "modal_ball", "rings": 20}}
     with Client(cluster, set_as_default=False) as client:
         pids = list(client.run(os.getpid).values())
-    keep = Store.keep
+    keep = Blocks.keep
 
-    def kill_and_keep(store: Store, block: Block, found: dict[str, Any]) -> None:
+    def kill_and_keep(store: Blocks, block: Block, found: dict[str, Any]) -> None:
         if pids:
             os.kill(pids.pop(), signal.SIGKILL)
             pids.clear()
         keep(store, block, found)
 
-    monkeypatch.setattr(Store, "keep", kill_and_keep)
+    monkeypatch.setattr(Blocks, "keep", kill_and_keep)
     found = thud.sweep(study, tmp_path, scheduler=cluster.scheduler_address)
     assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
 

@@ -164,7 +164,7 @@ def test_interruption_is_not_a_traceback(
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(sys.modules["thud.cli"], "call", interrupt)
+    monkeypatch.setattr(sys.modules["thud.cli.run"], "call", interrupt)
     assert cli.main(["run", str(case_file(MINIMAL))]) == 130
     assert "interrupted" in capsys.readouterr().err
 
@@ -183,11 +183,14 @@ def test_cases_of_one_name_do_not_replace_each_other(
 def test_interrupted_fit_does_not_say_that_it_is_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def interrupt(_: object) -> int:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(thud.fitting, "run", interrupt)
-    assert cli.main(["fit", "study.toml"]) == cli.INTERRUPTED
+    monkeypatch.setattr("thud.studies.fit.search", interrupt)
+    (tmp_path / "study.toml").write_text(
+        "parameters.mass = {}\n[target]\nlevels = [39, 31, 23, 17, 12]"
+    )
+    assert cli.main(["fit", "-q", "study.toml"]) == cli.INTERRUPTED
     sentence = "thud-driver: interrupted; a fit is kept only when it is done\n"
     assert capsys.readouterr().err == sentence
-    assert not list(tmp_path.iterdir())
+    assert not list((tmp_path / "outputs/study").iterdir())

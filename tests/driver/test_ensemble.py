@@ -205,7 +205,11 @@ def test_scalars_and_defaults() -> None:
 @pytest.mark.parametrize(
     ("parameters", "options", "message"),
     [
-        ({"radius": 1}, {}, "'radius' is not a key of hollow_sphere; allowed: outer_radius, wall_th"),
+        (
+            {"radius": 1},
+            {},
+            "'radius' is not a key of hollow_sphere; allowed: outer_radius, wall_th",
+        ),
         ({"height": [1, 2], "mass": [1, 2, 3]}, {}, "do not fit each other: height (2,), mass"),
         ({"height": [[1]]}, {}, "height has 2 dimensions"),
         ({"height": [[1], [1, 2]]}, {}, "height is not an array"),

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pytest
 
 import thud
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 IMPACT = thud.solve(duration=0.03)
 RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=1323)
@@ -14,22 +19,27 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
 @pytest.mark.parametrize(
     ("target", "parameters", "options", "words"),
     [
-        (RECORD, ["hardness"], {}, r"hardness is not a parameter .* allowed: outer_radius, wall"),
+        (
+            RECORD,
+            ["hardness"],
+            {},
+            r"\[parameters\] hardness is not a parameter .* allowed: outer_radius, wall",
+        ),
         (RECORD, [], {}, r"parameters: none is given; allowed: outer_radius"),
         (RECORD, {"mass": -1.0}, {}, r"mass: start = -1 is not allowed; allowed: 0 <= start"),
-        (RECORD, {"mass": thud.Parameter(2.0, 3.0, 1.0)}, {}, r"mass: lower = 3 and upper = 1"),
+        (RECORD, {"mass": thud.Parameter(2.0, 3.0, 1.0)}, {}, r"mass: low = 3 and high = 1"),
         (RECORD, {"mass": thud.Parameter(2.0, 3.0)}, {}, r"mass: start = 2 is not allowed"),
         (RECORD, {"mass": "heavy"}, {}, r"mass: start = 'heavy' is not .* finite"),
-        (RECORD, {"mass": thud.Parameter(2.5, "a")}, {}, r"mass: lower = 'a' is not allowed"),  # type: ignore[arg-type]
+        (RECORD, {"mass": thud.Parameter(2.5, "a")}, {}, r"mass: low = 'a' is not allowed"),  # type: ignore[arg-type]
         (RECORD, {"mass": thud.Parameter(10**400)}, {}, r"start = a very large number is not"),
         (RECORD, {"mass": np.complex128(2)}, {}, r"mass: start = np.complex128.* finite"),
         (RECORD, 3, {}, r"parameters = 3 is not allowed; allowed: an object of Iterable"),
         (RECORD, ["mass"], {"starts": 10**13}, r"starts = 10000000000000 .* from 1 to 100000"),
         (RECORD, ["mass"], {"starts": 2, "seed": -1}, r"seed = -1 is not .* from 0 to 4294967295"),
         (RECORD, ["mass"], {"max_steps": 0}, r"max_steps = 0 is not allowed; allowed: whole"),
-        (RECORD, ["mass"], {"level": 95.0}, r"level = 95.0 is not allowed; allowed: 0 < level < 1"),
+        (RECORD, ["mass"], {"confidence": 95.0}, r"confidence = 95.0 .* allowed: 0 < confid"),
         (RECORD, ["mass"], {"starts": 0}, r"starts = 0 is not allowed; allowed: whole numbers"),
-        (RECORD, ["mass"], {"base": thud.Case(model=None)}, r"&model is missing"),
+        (RECORD, ["mass"], {"case": thud.Case(model=None)}, r"&model is missing"),
         (RECORD, {"height": 1e5}, {}, r"the start cannot be computed: &drop: height = 100000"),
         ((RECORD[0], RECORD[1][:-1]), ["mass"], {}, r"target cannot be used; allowed: a ForceTarg"),
         (1.0, ["mass"], {}, r"target cannot be used"),
@@ -83,3 +93,17 @@ def test_bad_input_is_told(
 ) -> None:
     with pytest.raises(thud.ThudError, match=words):
         thud.fit(target, parameters, **options)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: thud.fit(RECORD, ["mass"], base=thud.Case()), r"fit\(\): 'base' is now 'case'"),
+        (lambda: thud.fit(RECORD, ["mass"], level=0.9), r"fit\(\): 'level' is now 'confidence'"),
+        (lambda: thud.Parameter(2.5, lower=1), r"Parameter\(\): 'lower' is now 'low'; allowed: st"),
+        (lambda: thud.Parameter(2.5, upper=3), r"Parameter\(\): 'upper' is now 'high'"),
+    ],
+)
+def test_old_words_are_answered_by_the_new_ones(call: Callable[[], object], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        call()

@@ -15,6 +15,7 @@ from conftest import REPOSITORY
 import thud
 from thud import cli
 from thud.checks import lock
+from thud.studies.fit import KIND
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -26,9 +27,8 @@ STUDY = """
 [target]
 file = "record.csv"
 
-[parameters.youngs_modulus]
-start = 1.4
-unit = "MPa"
+[parameters]
+youngs_modulus = { start = 1.4, unit = "MPa" }
 """
 
 
@@ -72,9 +72,9 @@ def test_studies_of_the_repository(
 
 def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(STUDY)
-    study = thud.fitting.read_study("study.toml")
-    assert study.parameters == {"youngs_modulus": thud.Parameter(start=1.4e6)}
-    fit = study.run()
+    study = thud.read_study("study.toml", "fit")
+    assert [p.given for p in study.parameters] == [{"start": 1.4e6, "unit": "MPa"}]
+    fit = KIND.run(study)
     # The table of the record has times of its own.
     assert fit.time_shift == pytest.approx(0.2, abs=1e-6)
     assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
@@ -82,20 +82,20 @@ def test_units_are_those_of_the_file(tmp_path: Path) -> None:
 
 
 def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:
-    text = '[target]\nfile = "record.csv"\n[parameters.wall_thickness]\nstart = 36\nunit = "mm"'
+    text = (
+        '[target]\nfile = "record.csv"\n[parameters]\nwall_thickness = { start = 36, unit = "mm" }'
+    )
     (tmp_path / "study.toml").write_text(text)
-    study = thud.fitting.read_study("study.toml")
-    assert study.parameters == {"wall_thickness": thud.Parameter(start=0.036)}
+    (parameter,) = thud.read_study("study.toml", "fit").parameters
+    assert parameter.start == 0.036
 
 
 def test_doubts_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    text = STUDY.replace("[parameters", "[parameters.wall_thickness]\n[parameters", 1)
-    text = text.replace("[parameters.wall_thickness]", "[parameters.wall_thickness]\nstart = 0.03")
-    (tmp_path / "study.toml").write_text(text)
+    (tmp_path / "study.toml").write_text(STUDY + "wall_thickness = { start = 0.03 }")
     assert cli.main(["fit", "-q", "-o", "found", "study.toml"]) == 0
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert "thud-driver: study.toml: the data do not tell wall_thickness and" in captured.err
+    assert "thud-driver: study.toml: youngs_modulus and wall_thickness are not" in captured.err
     saved = json.loads((tmp_path / "found/fit.json").read_text())
     assert saved["parameters"]["wall_thickness"]["standard_error"] is None
 
@@ -105,7 +105,7 @@ def test_search_without_an_end_is_a_failure(
 ) -> None:
     (tmp_path / "study.toml").write_text(f"max_steps = 1\n{STUDY}")
     assert cli.main(["fit", "--no-figures", "study.toml"]) == 2
-    assert "the search has not come to an end" in capsys.readouterr().err
+    assert "the search has not converged" in capsys.readouterr().err
 
 
 def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
@@ -126,7 +126,13 @@ def test_results_of_another_fit_are_not_touched(
     before = (tmp_path / "found/fit.json").read_bytes()
     (tmp_path / "study.toml").write_text(STUDY.replace("1.4", "1.5"))
     assert cli.main(arguments) == 1
-    assert "found/fit.json belongs to another study" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "found/fit.json belongs to another version of this study: " in error
+    assert (
+        ": [parameters] youngs_modulus = { start = 1.4, unit = 'MPa' } is now { start = 1.5"
+        in error
+    )
+    assert "; allowed: another directory, or --replace" in error
     assert (tmp_path / "found/fit.json").read_bytes() == before
     (tmp_path / "found/fit.json").write_text("[]")
     assert cli.main(arguments) == 1
@@ -140,8 +146,8 @@ def test_useless_directory_is_told_before_the_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (tmp_path / "study.toml").write_text(STUDY)
-    monkeypatch.delattr("thud.fitting.study.fit")
-    assert cli.main(["fit", "-o", place, "study.toml"]) == 1
+    monkeypatch.delattr("thud.studies.fit.search")
+    assert cli.main(["fit", "-q", "-o", place, "study.toml"]) == 1
     error = capsys.readouterr().err
     assert error.startswith(f"thud-driver: {place}")
     assert error.endswith("; allowed: a place that you may write to\n")
@@ -162,21 +168,34 @@ def test_fit_is_printed_even_if_it_cannot_be_saved(
     ("old", "new", "words"),
     [
         ("youngs_modulus", "hardness", r"\[parameters\] hardness is not a parameter .* allowed: o"),
-        ("MPa", "mm", r"\[parameters.youngs_modulus\]: unit 'mm' does not fit; allowed: Pa, kPa"),
+        ("MPa", "mm", r"\[parameters\] youngs_modulus: unit 'mm' does not fit; allowed: Pa, kPa"),
         ("1.4", "-1", r"youngs_modulus: start = -1e\+06 is not allowed; allowed: 0 <= start <="),
-        ("1.4", "'soft'", r"youngs_modulus\] start = 'soft' is not allowed; allowed: finite"),
+        ("1.4", "'soft'", r"youngs_modulus: start = 'soft' is not allowed; allowed: finite"),
         ("1.4", "nan", r"start = nan is not allowed"),
         ("1.4", f"1{'0' * 400}", r"start = a very large number is not allowed"),
-        ("[parameters.youngs_modulus]", "[parameters]", r"parameters\] start is not a parameter"),
-        ("start", "begin", r"'begin' is not known; allowed: start, lower, upper, unit"),
+        ("start", "lower", r"\[parameters\] youngs_modulus: 'lower' is now 'low'; allowed: start"),
+        ("start", "begin", r"'begin' is not known; allowed: start, low, high, unit"),
         ("file", "files", r"\[target\] takes one of file and levels"),
         ("record.csv", "nowhere.csv", r"nowhere.csv: cannot be read"),
-        ("[target]", "[targets]", r"'targets' is not known; allowed: base, target, parameters"),
-        ("[target]", "base = 'no.nml'\n[target]", r"no.nml: there is no such file"),
+        (
+            "[target]",
+            "[targets]",
+            r"'targets' is not known; allowed: name, case, fixed, parameters, target",
+        ),
+        ("[target]", "case = 'no.nml'\n[target]", r"no.nml: there is no such file"),
         ("[target]", "starts = 1.5\n[target]", r"starts = 1.5 is not allowed; allowed: whole"),
         ("[target]", "seed = -1\n[target]", r"seed = -1 is not allowed"),
-        ("[target]", "level = 2\n[target]", r"level = 2 is not allowed; allowed: 0 < level < 1"),
-        ("[target]", "[target", r"study.toml: cannot be read"),
+        ("[target]", "confidence = 2\n[target]", r"confidence = 2 is not allowed; allowed: 0"),
+        ("[target]", "level = 0.9\n[target]", r"'level' is now 'confidence'; allowed: name"),
+        ("[target]", "base = 'no.nml'\n[target]", r"'base' is now 'case'; allowed: name"),
+        ("[target]", "fixed.mass = -1\n[target]", r"\[fixed\]: &ball: mass = -1.0 is not allowed"),
+        ("[target]", "fixed.density = -1\n[target]", r"\[fixed\]: &ball: mass = .* is not allowed"),
+        (
+            "[target]",
+            "fixed.youngs_modulus = 1\n[target]",
+            r"\[fixed\] youngs_modulus has no use beside \[parameters\]",
+        ),
+        ("[target]", "[target", r"study.toml: .*; allowed: TOML"),
         ("[target]", "[target]\nnoise = 0", r"noise = 0 is not allowed"),
         ("[target]", "[target]\ntime_shift = 1", r"time_shift = 1 is not allowed; allowed: true"),
         ("[target]", "[target]\nwindow = 3", r"window = 3 is not allowed"),
@@ -194,11 +213,11 @@ def test_fit_is_printed_even_if_it_cannot_be_saved(
         (
             'file = "record.csv"',
             "levels = [39, 31, 23, 17, 12]\ncontact_time = 20",
-            r"contact_time is missing or not a table",
+            r"contact_time = 20 is not allowed; allowed: a table of value",
         ),
         (
             'file = "record.csv"',
-            "levels = [39, 31, 23, 17, 12]\ncontact_time = { value = 20, unit = 'm' }",
+            "levels = [39, 31, 23, 17, 12]\ncontact_time = {value=20, uncertainty=1, unit='m'}",
             r"contact_time: unit 'm' does not fit; allowed: s, ms, us",
         ),
     ],
@@ -217,7 +236,7 @@ def test_bad_studies_are_told(
 
 def test_study_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["fit", "nowhere.toml"]) == 1
-    assert "nowhere.toml: cannot be read" in capsys.readouterr().err
+    assert "nowhere.toml: No such file or directory; allowed: " in capsys.readouterr().err
 
 
 def test_targets_are_those_of_their_script(
@@ -236,11 +255,11 @@ def test_targets_are_those_of_their_script(
     assert first in (STUDIES / "fit_levels.toml").read_text()
 
 
-def test_results_of_another_record_or_base_are_not_touched(
+def test_results_of_another_record_or_case_are_not_touched(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     record = np.loadtxt("record.csv", delimiter=",")
-    (tmp_path / "study.toml").write_text('base = "ball.nml"\n' + STUDY)
+    (tmp_path / "study.toml").write_text('case = "ball.nml"\n' + STUDY)
     fit = ["fit", "-q", "--no-figures", "study.toml", "-o", "found"]
     for mass, scale in ((2.5, 1), (2.4, 1), (2.5, 0.9)):
         (tmp_path / "ball.nml").write_text(f"&ball mass = {mass} / &drop / &model /\n")
@@ -250,7 +269,8 @@ def test_results_of_another_record_or_base_are_not_touched(
             before = (tmp_path / "found/fit.json").read_bytes()
             continue
         assert cli.main(fit) == 1
-        assert "belongs to another study, or to another version" in capsys.readouterr().err
+        told = "&ball: mass = 2.5 is now 2.4" if mass == 2.4 else "numbers of [target] = "
+        assert f"another version of this study: {told}" in capsys.readouterr().err
         assert (tmp_path / "found/fit.json").read_bytes() == before
 
 
@@ -265,3 +285,43 @@ def test_fits_take_a_directory_one_at_a_time(
     assert "fit.json is being computed; allowed: wait, or another" in capsys.readouterr().err
     os.close(descriptor)
     assert cli.main(fit) == 0
+
+
+def test_replace_finds_the_fit_anew_and_leaves_no_older_file(tmp_path: Path) -> None:
+    both = STUDY + "height = {}\n"
+    (tmp_path / "study.toml").write_text(both)
+    fit = ["fit", "-q", "study.toml", "-o", "found"]
+    assert cli.main(fit) == 0
+    assert (tmp_path / "found/confidence.png").exists()
+    (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\ntime_shift = false"))
+    np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
+    assert cli.main([*fit, "--replace"]) == 0
+    assert sorted(path.name for path in (tmp_path / "found").iterdir()) == [
+        "fit.csv", "fit.json", "fit.png", "fit.svg", "fitted.nml",
+    ]  # fmt: skip
+
+
+def test_fixed_keys_and_units_of_targets(tmp_path: Path) -> None:
+    plain = STUDY.replace("[target]", "[target]\nnoise = 5\nbelow = 1000\nwindow = [0.2, 0.23]")
+    units = """
+fixed = { mass = { value = 2400, unit = "g" } }
+[target]
+file = "record.csv"
+noise = { value = 0.005, unit = "kN" }
+below = { value = 1, unit = "kHz" }
+window = { value = [200, 230], unit = "ms" }
+[parameters]
+youngs_modulus = { start = 1400, unit = "kPa" }
+"""
+    (tmp_path / "ball.nml").write_text("&ball mass = 2.4 / &drop / &model /\n")
+    (tmp_path / "plain.toml").write_text(f'case = "ball.nml"\n{plain}')
+    (tmp_path / "units.toml").write_text(units)
+    one, other = (KIND.run(f"{name}.toml") for name in ("plain", "units"))
+    assert other.case.ball.mass == 2.4
+    assert one.values == other.values
+    density = {"density": {"value": 1.0, "unit": "g/cm3"}}
+    study = {"fixed": density, "target": {"levels": [39, 31, 23, 17, 12]}}
+    found = thud.read_study({**study, "parameters": {"youngs_modulus": {}}}, "fit")
+    assert found.case.ball.mass == pytest.approx(1e3 * 4 / 3 * np.pi * (0.089**3 - 0.057**3))
+    with pytest.raises(thud.InputError, match="density is not allowed beside a geometry"):
+        thud.read_study({**study, "parameters": {"wall_thickness": {}}}, "fit")

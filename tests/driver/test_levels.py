@@ -104,7 +104,9 @@ def test_anything_like_an_array_is_a_record() -> None:
         (PULSE, {"method": "guess"}, "'guess' is not known; allowed: 'exact', 'fft'"),
     ],
 )
-def test_useless_records_are_refused(record: object, options: dict[str, object], words: str) -> None:
+def test_useless_records_are_refused(
+    record: object, options: dict[str, object], words: str
+) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.force_exposure_levels(record, **{"sample_rate": 44100.0, **options})  # type: ignore[arg-type]
 

@@ -20,7 +20,7 @@ from scipy.stats import qmc
 import thud
 from thud import cli, tables, units
 from thud.keys import known_keys
-from thud.studies import designs, evaluation, run, sets
+from thud.studies import designs, directory, evaluation, fit, sweep
 from thud.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
         assert found.attrs["thud_version"] == thud.__version__
         assert found.attrs["compiler"].startswith("GCC version")
         assert "/" not in found.attrs["compiler"]
-        assert "youngs_modulus = 1600000.0" in found.attrs["base_case"]
+        assert "youngs_modulus = 1600000.0" in found.attrs["case"]
 
 
 def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,17 +107,17 @@ def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatc
         }
     )
     grid = thud.read_study(HEIGHTS)
-    before = drawn.fingerprint, grid.fingerprint
+    before = drawn.identity, grid.identity
     found = thud.sweep(drawn)
     assert found.attrs["scipy_version"] == scipy.__version__
     assert "salib_version" not in found.attrs
     assert "salib_version" in designs.makers("saltelli")
     monkeypatch.setattr(designs, "version", lambda _: "0.0.1")
-    assert drawn.fingerprint != before[0]
-    assert grid.fingerprint == before[1]
+    assert drawn.identity != before[0]
+    assert grid.identity == before[1]
 
 
-@pytest.mark.parametrize("module", [run, tables, units])
+@pytest.mark.parametrize("module", [directory, fit, sweep, tables, units])
 def test_examples_are_true(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 0
@@ -139,10 +139,10 @@ def test_multiples_are_exact() -> None:
 
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_drawn_designs_fill_their_range(design: str) -> None:
-    whole = sets.unit_sets(design, 3, 256, 5, 0, 256)
-    parts = [sets.unit_sets(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))]
+    whole = designs.unit_sets(design, 3, 256, 5, 0, 256)
+    parts = [designs.unit_sets(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
-    assert not np.array_equal(sets.unit_sets(design, 3, 256, 6, 0, 256), whole)
+    assert not np.array_equal(designs.unit_sets(design, 3, 256, 6, 0, 256), whole)
     if design == "random":
         # Six standard errors of the mean of a uniform distribution.
         assert abs(whole.mean() - 0.5) < 6 / np.sqrt(12 * whole.size)
@@ -170,7 +170,7 @@ def test_spreads_have_their_quantiles() -> None:
             },
         }
     )
-    found = sets.parameter_columns(study, 0, 4000)
+    found = study.parameter_columns(0, 4000)
     assert np.quantile(found["mass"], [0.0228, 0.5, 0.9772]) == pytest.approx(
         [2.3, 2.5, 2.7], abs=2e-3
     )
@@ -184,7 +184,7 @@ def test_spreads_have_their_quantiles() -> None:
 def test_fixed_value_is_the_middle_of_a_normal_distribution() -> None:
     study: dict[str, Any] = {"design": {"kind": "latin_hypercube", "size": 1000}}
     study |= {"fixed": {"mass": 3}, "parameters": {"mass": {"std": 0.1}}}
-    found = sets.parameter_columns(thud.read_study(study), 0, 1000)
+    found = thud.read_study(study).parameter_columns(0, 1000)
     assert found["mass"].mean() == pytest.approx(3, abs=1e-3)
 
 
@@ -290,7 +290,7 @@ def test_ensemble_is_used_where_it_can_be(monkeypatch: pytest.MonkeyPatch) -> No
         asked.append(options["threads"])
         return solve_many(parameters, **options)
 
-    monkeypatch.setattr(thud, "solve_many", count)
+    monkeypatch.setattr(evaluation, "solve_many", count)
     thud.sweep(HEIGHTS, workers=3)
     thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
     thud.sweep({**HEIGHTS, "fixed": {"model": "modal_ball"}})
@@ -325,14 +325,14 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere; allowed: outer"),
         ("parameters.loss_factor.values = [1]", "allowed: outer_radius, wall_thickness, mass"),
-        ("parameters.height = 1", r"height = 1 has no values; allowed: a table"),
+        ("parameters.height = 1", r"height = 1 is no table; allowed: values, low"),
         ("parameters.height.values = []", r"values = \[\] is empty"),
         ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
         ("parameters.height.values = [inf]", "allowed: finite numbers"),
         ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}", "allowed: finite numbers"),
         ("parameters.height = {values=[1], unit='s'}", "unit 's' does not fit; allowed: m, cm, mm"),
         ("parameters.height = {values=[1], unit=['m']}", "does not fit; allowed: m, cm"),
-        ("parameters.height = {values=[1], count=2}", "count is not known beside values; allowed:"),
+        ("parameters.height = {values=[1], count=2}", "'count' is not known; allowed: values, u"),
         ("parameters.height = {low=1, high=2}", "no values for a grid design; allowed: values"),
         ("parameters.height = {low=1}", "no high end; allowed: high"),
         ("parameters.height = {low=2, high=1, count=3}", "low = 2 is not allowed; allowed: low <"),
@@ -363,7 +363,14 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.momentum_flux.values = ['some']", "allowed: 'momentum_balance', 'retarding'"),
         ("parameters.momentum_flux = {low=1, high=2}", "is not a number; allowed: values"),
         ("parameters.bands.values = ['third']", r"allowed: bands in \[fixed\]"),
-        ("fixed.mass = -2\nparameters.height.values = [1]", "allowed: 0 to 1e\\+06 kg"),
+        ("fixed.mass = -2\nparameters.height.values = [1]", r"\[fixed\]: &ball: mass = -2.0 is "),
+        (
+            "fixed.wall_thickness = 0.1\nparameters.height.values = [1]",
+            r"\[fixed\]: &ball: wall_thickness = 0.1 is not allowed; allowed: 0 < .* < 0.089 m",
+        ),
+        ("base = 'a.nml'\nparameters.height.values = [1]", "'base' is now 'case'; allowed: name"),
+        ("parameters.height = {lower=1, upper=2}", "height: 'lower' is now 'low'; allowed: val"),
+        ("parameters.height = {start=1}", "height: 'start' is not known; allowed: values, low"),
         ("fixed.hight = 1\nparameters.mass.values = [1]", "'hight' is not a key"),
         ("fixed.model = 'cube'\nparameters.mass.values = [1]", "allowed: 'hollow_sphere', 'modal"),
         ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),
@@ -434,7 +441,7 @@ def test_numbers_of_numpy_are_numbers() -> None:
     plain = {"fixed": {"substeps": 2}, "parameters": {"height": {"values": [0.5, 0.75, 1.0]}}}
     for heights in (np.linspace(0.5, 1, 3), list(np.linspace(0.5, 1, 3)), (0.5, 0.75, 1)):
         study = {"fixed": {"substeps": np.int64(2)}, "parameters": {"height": {"values": heights}}}
-        assert thud.read_study(study).fingerprint == thud.read_study(plain).fingerprint
+        assert thud.read_study(study).identity == thud.read_study(plain).identity
 
 
 @pytest.mark.parametrize(
@@ -483,7 +490,7 @@ def test_any_damage_to_a_study(
         assert "\n" not in str(error)
         assert "allowed: " in str(error)
     else:
-        assert sets.count(study) > 0
+        assert study.count > 0
 
 
 def test_command_writes_figure_and_table(
@@ -528,3 +535,23 @@ def test_import_stays_light() -> None:
     code = "import sys, thud; print({'xarray', 'scipy', 'SALib', 'matplotlib'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+def test_fixed_values_may_suit_parameters_only() -> None:
+    # Neither ball exists with the other measure of the case.
+    thin = {"fixed": {"outer_radius": 0.02}, "parameters": {"wall_thickness": {"values": [0.005]}}}
+    thick = {"fixed": {"wall_thickness": 0.1}, "parameters": {"outer_radius": {"values": [0.2]}}}
+    for study in (thin, thick):
+        assert thud.read_study(study).count == 1
+
+
+def test_unknown_keywords_are_told() -> None:
+    with pytest.raises(thud.InputError, match="keywords: 'threads' is not known; allowed: backend"):
+        thud.sweep(HEIGHTS, threads=2)
+
+
+def test_parameters_of_python_are_those_of_files() -> None:
+    table = {"low": 50, "high": 100, "count": 3, "unit": "cm"}
+    parameter = thud.Parameter(**table)
+    one, other = ({"parameters": {"height": height}} for height in (table, parameter))
+    assert thud.read_study(one).identity == thud.read_study(other).identity

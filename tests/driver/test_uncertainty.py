@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 
 import thud
 from thud import cli
-from thud.studies.tolerances import wilson_interval
+from thud.studies.uncertainty import wilson_interval
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -133,7 +133,9 @@ def test_fixed_values_are_the_middle_of_normal_distributions() -> None:
     study = {"design": {"size": 4}, **ball}
     density = thud.uncertainty(study).dataset["density"].values
     assert abs(density - 1148).max() < 6
+    fixed = {"model": "measured_modes", "frequency": [24, 89]}
+    fixed |= {"damping_ratio": [0.05, 0.05], "effective_mass": [2.4, 0.1]}
     frequency = {"frequency(2)": {"std": 0.1}}
-    modes = {"fixed": {"model": "measured_modes", "frequency": [24, 89]}, "parameters": frequency}
+    modes = {"fixed": fixed, "parameters": frequency}
     parameter = thud.read_study({"design": {"size": 2}, **modes}, "uncertainty").parameters[0]
-    assert parameter.spread.mean == 89
+    assert parameter.mean == 89

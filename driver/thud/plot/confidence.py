@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.fitting.result import Estimates
+    from thud.studies.fitting.result import Fit
 
 # More parameters than that are drawn as a table of correlations.
 MAX_PARAMETERS = 5
@@ -26,7 +26,7 @@ GREY = "0.85"
 LINE = 44
 
 
-def confidence(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> Figure:
+def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
     """Draw joint confidence regions of pairs of parameters, or their correlations.
 
     Parameters
@@ -66,7 +66,7 @@ def confidence(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> Figure
 
 
 def _draw_pair(
-    fit: Estimates, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
+    fit: Fit, axes: Axes, pair: tuple[int, int], units: Mapping[str, tuple[str, float]]
 ) -> None:
     """Draw the joint confidence region of two parameters around their values."""
     factor = np.array([units[fit.names[i]][1] for i in pair])
@@ -94,9 +94,9 @@ def _draw_pair(
     axes.set_title(f"correlation {share:.{digits}f}", fontsize=SIZE - 1)
 
 
-def _squared_radius(fit: Estimates) -> float:
+def _squared_radius(fit: Fit) -> float:
     """Return the quantile of chi-square with 2 degrees of freedom, or twice that of Fisher's F."""
-    logarithm = np.log1p(-fit.level)
+    logarithm = np.log1p(-fit.confidence)
     if fit.known_noise:
         return float(-2 * logarithm)
     freedom = fit.degrees_of_freedom
@@ -118,7 +118,7 @@ def _add_ellipse(axes: Axes, centre: NDArray[np.float64], block: NDArray[np.floa
     )
 
 
-def _draw_correlation(fit: Estimates) -> Figure:
+def _draw_correlation(fit: Fit) -> Figure:
     """Draw the correlations of all parameters as a table of colours."""
     figure = new_figure(WIDTH)
     axes = figure.add_subplot()

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.plot.parameter_axis import Which
-    from thud.studies import DesignMap
+    from thud.studies.design_map import DesignMap
 
     Values = NDArray[np.float64]
 

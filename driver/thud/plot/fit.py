@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.fitting.force_target import ForceMisfit
-    from thud.fitting.result import Estimates
+    from thud.studies.fitting.force_target import ForceMisfit
+    from thud.studies.fitting.result import Fit
 
 # More names of bands than that are turned.
 MAX_UPRIGHT = 5
@@ -30,7 +30,7 @@ VISIBLE = 0.003
 BEFORE, AFTER = 0.15, 0.4
 
 
-def draw_fit(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
+def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
     """Draw a fit, and how well several parameters are known together.
 
     Parameters
@@ -51,7 +51,7 @@ def draw_fit(fit: Estimates, units: Mapping[str, tuple[str, float]]) -> dict[str
     return figures
 
 
-def target_and_fit(fit: Estimates) -> Figure:
+def target_and_fit(fit: Fit) -> Figure:
     """Draw target and model, and below it their difference over the uncertainty.
 
     Parameters
@@ -78,7 +78,7 @@ def target_and_fit(fit: Estimates) -> Figure:
     return figure
 
 
-def _draw_force(fit: Estimates, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
+def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
     """Draw record, fit and residual."""
     column = misfit.history_columns(fit.impact, fit.time_shift)
     time = 1e3 * column["time_s"]
@@ -109,7 +109,7 @@ def _draw_force(fit: Estimates, misfit: ForceMisfit, above: Axes, below: Axes) -
     legend_above(above, 2, "lower right")
 
 
-def _draw_levels(fit: Estimates, above: Axes, below: Axes) -> None:
+def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     """Draw levels with their uncertainty, and whatever else was compared in the residuals."""
     column = fit.misfit.columns(fit.impact, 0.0)
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]

@@ -14,8 +14,9 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from thud.checks import replace_file, require_kind
+from thud.checks import require_kind
 from thud.errors import InputError
+from thud.files import replace_file
 from thud.impact import FORCES, Impact
 from thud.levels import get_bands
 from thud.recording import Recording

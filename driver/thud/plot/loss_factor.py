@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from thud._schema import FiniteElement
 from thud.errors import InputError
 from thud.free_modes import loss_factors
 from thud.impact import Impact
-from thud._schema import FiniteElement
 from thud.plot.look import SIZE, add_curves, empty_axes
 
 

@@ -12,8 +12,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud.checks import replace_file, require_kind
+from thud.checks import require_kind
 from thud.errors import InputError
+from thud.files import replace_file
 from thud.impact import Impact
 from thud.motion import Motion
 from thud.plot.examples import solve_published

@@ -12,7 +12,7 @@ from thud.plot.look import COLOURS, SIZE, empty_axes, legend_above
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.studies import Sensitivity
+    from thud.studies.sensitivity import Sensitivity
 
 
 def draw_sensitivity(result: Sensitivity) -> Figure:

@@ -12,7 +12,7 @@ from thud.plot.look import COLOURS, SIZE, empty_axes, legend_above, octave_axis,
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.studies import Uncertainty
+    from thud.studies.uncertainty import Uncertainty
 
 
 def draw_uncertainty(result: Uncertainty) -> Figure:

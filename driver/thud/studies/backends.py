@@ -66,14 +66,12 @@ def run_blocks(
     """
     backend, workers, scheduler = checked_backend(backend, workers, scheduler)
     with _open(backend, workers, scheduler) as (executor, width):
-        # An ensemble in this process uses all its threads; elsewhere blocks run side by side.
-        threads = width if backend == "threads" else 1
         running: dict[Future[dict[str, NDArray[Any]]], Block] = {}
         try:
             for block in blocks:
                 if len(running) >= 2 * width:
                     _collect(running, keep)
-                running[executor.submit(evaluate, block, threads)] = block
+                running[executor.submit(evaluate, block)] = block
             while running:
                 _collect(running, keep)
         except BaseException:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import platform
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
@@ -9,28 +10,26 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-import thud
-from thud._api import compiler
+from thud._api import compiler, version
+from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
-from thud.studies import sets
 from thud.studies.designs import makers
 from thud.studies.evaluation import SCALARS, block_size, level_names
-from thud.studies.parameters import Uniform
-from thud.units import power_of
 
 if TYPE_CHECKING:
-    from thud.studies.parameters import Parameter
-    from thud.studies.sets import Columns
-    from thud.studies.study import Study
+    from thud.studies.parameter import Parameter
+    from thud.studies.sets import Columns, SetStudy
 
 _LEVEL = "force exposure level of the {} force, re 1 N and 1 s"
 MEANINGS = {
     **SCALARS,
-    "elastic_level": ("dB", _LEVEL.format("elastic")),
-    "floor_level": ("dB", _LEVEL.format("floor")),
-    "elastic_third_level": ("dB", _LEVEL.format("elastic")),
-    "floor_third_level": ("dB", _LEVEL.format("floor")),
-    "margin": ("dB", "least distance of the judged octave levels to a limit, positive inside"),
+    **{f"{force}_level": ("dB", _LEVEL.format(force)) for force in FORCES},
+    **{
+        f"{force}_{bands}_level": ("dB", _LEVEL.format(force))
+        for bands in BANDWIDTHS[1:]
+        for force in FORCES
+    },
+    "margin": ("dB", "minimum distance of the judged octave levels to a limit, positive inside"),
     "conforms": ("1", "all criteria of the standard are met"),
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
@@ -40,11 +39,11 @@ _SET_BYTES = 95
 _FILE_BYTES = 27_000
 
 
-def disk_space(study: Study) -> int:
+def disk_space(study: SetStudy) -> int:
     """Return about how many bytes the results of a study need, those of its blocks included."""
-    total = sets.count(study)
-    files = 1 - (-total // block_size(study.base))
-    levels = sum(len(get_bands(bands).nominal) for _, bands in level_names(study.base).values())
+    total = study.count
+    files = 1 - (-total // block_size(study.case))
+    levels = sum(len(get_bands(bands).nominal) for _, bands in level_names(study.case).values())
     return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * (levels + len(study.parameters)))
 
 
@@ -54,7 +53,7 @@ def coordinate(parameter: Parameter) -> str:
     return f"{parameter.key.group}_{name}" if name in MEANINGS else name
 
 
-def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
+def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset:
     """Return the results of some sets as a dataset, one after the other.
 
     Parameters
@@ -71,7 +70,7 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
     Dataset
         Of the dimensions ``set`` and ``octave``, and ``third`` where the case wants them.
     """
-    levels = level_names(study.base)
+    levels = level_names(study.case)
     coordinates: dict[str, Any] = {
         bands: (bands, get_bands(bands).nominal, {"units": "Hz", "long_name": "nominal frequency"})
         for _, bands in levels.values()
@@ -89,9 +88,10 @@ def new_dataset(study: Study, columns: Columns, found: Columns) -> xr.Dataset:
     return in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 
-def _attributes(study: Study, parameter: Parameter) -> dict[str, Any]:
+def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
     """Return the attributes of a parameter; figures show it in unit and scale of the study."""
-    key, spread, law = parameter.key, parameter.spread, study.temperature
+    key, law = parameter.key, study.temperature
+    shown_unit, power = parameter.shown_unit
     meaning = key.meaning
     if law and parameter.name == "youngs_modulus":
         meaning += f" at {law.reference:g} degC; its temperature acts on it besides"
@@ -100,27 +100,27 @@ def _attributes(study: Study, parameter: Parameter) -> dict[str, Any]:
         "long_name": meaning,
         "group": key.group,
         "key": parameter.name,
-        "shown_unit": parameter.unit,
-        "shown_power": -power_of(parameter.unit, key.unit, parameter.name),
-        "scale": "log" if isinstance(spread, Uniform) and spread.logarithmic else "linear",
+        "shown_unit": shown_unit,
+        "shown_power": -power,
+        "scale": parameter.scale,
     }
 
 
-def provenance(study: Study) -> dict[str, str]:
+def provenance(study: SetStudy) -> dict[str, str]:
     """Return where results come from."""
     return {
         "title": f"{study.kind} {study.name}",
         "study": study.text,
         "study_kind": study.kind,
-        "fingerprint": study.fingerprint,
+        "identity": json.dumps(study.identity),
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
         "model": study.model,
         "parameters": " ".join(map(coordinate, study.parameters)),
-        "judged_force": study.base.levels.force,
-        "limits": study.base.limits.source,
-        "base_case": f"{study.base.to_namelist()}",
-        "thud_version": thud.__version__,
+        "judged_force": study.case.levels.force,
+        "limits": study.case.limits.source,
+        "case": f"{study.case.to_namelist()}",
+        "thud_version": version(),
         "compiler": compiler(),
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,
@@ -139,15 +139,15 @@ def in_order(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(results, coordinates, dataset.attrs)
 
 
-def grid_of(study: Study, dataset: xr.Dataset) -> xr.Dataset:
+def grid_of(study: SetStudy, dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset of a complete grid with one dimension per parameter instead of ``set``."""
     if study.design != "grid":
         return dataset
-    sizes = sets.shape(study)
+    sizes = study.shape
     names = tuple(map(coordinate, study.parameters))
     axes = {}
     for parameter, name in zip(study.parameters, names, strict=True):
-        values = parameter.spread.grid()
+        values = parameter.grid()
         if values.dtype.kind == "U":
             values = values.astype(object)
         axes[name] = (name, values, dataset[name].attrs)

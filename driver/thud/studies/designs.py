@@ -1,25 +1,24 @@
-"""Designs: which sets a study has, as its table ``[design]`` says."""
+"""Designs: which sets a study has, and the points of those that are drawn."""
 
 from __future__ import annotations
 
 import math
+import warnings
+from functools import lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from thud.checks import LARGEST_SEED, require_whole, require_words
 from thud.errors import InputError
-from thud.studies.parameters import MAX_VALUES, Normal, Parameter, Uniform
+from thud.studies.parameter import MAX_VALUES, Parameter
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-# By study: the designs that it takes, the default first.
-DESIGNS = {
-    "sweep": ("grid", "list", "random", "latin_hypercube", "sobol"),
-    "sensitivity": ("saltelli",),
-    "design": ("grid",),
-    "uncertainty": ("random",),
-}
+    from numpy.typing import NDArray
+
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
 MIN_SAMPLES = 4
@@ -28,13 +27,13 @@ _MAX_SETS = 2**63 - 1
 
 
 def makers(design: str) -> dict[str, str]:
-    """Return the versions of what draws the points of a design; other versions may draw others."""
+    """Return the versions of what draws the points of a design: others may draw other points."""
     names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in DRAWN else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 
 
 def read_design(
-    given: Mapping[str, Any], kind: str, parameters: tuple[Parameter, ...]
+    given: Mapping[str, Any], allowed: tuple[str, ...], parameters: tuple[Parameter, ...]
 ) -> tuple[str, int, int]:
     """Return kind, size and seed of a design.
 
@@ -42,8 +41,8 @@ def read_design(
     ----------
     given
         The table ``[design]``.
-    kind
-        The kind of study.
+    allowed
+        The designs that suit the kind of study, the default first.
     parameters
         Its parameters.
 
@@ -52,7 +51,6 @@ def read_design(
     InputError
         Where the design does not suit the study or its parameters.
     """
-    allowed = DESIGNS[kind]
     design = given.get("kind", allowed[0])
     if design not in allowed:
         message = f"[design] kind = {design!r} is not allowed; allowed: {', '.join(allowed)}"
@@ -60,31 +58,29 @@ def read_design(
     words = ("kind", "size", "seed") if design in DRAWN else ("kind",)
     require_words(f"[design] of kind {design}", given, words)
     for parameter in parameters:
-        spread = parameter.spread
-        if design in DRAWN and isinstance(spread, Uniform) and spread.count:
+        if design in DRAWN and parameter.count:
             message = (
                 f"[parameters] {parameter.name}: count has no use in a {design} design; "
                 f"allowed: low, high and scale"
             )
             raise InputError(message)
-        gridless = isinstance(spread, Normal) or (isinstance(spread, Uniform) and not spread.count)
-        if design not in DRAWN and gridless:
+        if design not in DRAWN and not parameter.size:
             message = (
                 f"[parameters] {parameter.name} has no values for a {design} design; "
                 f"allowed: values = [...], or low, high and count"
             )
             raise InputError(message)
-    if design == "list" and len({p.spread.size for p in parameters}) > 1:
+    if design == "list" and len({p.size for p in parameters}) > 1:
         message = "[parameters] differ in their number of values; allowed: the same for all"
         raise InputError(message)
-    if design == "grid" and math.prod(p.spread.size for p in parameters) > _MAX_SETS:
+    if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SETS:
         message = "[parameters] make too many sets; allowed: up to 2^63 - 1 in a grid"
         raise InputError(message)
     if design not in DRAWN:
         return design, 0, 0
     size, seed = given.get("size", 0), given.get("seed", 0)
-    least = MIN_SAMPLES if design == "saltelli" else 1
-    require_whole("[design] size", size, least, MAX_VALUES)
+    minimum = MIN_SAMPLES if design == "saltelli" else 1
+    require_whole("[design] size", size, minimum, MAX_VALUES)
     require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
         near = 1 << size.bit_length() - 1
@@ -94,3 +90,48 @@ def read_design(
         )
         raise InputError(message)
     return design, size, seed
+
+
+def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
+    design: str, dimension: int, size: int, seed: int, start: int, stop: int
+) -> NDArray[np.float64]:
+    """Return some points of a design in the unit cube, shape (stop - start, dimension).
+
+    Random and Sobol points are made when they are asked for; the other designs are a whole.
+    """
+    if design == "random":
+        generator = np.random.PCG64(seed).advance(start * dimension)
+        return np.random.Generator(generator).random((stop - start, dimension))
+    if design == "sobol":
+        from scipy.stats import qmc  # noqa: PLC0415 - takes its time
+
+        points = qmc.Sobol(dimension, rng=seed)
+        if start:
+            points.fast_forward(start)
+        with warnings.catch_warnings():
+            # The whole is a power of 2; its parts need not be.
+            warnings.simplefilter("ignore", UserWarning)
+            return _float(points.random(stop - start))
+    return _whole(design, dimension, size, seed)[start:stop]
+
+
+@lru_cache(maxsize=1)
+def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
+    """Return all points of a design."""
+    if design == "latin_hypercube":
+        from scipy.stats import qmc  # noqa: PLC0415 - takes its time
+
+        return _float(qmc.LatinHypercube(dimension, rng=seed).random(size))
+    from SALib.sample import sobol as saltelli  # noqa: PLC0415 - takes its time
+
+    cube = {
+        "num_vars": dimension,
+        "names": list(map(str, range(dimension))),
+        "bounds": [[0.0, 1.0]] * dimension,
+    }
+    return _float(saltelli.sample(cube, size, calc_second_order=False, seed=seed))
+
+
+def _float(points: Any) -> NDArray[np.float64]:  # noqa: ANN401 - of libraries without types
+    """Return points as an array of floats."""
+    return np.asarray(points, dtype=np.float64)

@@ -1,47 +1,30 @@
-"""What becomes of a block of sets: one function, whatever computes them."""
+"""What becomes of a block of sets: one call of the library, whatever computes it."""
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-import thud
-from thud.case import Ball, Case, Drop, Levels
-from thud.errors import InputError, ThudError
-from thud.impact import FORCES, solve_case
-from thud.keys import put
-from thud.levels import get_bands, octave_limits
-from thud.models import HollowSphere
+from thud import _schema as schema
+from thud._api import version
+from thud.ensemble import get_cost, solve_many
+from thud.errors import InputError
+from thud.impact import FORCES
+from thud.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import NDArray
+
+    from thud.case import Case
 
     Columns = dict[str, NDArray[Any]]
 
 # By name: unit and meaning of the numbers that each set has.
 SCALARS = {
-    "contact_time": ("s", "contact time"),
-    "peak_force": ("N", "largest elastic force"),
-    "peak_floor_force": ("N", "largest force on the floor"),
-    "max_deflection": ("m", "largest deflection"),
-    "restitution": ("1", "coefficient of restitution"),
-    "impulse": ("N s", "time integral of the force on the floor"),
+    name: (schema.SCALARS[name][0] or "1", schema.SCALARS[name][1]) for name in schema.OUTCOMES
 }
-OCTAVES = len(get_bands().nominal)
-# About the time of one set, s; a block of sets should take about _BLOCK_TIME.
-_SET_TIME = {"modal_ball": 8e-3, "finite_element": 0.25}
-_USUAL_TIME = 1.5e-3
-_ENSEMBLE_TIME = 1.5e-5
+# A block of sets should take about this time, s.
 _BLOCK_TIME = 0.5
-_ENSEMBLE_KEYS = {
-    *(option.name for kind in (Ball, Drop) for option in dataclasses.fields(kind)),
-    "momentum_flux",
-}
 
 
 @dataclass(frozen=True)
@@ -52,7 +35,7 @@ class Block:
     ----------
     start : int
         The first of them.
-    base : Case
+    case : Case
         The case from which they differ.
     columns : dict of str to ndarray, shape (n_set,)
         Their values by the names of keys.
@@ -61,135 +44,62 @@ class Block:
     """
 
     start: int
-    base: Case
+    case: Case
     columns: Columns
     version: str
 
 
-def evaluate(block: Block, threads: int = 1) -> Columns:
+def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
     Parameters
     ----------
     block
         The sets.
-    threads
-        Threads of an ensemble; it gives the same bits with any number of them.
 
     Returns
     -------
-    dict of str to ndarray, shape (n_set,) or (n_set, 5)
-        The `SCALARS`; ``elastic_level`` and ``floor_level`` of each octave, dB, and where the case
-        wants them ``elastic_third_level`` and ``floor_third_level``; ``margin``, the
-        least distance of the judged force's levels to a limit, dB; ``conforms``; ``status``, 0 or
-        the exit code of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
+    dict of str to ndarray, shape (n_set,) or (n_set, n_band)
+        The `SCALARS`; the levels of `level_names`, dB; ``margin``, the minimum distance of the
+        judged force's octave levels to a limit, dB; ``conforms``; ``status``, 0 or the exit code
+        of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
 
     Raises
     ------
     InputError
         Where this is another version of thud.
     """
-    if block.version != thud.__version__:
+    if block.version != version():
         message = (
-            f"thud {thud.__version__} is asked for sets of thud {block.version}; "
+            f"thud {version()} is asked for sets of thud {block.version}; "
             f"allowed: the same version everywhere"
         )
         raise InputError(message)
-    if _suits_ensemble(block.base, block.columns):
-        return _by_ensemble(block.base, block.columns, threads)
-    return _one_by_one(block.base, block.columns)
+    found = solve_many(block.columns, block.case, threads=1)
+    columns: Columns = {name: getattr(found, name) for name in SCALARS}
+    for name, (force, bands) in level_names(block.case).items():
+        columns[name] = found.levels[force, bands]
+    return columns | {
+        "margin": found.margin,
+        "conforms": found.conforms,
+        "status": found.status.astype("int8"),
+        "reason": found.reason,
+    }
 
 
-def _one_by_one(base: Case, columns: Mapping[str, NDArray[Any]]) -> Columns:
-    """Compute sets by the single solver."""
-    size = len(next(iter(columns.values())))
-    found = _empty(size, base)
-    for i in range(size):
-        try:
-            case = put(base, {name: values[i].item() for name, values in columns.items()})
-            impact = solve_case(case)
-            levels = {
-                name: impact.levels(bands=bands, force=force)
-                for name, (force, bands) in level_names(base).items()
-            }
-            verdict = impact.conformity()
-        except ThudError as error:
-            found["status"][i] = error.exit_code
-            found["reason"][i] = str(error)
-            continue
-        for name in SCALARS:
-            found[name][i] = getattr(impact, name)
-        for name, values in levels.items():
-            found[name][i] = values
-        octaves = verdict.criteria[:OCTAVES]
-        found["margin"][i] = min(min(o.value - o.lower, o.upper - o.value) for o in octaves)
-        found["conforms"][i] = verdict.conforms
-    return found
-
-
-def level_names(base: Case) -> dict[str, tuple[str, str]]:
+def level_names(case: Case) -> dict[str, tuple[str, str]]:
     """Return force and bands of the levels that each set has, by their names.
 
-    The octaves serve the verdict also where the case wants thirds only.
+    The octaves serve the verdict also where the case wants others only.
     """
-    names = {f"{force}_level": (force, "octave") for force in FORCES}
-    if base.levels.bands != "octave":
-        names |= {f"{force}_third_level": (force, "third") for force in FORCES}
-    return names
+    octave, *others = BANDWIDTHS
+    wanted = [bands for bands in others if case.levels.bands in {bands, "both"}]
+    names = {f"{force}_level": (force, octave) for force in FORCES}
+    return names | {
+        f"{force}_{bands}_level": (force, bands) for bands in wanted for force in FORCES
+    }
 
 
-def _empty(size: int, base: Case) -> Columns:
-    """Return columns for the results of sets: not a number, not conforming, no error."""
-    found: Columns = {name: np.full(size, np.nan) for name in (*SCALARS, "margin")}
-    for name, (_, bands) in level_names(base).items():
-        found[name] = np.full((size, len(get_bands(bands).nominal)), np.nan)
-    found["conforms"] = np.zeros(size, dtype=bool)
-    found["status"] = np.zeros(size, dtype=np.int8)
-    found["reason"] = np.full(size, "", dtype=object)
-    return found
-
-
-def block_size(base: Case) -> int:
+def block_size(case: Case) -> int:
     """Return how many sets are computed together: the same wherever they are computed."""
-    usual = _ENSEMBLE_TIME if _has_ensemble(base) else _USUAL_TIME
-    return max(1, round(_BLOCK_TIME / _SET_TIME.get(base.model.name, usual)))  # type: ignore[union-attr]
-
-
-def _has_ensemble(base: Case) -> bool:
-    """Return whether the library computes many sets of a case at once."""
-    exact = base.levels.method == Levels.method
-    return isinstance(base.model, HollowSphere) and exact
-
-
-def _suits_ensemble(base: Case, columns: Mapping[str, NDArray[Any]]) -> bool:
-    """Return whether the library computes these sets at once."""
-    return _has_ensemble(base) and set(columns) <= _ENSEMBLE_KEYS
-
-
-def _by_ensemble(base: Case, columns: Columns, threads: int) -> Columns:
-    """Compute sets by the ensemble of the shell model."""
-    shared = vars(base.ball) | vars(base.drop) | vars(base.model)
-    source = base.limits.source
-    names = level_names(base)
-    widest = "third" if "elastic_third_level" in names else "octave"
-    ensemble = thud.solve_many(
-        shared | columns, threads=threads, bands=widest, source=source, **vars(base.sampling)
-    )
-    found = _empty(len(next(iter(columns.values()))), base)
-    for name in SCALARS:
-        found[name][:] = getattr(ensemble, name)
-    judged_by_floor = base.levels.force == "floor"
-    found["conforms"][:] = ensemble.floor_conforms if judged_by_floor else ensemble.conforms
-    for name, (force, bands) in names.items():
-        kind = "octaves" if bands == "octave" else "levels"
-        found[name][:] = getattr(ensemble, f"{force}_{kind}")
-    lower, upper = octave_limits(source)
-    judged = found[f"{base.levels.force}_level"]
-    found["margin"][:] = np.minimum(judged - lower, upper - judged).min(axis=1)
-    # The single solver has the sentences.
-    failed = np.flatnonzero(np.asarray(ensemble.status))
-    if failed.size:
-        again = _one_by_one(base, {name: values[failed] for name, values in columns.items()})
-        for name, values in again.items():
-            found[name][failed] = values
-    return found
+    return max(1, round(_BLOCK_TIME / get_cost(case)))

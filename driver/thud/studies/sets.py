@@ -1,148 +1,155 @@
-"""The sets of a study: designs, and what they mean for the keys of the input."""
+"""Studies of many sets: designs, and what their sets mean for the keys of the input."""
 
 from __future__ import annotations
 
 import math
-import warnings
-from functools import lru_cache
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.checks import require_words
+from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE
+from thud.studies.designs import makers, unit_sets
+from thud.studies.parameter import checked
+from thud.studies.study import Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.studies.study import Study
+    from thud.studies.parameter import Parameter
 
     Columns = dict[str, NDArray[Any]]
 
 
-def shape(study: Study) -> tuple[int, ...]:
-    """Return the number of values of each parameter of a grid, or the one number of all sets."""
-    if study.design == "grid":
-        return tuple(parameter.spread.size for parameter in study.parameters)
-    if study.design == "list":
-        return (study.parameters[0].spread.size,)
-    if study.design == "saltelli":
-        return (study.size * (len(study.parameters) + 2),)
-    return (study.size,)
+@dataclass(frozen=True)
+class Temperature:
+    """How the modulus of elasticity falls with temperature: E (1 + c (T - T_ref)).
 
-
-def count(study: Study) -> int:
-    """Return the number of sets."""
-    return math.prod(shape(study))
-
-
-def parameter_columns(study: Study, start: int, stop: int) -> Columns:
-    """Return the parameters of some sets in their order, in the units of their keys.
-
-    Parameters
+    Attributes
     ----------
-    study
-        The study.
-    start, stop
-        The first set, and the one after the last.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (stop - start,)
-        Values by the names of parameters.
+    reference : float
+        Temperature T_ref at which the modulus is that of the case, degrees Celsius.
+    coefficient : float
+        Relative change c of the modulus, 1/K.
     """
-    if study.design == "grid":
-        places = np.unravel_index(np.arange(start, stop), shape(study))
-        return {p.name: p.spread.grid()[i] for p, i in zip(study.parameters, places, strict=True)}
-    if study.design == "list":
-        return {p.name: p.spread.grid()[start:stop] for p in study.parameters}
-    shares = unit_sets(study.design, len(study.parameters), study.size, study.seed, start, stop)
-    return {p.name: p.spread.quantile(shares[:, i]) for i, p in enumerate(study.parameters)}
+
+    reference: float
+    coefficient: float
 
 
-def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
-    design: str, dimension: int, size: int, seed: int, start: int, stop: int
-) -> NDArray[np.float64]:
-    """Return some points of a design in the unit cube, shape (stop - start, dimension).
+@dataclass(frozen=True)
+class SetStudy(Study):
+    """A study whose sets differ from its case in the values of its parameters.
 
-    Random and Sobol points are made when they are asked for; the other designs are a whole.
-    """
-    if design == "random":
-        generator = np.random.PCG64(seed).advance(start * dimension)
-        return np.random.Generator(generator).random((stop - start, dimension))
-    if design == "sobol":
-        from scipy.stats import qmc  # noqa: PLC0415 - takes its time
-
-        points = qmc.Sobol(dimension, rng=seed)
-        if start:
-            points.fast_forward(start)
-        with warnings.catch_warnings():
-            # The whole is a power of 2; its parts need not be.
-            warnings.simplefilter("ignore", UserWarning)
-            return _float(points.random(stop - start))
-    return _whole(design, dimension, size, seed)[start:stop]
-
-
-@lru_cache(maxsize=1)
-def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    """Return all points of a design."""
-    if design == "latin_hypercube":
-        from scipy.stats import qmc  # noqa: PLC0415 - takes its time
-
-        return _float(qmc.LatinHypercube(dimension, rng=seed).random(size))
-    from SALib.sample import sobol as saltelli  # noqa: PLC0415 - takes its time
-
-    cube = {
-        "num_vars": dimension,
-        "names": list(map(str, range(dimension))),
-        "bounds": [[0.0, 1.0]] * dimension,
-    }
-    return _float(saltelli.sample(cube, size, calc_second_order=False, seed=seed))
-
-
-def _float(points: Any) -> NDArray[np.float64]:  # noqa: ANN401 - of libraries without types
-    """Return points as an array of floats."""
-    return np.asarray(points, dtype=np.float64)
-
-
-def key_columns(study: Study, columns: Columns) -> Columns:
-    """Return what some sets mean for the keys of the input.
-
-    The density gives the mass, and the temperature the modulus of elasticity.
-
-    Parameters
+    Attributes
     ----------
-    study
-        The study.
-    columns
-        What `parameter_columns` gives.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n_set,)
-        Values by the names of keys of the library.
+    design : str
+        ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
+    size, seed : int
+        Number of sets that are drawn (of base samples for ``"saltelli"``), and the seed.
+    temperature : Temperature or None
+        Law of the modulus where the temperature varies.
+    format : str
+        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
     """
-    found = dict(columns)
-    density = found.pop(DENSITY.name, study.density)
-    if density is not None:
-        ball = vars(study.base.ball) | found
-        volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
-        found["mass"] = density * volume * np.ones(len(_first(columns)))
-    temperature = found.pop(TEMPERATURE.name, None)
-    if study.temperature and temperature is not None:
-        law = study.temperature
-        modulus = found.get("youngs_modulus", study.base.ball.youngs_modulus)
-        found["youngs_modulus"] = modulus * (1 + law.coefficient * (temperature - law.reference))
-    return found
+
+    design: str = "grid"
+    size: int = 0
+    seed: int = 0
+    temperature: Temperature | None = None
+    format: str = "auto"
+
+    def own_identity(self) -> dict[str, str]:
+        """Return what the sets depend on besides."""
+        found = makers(self.design) | {"[design] kind": self.design}
+        if self.size:
+            found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
+        if self.temperature:
+            found |= {f"[temperature] {k}": f"{v!r}" for k, v in vars(self.temperature).items()}
+        return found
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each parameter of a grid, or the one number of all sets."""
+        if self.design == "grid":
+            return tuple(parameter.size for parameter in self.parameters)
+        if self.design == "list":
+            return (self.parameters[0].size,)
+        if self.design == "saltelli":
+            return (self.size * (len(self.parameters) + 2),)
+        return (self.size,)
+
+    @property
+    def count(self) -> int:
+        """Number of sets."""
+        return math.prod(self.shape)
+
+    def parameter_columns(self, start: int, stop: int) -> Columns:
+        """Return the parameters of some sets in their order, in the units of their keys.
+
+        Parameters
+        ----------
+        start, stop
+            The first set, and the one after the last.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (stop - start,)
+            Values by the names of parameters.
+        """
+        if self.design == "grid":
+            places = np.unravel_index(np.arange(start, stop), self.shape)
+            return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
+        if self.design == "list":
+            return {p.name: p.grid()[start:stop] for p in self.parameters}
+        shares = unit_sets(self.design, len(self.parameters), self.size, self.seed, start, stop)
+        return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
+
+    def key_columns(self, columns: Columns) -> Columns:
+        """Return what some sets mean for the keys of the input.
+
+        The density gives the mass, and the temperature the modulus of elasticity.
+
+        Parameters
+        ----------
+        columns
+            What `parameter_columns` gives.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (n_set,)
+            Values by the names of keys of the library.
+        """
+        found = dict(columns)
+        density = found.pop(DENSITY.name, self.density)
+        if density is not None:
+            ball = vars(self.case.ball) | found
+            volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
+            found["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
+        temperature = found.pop(TEMPERATURE.name, None)
+        if self.temperature and temperature is not None:
+            law = self.temperature
+            modulus = found.get("youngs_modulus", self.case.ball.youngs_modulus)
+            change = law.coefficient * (temperature - law.reference)
+            found["youngs_modulus"] = modulus * (1 + change)
+        return found
 
 
-def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 - or arrays
-    """Return the volume of the wall of a ball, m3, from its measures, m."""
-    inner = outer_radius - wall_thickness
-    # Products of absurd radii are infinite, where their powers are errors of Python.
-    outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
-    return 4 / 3 * np.pi * (outer_cube - inner_cube)
-
-
-def _first(columns: Columns) -> NDArray[Any]:
-    """Return one of the columns."""
-    return next(iter(columns.values()))
+def read_temperature(given: object, parameters: tuple[Parameter, ...]) -> Temperature | None:
+    """Return the law of the modulus in the table ``[temperature]``."""
+    varies = any(parameter.key == TEMPERATURE for parameter in parameters)
+    if varies != (given is not None):
+        message = (
+            "temperature needs both a parameter and the table [temperature]; "
+            "allowed: reference, degC, and coefficient, 1/K, in [temperature]"
+        )
+        raise InputError(message)
+    if not isinstance(given, Mapping):
+        return None
+    words = ("reference", "coefficient")
+    require_words("[temperature]", given, words)
+    numbers = (checked(f"[temperature] {w}", TEMPERATURE, given.get(w), 0) for w in words)
+    return Temperature(*map(float, numbers))

@@ -1,49 +1,39 @@
-"""Studies: what varies around which case, read from TOML."""
+"""Studies: which case, what varies or is fitted, read from TOML."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-import thud
-from thud.case import Case, read_case
+from thud._api import version
+from thud._schema import MODELS
+from thud.case import Case, check_case, new_model, read_case
 from thud.checks import require_kind, require_words, shown
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
-from thud.models import MODELS, FiniteElement, new_model
-from thud.studies.designs import makers, read_design
-from thud.studies.parameters import Parameter, checked, new_parameter, within
-from thud.units import power_of
+from thud.studies.parameter import Parameter, checked, quantity
 
-# What `read_study` reads.
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+# What studies are read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
 
-FORMATS = ("auto", "netcdf", "zarr")
-_WORDS = ("name", "case", "format", "fixed", "design", "temperature", "parameters")
-
-
-@dataclass(frozen=True)
-class Temperature:
-    """How the modulus of elasticity falls with temperature: E (1 + c (T - T_ref)).
-
-    Attributes
-    ----------
-    reference : float
-        Temperature T_ref at which the modulus is that of the case, degrees Celsius.
-    coefficient : float
-        Relative change c of the modulus, 1/K.
-    """
-
-    reference: float
-    coefficient: float
+# What every study may hold.
+WORDS = ("name", "case", "fixed", "parameters")
+# Texts longer than this are told by their beginning where results are compared.
+_LONG = 300
+# Where spreads are tried for whether a case with fixed values can be valid.
+_SHARES = np.array([0.01, 0.5, 0.99])
+_NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 
 @dataclass(frozen=True)
@@ -55,82 +45,86 @@ class Study:
     name : str
         Name of the study, also of its files.
     kind : str
-        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
-    base : Case
-        The case from which sets differ.
+        Kind of study, see `thud.studies.kinds.KINDS`.
+    case : Case
+        Everything that neither varies nor is fitted.
     parameters : tuple of Parameter
-        What varies.
-    design : str
-        ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
-    size, seed : int
-        Number of sets that are drawn (of base samples for ``"saltelli"``), and the seed.
+        What varies or is fitted, in the units of the keys.
     density : float or None
-        Density of the wall where it is given instead of the mass, kg/m3.
-    temperature : Temperature or None
-        Law of the modulus where the temperature varies.
-    format : str
-        ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
+        Density of the wall where it is fixed instead of the mass, kg/m3.
     text : str
         The text of the study.
     """
 
     name: str
     kind: str
-    base: Case
+    case: Case
     parameters: tuple[Parameter, ...]
-    design: str
-    size: int = 0
-    seed: int = 0
     density: float | None = None
-    temperature: Temperature | None = None
-    format: str = "auto"
     text: str = field(default="", compare=False, repr=False)
 
     @property
     def model(self) -> str:
         """Name of the source model."""
-        return self.base.model.name  # type: ignore[union-attr]
+        return self.case.model.name  # type: ignore[union-attr]
 
     @property
-    def fingerprint(self) -> str:
-        """What tells studies with other results apart; comments and formats do not count."""
-        versions = {"thud_version": thud.__version__, **makers(self.design)}
-        return hashlib.sha256(f"{versions} {replace(self, format='')}".encode()).hexdigest()
+    def identity(self) -> dict[str, str]:
+        """What its results depend on, as texts by place and key."""
+        found = {"thud": version(), "kind": self.kind, **self.own_identity()}
+        found["[parameters]"] = ", ".join(p.name for p in self.parameters)
+        found |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
+        if self.density is not None:
+            found["[fixed] density"] = f"{self.density!r} kg/m3"
+        for group, keys in self.case.to_namelist().items():
+            found |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
+        return {key: _shortened(value) for key, value in found.items()}
+
+    def own_identity(self) -> dict[str, str]:
+        """Return what the results of this kind depend on besides."""
+        return {}
 
 
-def read_study(source: Source, kind: str = "sweep") -> Study:
-    """Read a study.
+def _shortened(text: str) -> str:
+    """Return a text, or the beginning of a long one with a number that tells it from others."""
+    if len(text) <= _LONG:
+        return text
+    import hashlib  # noqa: PLC0415 - seldom needed
+
+    return f"{text[:_LONG]}... ({hashlib.sha256(text.encode()).hexdigest()[:16]})"
+
+
+def read_content(
+    source: str | os.PathLike[str] | Mapping[str, Any],
+    read: Callable[[dict[str, Any], Path, str, str], Any],
+) -> Any:  # noqa: ANN401 - what the reader makes of it
+    """Read the tables of a study.
 
     Parameters
     ----------
     source
         Path of a TOML file, or what would stand in it.
-    kind
-        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
+    read
+        Takes the tables, the folder from which files are named, a name and the text.
 
     Returns
     -------
-    Study
-        The study.
+    object
+        What `read` returns.
 
     Raises
     ------
     InputError
-        Names file, table, key and what is allowed.
+        With the name of the file.
     """
-    if isinstance(source, Study):
-        if source.kind != kind:
-            message = f"{source.name} is a {source.kind} study; allowed: a {kind} study"
-            raise InputError(message)
-        return source
     if isinstance(source, Mapping):
         text = _text(source)
-        return _new_study(json.loads(text), kind, Path(), "python", text)
+        return read(json.loads(text), Path(), "python", text)
     require_kind("study", source, str | Path)
     path = Path(source)
     try:
-        content = path.read_text(encoding="utf-8")
-        return _new_study(tomllib.loads(content), kind, path.parent, path.stem, content)
+        text = path.read_text(encoding="utf-8")
+        return read(tomllib.loads(text), path.parent, path.stem, text)
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
@@ -150,6 +144,8 @@ def _text(source: Mapping[str, Any]) -> str:
 
 def _plain(value: object) -> object:
     """Return tables, paths, and numbers and arrays of NumPy as what JSON knows."""
+    if isinstance(value, Parameter):
+        return value.given
     if isinstance(value, Mapping):
         return dict(value)
     if isinstance(value, np.generic | np.ndarray):
@@ -160,14 +156,36 @@ def _plain(value: object) -> object:
     raise TypeError(message)
 
 
-def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: str) -> Study:
-    """Return the study that a table describes."""
-    require_words("the study", given, _WORDS)
-    for table in ("fixed", "design", "temperature", "parameters"):
-        if not isinstance(given.get(table, {}), dict):
-            message = f"{table} = {given[table]!r} is not allowed; allowed: a table [{table}]"
-            raise InputError(message)
-    name = given.get("name", name)
+def read_common(
+    given: dict[str, Any],
+    folder: Path,
+    kind: str,
+    words: Iterable[str],
+    new_parameter: Callable[[str, object, Case, Value | None], Parameter],
+) -> Study:
+    """Read what every study has.
+
+    Parameters
+    ----------
+    given
+        The tables of the study; ``name`` is given.
+    folder
+        Where its files are named from.
+    kind
+        Its kind.
+    words
+        What this kind may hold besides `WORDS`.
+    new_parameter
+        Makes a parameter of its name, table, case and value there.
+
+    Raises
+    ------
+    InputError
+        Names table, key, value and what is allowed.
+    """
+    require_words("the study", given, (*WORDS, *words))
+    fixed, parameters = (table_of(given, name) for name in ("fixed", "parameters"))
+    name = given["name"]
     if (
         not isinstance(name, str)
         or not name.strip()
@@ -177,29 +195,35 @@ def _new_study(given: dict[str, Any], kind: str, folder: Path, name: str, text: 
     ):
         message = f"name = {name!r} is not allowed; allowed: the name of a file, without folders"
         raise InputError(message)
-    written = given.get("format", FORMATS[0])
-    if written not in FORMATS:
-        message = f"format = {written!r} is not known; allowed: {', '.join(FORMATS)}"
+    case, density = _fix(_case(given.get("case"), folder, fixed), fixed)
+    if not parameters:
+        message = "[parameters] is empty; allowed: one parameter or more"
         raise InputError(message)
-    fixed = given.get("fixed", {})
-    base, density = _fix(_base_case(given, folder), fixed)
-    parameters = _parameters(given.get("parameters", {}), base, density)
-    _require_use(fixed, given["parameters"])
-    temperature = _temperature(given.get("temperature"), parameters)
-    design, size, seed = read_design(given.get("design", {}), kind, parameters)
-    return Study(
-        name, kind, base, parameters, design, size, seed, density, temperature, written, text
+    found = tuple(
+        new_parameter(name, entry, case, density if name == DENSITY.name else value_in(case, name))
+        for name, entry in parameters.items()
     )
+    _require_use(fixed, parameters)
+    _require_valid(case, fixed, found, density)
+    return Study(name, kind, case, found, density)
 
 
-def _base_case(given: Mapping[str, Any], folder: Path) -> Case:
-    """Return the case from which sets differ: of a file, or the default, with its model."""
-    path = given.get("case")
+def table_of(given: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """Return a table of a study, empty where it is missing."""
+    table = given.get(name, {})
+    if not isinstance(table, dict):
+        message = f"{name} = {shown(table)} is not allowed; allowed: a table [{name}]"
+        raise InputError(message)
+    return table
+
+
+def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
+    """Return the case of a file, or the default, with its model."""
     if path is not None and not isinstance(path, str):
         message = f"case = {path!r} is not allowed; allowed: the path of a namelist file"
         raise InputError(message)
     case = Case() if path is None else read_case(folder / path)
-    model = given.get("fixed", {}).get("model")
+    model = fixed.get("model")
     if model is not None and not isinstance(model, str):
         message = f"[fixed] model = {shown(model)} is not allowed; allowed: {', '.join(MODELS)}"
         raise InputError(message)
@@ -208,9 +232,7 @@ def _base_case(given: Mapping[str, Any], folder: Path) -> Case:
     if case.model is None:
         message = f"case = {path!r} has no source model; allowed: a case with one"
         raise InputError(message)
-    if isinstance(case.model, FiniteElement):
-        case = replace(case, model=replace(case.model, snapshot_interval=0.0))
-    return replace(case, modes=None)
+    return case
 
 
 def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
@@ -224,21 +246,18 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
         if key == TEMPERATURE:
             message = f"{place} is not allowed; allowed: temperature in [parameters]"
             raise InputError(message)
-        given = entry if isinstance(entry, dict) else {"value": entry}
-        require_words(place, given, ("value", "unit"))
-        power = power_of(given.get("unit", key.unit or "1"), key.unit, place)
-        value = given.get("value")
+        value = quantity(place, entry, key.unit)
         if key.kind == "list" and place_in_list is None:
             entries = value if isinstance(value, list) else [value]
-            values[name] = tuple(within(place, key, item, power) for item in entries)
+            values[name] = tuple(checked(place, key, item, 0) for item in entries)
         else:
-            values[name] = within(place, key, value, power)
+            values[name] = checked(place, key, value, 0)
     density = values.pop(DENSITY.name, None)
     return put(case, values), density  # type: ignore[return-value]
 
 
 def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
-    """Complain about keys that others overrule."""
+    """Raise InputError where one key overrules another."""
     if {"mass", DENSITY.name} <= {*fixed, *parameters}:
         message = "mass and density are both given; allowed: one of them"
         raise InputError(message)
@@ -252,48 +271,52 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
             raise InputError(message)
 
 
-def _parameters(
-    given: Mapping[str, Any], base: Case, density: float | None
-) -> tuple[Parameter, ...]:
-    """Return what varies."""
-    if not given:
-        message = "[parameters] is empty; allowed: one parameter or more"
+def _require_valid(
+    case: Case,
+    fixed: Mapping[str, Any],
+    parameters: tuple[Parameter, ...],
+    density: float | None,
+) -> None:
+    """Raise InputError where the library refuses a fixed value, whatever the parameters are."""
+    keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if density else set())
+    trials = [p.trials(_SHARES) for p in parameters if p.key not in {DENSITY, TEMPERATURE}]
+    names = [p.name for p in parameters if p.key not in {DENSITY, TEMPERATURE}]
+    refusals = []
+    for i in range(len(_SHARES)):
+        values = {name: trial[i] for name, trial in zip(names, trials, strict=True) if trial}
+        try:
+            tried = put(case, values)
+            if density is not None:
+                tried = with_density(tried, density)
+            check_case(replace(tried, modes=None))
+        except InputError as error:
+            refusals.append(str(error))
+    named = [_NAMED_KEY.match(refusal) for refusal in refusals]
+    if len(named) == len(_SHARES) and all(found and found[1] in keys for found in named):
+        message = f"[fixed]: {refusals[0]}"
         raise InputError(message)
-    if "bands" in given:
-        message = "[parameters] bands is not allowed; allowed: bands in [fixed], alike for all sets"
-        raise InputError(message)
-    model = base.model.name  # type: ignore[union-attr]
-    return tuple(
-        new_parameter(
-            name, spread, model, density if name == DENSITY.name else value_in(base, name)
-        )
-        for name, spread in given.items()
-    )
 
 
-def value_in(base: Case, name: str) -> Value | None:
+def with_density(case: Case, density: float) -> Case:
+    """Return a case whose mass is that of a wall of a density, kg/m3."""
+    volume = wall_volume(case.ball.outer_radius, case.ball.wall_thickness)
+    return replace(case, ball=replace(case.ball, mass=density * volume))
+
+
+def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 - or arrays
+    """Return the volume of the wall of a ball, m3, from its measures, m."""
+    inner = outer_radius - wall_thickness
+    # Products of absurd radii are infinite, where their powers are errors of Python.
+    outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
+    return 4 / 3 * np.pi * (outer_cube - inner_cube)
+
+
+def value_in(case: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None where it has none, or a list of them."""
-    groups = (base.ball, base.drop, base.sampling, base.levels, base.limits, base.model)
+    groups = (case.ball, case.drop, case.sampling, case.levels, case.limits, case.model)
     key, _, entry = name.partition("(")
     values = (getattr(group, key, None) for group in groups)
     found = next((value for value in values if value is not None), None)
     if isinstance(found, tuple) and entry:
         found = next(iter(found[int(entry.rstrip(")")) - 1 :]), None)
     return found if isinstance(found, Value) else None
-
-
-def _temperature(given: Mapping[str, Any] | None, parameters: tuple[Parameter, ...]) -> Any:  # noqa: ANN401
-    """Return the law of the modulus."""
-    varies = any(parameter.key == TEMPERATURE for parameter in parameters)
-    if varies != (given is not None):
-        message = (
-            "temperature needs both a parameter and the table [temperature]; "
-            "allowed: reference, degC, and coefficient, 1/K, in [temperature]"
-        )
-        raise InputError(message)
-    if given is None:
-        return None
-    words = ("reference", "coefficient")
-    require_words("[temperature]", given, words)
-    numbers = (checked(f"[temperature] {w}", TEMPERATURE, given.get(w), 0) for w in words)
-    return Temperature(*map(float, numbers))

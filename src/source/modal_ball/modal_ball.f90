@@ -11,7 +11,7 @@ module thud_modal_ball
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: force_history_type, new_force_history
+   use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
    use thud_kinds, only: wp
    use thud_lapack, only: dgemv
    use thud_legendre, only: get_legendre
@@ -19,7 +19,7 @@ module thud_modal_ball
    use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_sphere_basis, only: basis_type, new_basis
+   use thud_sphere_modes, only: basis_type, new_basis
    use thud_sphere_modes, only: family_type, get_family, get_static_family
    use thud_text, only: to_text
    implicit none (type, external)
@@ -329,6 +329,7 @@ contains
       history%floor_force = history%part(:, 1)
       history%peak_force = maxval(history%floor_force)
       history%peak_floor_force = history%peak_force
+      call continue_to_zero(history)
       history%restitution = state%speed/history%impact_velocity
       associate (momentum => mass*(history%impact_velocity + state%speed), initial => mass/2*history%impact_velocity**2)
          history%impulse_residual = abs(history%impulse - momentum)/momentum

@@ -11,16 +11,20 @@ from scipy.special import ndtri
 
 from thud.errors import InputError
 from thud.levels import get_bands, octave_limits
-from thud.studies.run import sweep
-from thud.studies.study import read_study
+from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:
     import os
 
     import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.studies.run import How
+    from thud.case import Case
+    from thud.keys import Value
+    from thud.studies.kind import How
+    from thud.studies.parameter import Parameter
+    from thud.studies.sets import SetStudy
     from thud.studies.study import Source
 
 CONFIDENCE = 0.95
@@ -106,6 +110,53 @@ def wilson_interval(hits: int, trials: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
+class UncertaintyKind(SetKind[Uncertainty]):
+    """Uncertainty as a kind of study."""
+
+    name = "uncertainty"
+    designs = ("random",)
+
+    def new_parameter(
+        self, name: str, given: object, case: Case, centre: Value | None
+    ) -> Parameter:
+        """Return a parameter that varies, but for what is alike for all sets."""
+        if name in {"source", "force"}:
+            message = (
+                f"[parameters] {name} is not allowed, because all levels are held "
+                f"against the same limits; allowed: {name} in [fixed]"
+            )
+            raise InputError(message)
+        return super().new_parameter(name, given, case, centre)
+
+    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> Uncertainty:
+        """Return the distribution over all sets."""
+        dataset = dataset.load()
+        good = dataset["status"].values == 0
+        if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
+            reasons = [text for text in dataset["reason"].values if text]
+            message = f"only {good.sum()} of {study.size} sets have results"
+            message += f" ({reasons[0]})" if reasons else ""
+            message += "; allowed: two or more"
+            raise InputError(message)
+        return Uncertainty(
+            dataset,
+            dataset[f"{study.case.levels.force}_level"].values[good],
+            study.case.limits.source,
+            int(dataset["conforms"].values[good].sum()),
+            int(good.sum()),
+            int((~good).sum()),
+        )
+
+    def draw(self, result: Uncertainty) -> Figure:
+        """Return the distribution of the levels."""
+        from thud.plot import draw_uncertainty  # noqa: PLC0415 - takes its time
+
+        return draw_uncertainty(result)
+
+
+KIND = UncertaintyKind()
+
+
 def uncertainty(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
 ) -> Uncertainty:
@@ -121,34 +172,11 @@ def uncertainty(
     Returns
     -------
     Uncertainty
-        Levels of the force that the base case judges, and the probability of conformity.
+        Levels of the force that the case judges, and the probability of conformity.
 
     Raises
     ------
     InputError
         As `sweep`; also where fewer than two sets have results.
     """
-    plan = read_study(study, "uncertainty")
-    for parameter in plan.parameters:
-        if parameter.name in {"source", "force"}:
-            message = (
-                f"[parameters] {parameter.name} is not allowed, because all levels are held "
-                f"against the same limits; allowed: {parameter.name} in [fixed]"
-            )
-            raise InputError(message)
-    dataset = sweep(plan, output, **how).load()
-    good = dataset["status"].values == 0
-    if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
-        reasons = [text for text in dataset["reason"].values if text]
-        message = f"only {good.sum()} of {plan.size} sets have results"
-        message += f" ({reasons[0]})" if reasons else ""
-        message += "; allowed: two or more"
-        raise InputError(message)
-    return Uncertainty(
-        dataset,
-        dataset[f"{plan.base.levels.force}_level"].values[good],
-        plan.base.limits.source,
-        int(dataset["conforms"].values[good].sum()),
-        int(good.sum()),
-        int((~good).sum()),
-    )
+    return KIND.run(study, output, **how)

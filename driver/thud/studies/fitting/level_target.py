@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.errors import InputError
-from thud.fitting.misfit import numbers, require_choice, require_positive
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
-from thud.models import FiniteElement, ModalBall
+from thud.studies.fitting.misfit import numbers, require_choice, require_positive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,7 +30,7 @@ class LevelTarget:
     levels : sequence of float, shape (n_band,)
         Force exposure levels, dB.
     uncertainty : float or sequence of float or None
-        Standard deviations of the levels, dB; None: one for all, told from the residual.
+        Standard deviations of the levels, dB; None: one for all, estimated from the residual.
     bands : str
         ``"octave"`` or ``"third"``.
     frequencies : sequence of float or None
@@ -108,7 +107,7 @@ class LevelMisfit:
     def values(self, impact: Impact) -> NDArray[np.float64]:
         """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
         levels = impact.levels(self.bands, force=self.kind)[self.places]
-        known = {"contact_time": release(impact), "restitution": impact.restitution}
+        known = {"contact_time": impact.exact_contact_time, "restitution": impact.restitution}
         return np.concatenate([levels, [known[name] for name in self.extra]])
 
     def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:  # noqa: ARG002
@@ -143,18 +142,3 @@ class LevelMisfit:
     def doubt(self, impact: Impact, shift: float, count: int) -> str:  # noqa: ARG002
         """Return nothing: levels do not tell where noise ends and the model's error begins."""
         return ""
-
-
-def release(impact: Impact) -> float:
-    """Return the contact time between samples, s: some models tell it in whole ones only.
-
-    Their force is continued to zero in a straight line from the last two samples of the contact.
-    """
-    model = impact.case.model
-    if not isinstance(model, ModalBall | FiniteElement):
-        return impact.contact_time
-    last = int(np.flatnonzero(impact.floor_force)[-1])
-    before, end = impact.floor_force[last - 1 : last + 1]
-    part = min(1.0, end / (before - end)) if before > end else 1.0
-    touch = model.flight_before if isinstance(model, FiniteElement) else 0.0
-    return float((last + part) / impact.sample_rate - touch)

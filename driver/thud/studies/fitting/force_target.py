@@ -11,9 +11,9 @@ from scipy.signal import ZoomFFT
 
 from thud.checks import shown
 from thud.errors import InputError
-from thud.fitting.misfit import require_choice, require_positive
 from thud.impact import FORCES, Impact
 from thud.recording import MIN_ROWS, Recording
+from thud.studies.fitting.misfit import require_choice, require_positive
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 BELOW = 1250.0
 # Part of that frequency that rounded times leave open.
 SAME = 1e-5
-# A record must hold the whole pulse: mean of its last millisecond over its largest value.
+# A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
 # A doubt needs this many independent values during contact and otherwise, this probability of
-# Fisher's F, and a residual above this part of the largest force: less comes from sampling.
+# Fisher's F, and a residual above this part of the peak force: less comes from sampling.
 MIN_FREEDOM = 5
 SURE = 0.999
 NUMERICAL = 1e-4
@@ -46,7 +46,7 @@ class ForceTarget:
     record : Recording, Impact or pair of array_like
         The force; of arrays: time, s, and force, N, both of shape (n_sample,).
     noise : float or None
-        Standard deviation of the noise of one sample, N; None: it is told from the residual.
+        Standard deviation of the noise of one sample, N; None: it is estimated from the residual.
     force : str
         ``"floor"`` (what a force plate measures) or ``"elastic"``: the force of the model, and
         of an impact as target.
@@ -84,7 +84,7 @@ class ForceTarget:
         last = force[time > time[-1] - END].mean()
         if last > OPEN_END * force.max():
             message = (
-                f"target: the force ends with {last / force.max():.0%} of its largest value; "
+                f"target: the force ends with {last / force.max():.0%} of its peak; "
                 "allowed: a record of a whole impact"
             )
             raise InputError(message)

@@ -1,31 +1,38 @@
-"""The answer of a fit in numbers."""
+"""The result of a fit: numbers, table, figures and files."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud._api import version
-from thud.fitting.inference import coverage_factor
+from thud.case import case_text
+from thud.checks import refuse_old_words
+from thud.studies.directory import save
+from thud.studies.fitting.inference import coverage_factor
 from thud.tables import format_rows
 from thud.units import handy_unit
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Mapping
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.case import Case
-    from thud.fitting.misfit import Misfit
     from thud.impact import Impact
+    from thud.studies.fitting.misfit import Misfit
 
 SHIFT = "time_shift"
 
 
 @dataclass(frozen=True, eq=False)
-class Estimates:
+class Fit:
     """Parameters of a model that fit a target best, and how well they are known; SI units.
 
     Attributes
@@ -37,16 +44,16 @@ class Estimates:
     estimate : ndarray, shape (n,)
         Their values.
     covariance : ndarray, shape (n, n)
-        Their covariance; infinite variances where the data do not tell them apart.
+        Their covariance; infinite variances where they are not identifiable.
     limits : ndarray, shape (n, 2)
-        Lower and upper limit of the search for each; infinite where there is none.
+        Low and high limit of the search for each; infinite where there is none.
     singular_values : ndarray, shape (n,)
         Singular values of the Jacobian with columns of unit length, the largest first.
-    level : float
+    confidence : float
         Confidence of the intervals in tables and files.
     noise : float
-        Standard deviation of one residual: given, or told from the residuals; N for forces, for
-        levels in units of their uncertainties, or dB where none were given.
+        Standard deviation of one residual, given or estimated: N for forces, for levels in units of
+        their uncertainties, or dB where none were given.
     known_noise : bool
         The standard deviation was given.
     residuals : ndarray, shape (n_residual,)
@@ -54,11 +61,11 @@ class Estimates:
     evaluations, failures : int
         Impacts that were computed, and that could not be.
     converged : bool
-        The search came to an end by itself.
+        The search has converged.
     warnings : tuple of str
-        What the data do not tell, parameters at their limits, and other doubts, as sentences.
+        Parameters that are not identifiable or at their limits, and other doubts, as sentences.
     case : Case
-        The base case with the fitted values.
+        The case with the fitted values.
     impact : Impact
         Its impact.
     misfit : Misfit
@@ -71,7 +78,7 @@ class Estimates:
     covariance: NDArray[np.float64]
     limits: NDArray[np.float64]
     singular_values: NDArray[np.float64]
-    level: float
+    confidence: float
     noise: float
     known_noise: bool
     residuals: NDArray[np.float64]
@@ -109,7 +116,7 @@ class Estimates:
 
     @property
     def reduced_chi_square(self) -> float:
-        """Squared residuals over degrees of freedom; 1 where they tell the noise."""
+        """Squared residuals over degrees of freedom; 1 where the noise is estimated."""
         freedom = self.degrees_of_freedom
         return float(self.residuals @ self.residuals / freedom) if freedom else float("nan")
 
@@ -118,20 +125,21 @@ class Estimates:
         """Time of first touch in the record, s."""
         return self.values.get(SHIFT, 0.0)
 
-    def intervals(self, level: float | None = None) -> dict[str, tuple[float, float]]:
-        """Return confidence intervals by name, Student's t where the residuals tell the noise.
+    @refuse_old_words
+    def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
+        """Return confidence intervals by name, Student's t where the noise is estimated.
 
         They end at the limits of the search: values beyond were ruled out beforehand.
 
         Parameters
         ----------
-        level
-            Confidence; by default that of the fit.
+        confidence
+            By default that of the fit.
         """
-        factor = self._coverage_factor(level)
+        factor = self._coverage_factor(confidence)
         return {
-            name: (max(value - factor * error, lower), min(value + factor * error, upper))
-            for (name, value), error, (lower, upper) in zip(
+            name: (max(value - factor * error, low), min(value + factor * error, high))
+            for (name, value), error, (low, high) in zip(
                 self.values.items(),
                 self.standard_errors.values(),
                 self.limits.tolist(),
@@ -139,10 +147,10 @@ class Estimates:
             )
         }
 
-    def _coverage_factor(self, level: float | None = None) -> float:
+    def _coverage_factor(self, confidence: float | None = None) -> float:
         """Return how many standard errors an interval reaches."""
         freedom = None if self.known_noise else self.degrees_of_freedom
-        return coverage_factor(self.level if level is None else level, freedom)
+        return coverage_factor(self.confidence if confidence is None else confidence, freedom)
 
     def table(self, units: Mapping[str, tuple[str, float]] | None = None) -> str:
         """Return the fit as text.
@@ -152,13 +160,13 @@ class Estimates:
         units
             Other units by parameter: name, and how many SI units it is.
         """
-        rows = [("parameter", "value", "standard error", f"{self.level:.0%} interval", "unit")]
+        rows = [("parameter", "value", "standard error", f"{self.confidence:.0%} interval", "unit")]
         intervals = self.intervals()
         for name, (shown, factor) in self.shown_units(units).items():
             value, error = self.values[name] / factor, self.standard_errors[name] / factor
-            lower, upper = (end / factor for end in intervals[name])
+            low, high = (end / factor for end in intervals[name])
             digits = _digits(value, error)
-            interval = f"{lower:.{digits}g} to {upper:.{digits}g}"
+            interval = f"{low:.{digits}g} to {high:.{digits}g}"
             if not np.isfinite(error):
                 interval = "not known"
             rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
@@ -176,7 +184,7 @@ class Estimates:
 
     def _remarks(self) -> list[str]:
         """Return the quality of the fit, one sentence per line."""
-        kind = "given" if self.known_noise else "told from the residuals"
+        kind = "given" if self.known_noise else "estimated from the residuals"
         unit = self.misfit.deviation_unit
         # Those that are given with levels may differ from one to the next.
         several = self.known_noise and unit == "dB"
@@ -211,7 +219,7 @@ class Estimates:
                 }
                 for name, unit in zip(self.names, self.units, strict=True)
             },
-            "level": self.level,
+            "confidence": self.confidence,
             "covariance": [[_finite(entry) for entry in row] for row in self.covariance],
             "correlation": [[_finite(entry) for entry in row] for row in self.correlation],
             "singular_values": self.singular_values.tolist(),
@@ -225,6 +233,63 @@ class Estimates:
             "converged": self.converged,
             "warnings": list(self.warnings),
         }
+
+    def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
+        """Return the figures by name; `units` as in `table`."""
+        from thud.plot import draw_fit  # noqa: PLC0415 - matplotlib takes its time
+
+        return draw_fit(self, self.shown_units(units))
+
+    def files(self, **extra: object) -> dict[str, bytes]:
+        """Return the content of ``fit.json``, ``fit.csv`` and ``fitted.nml``.
+
+        Parameters
+        ----------
+        **extra
+            What ``fit.json`` is to hold besides.
+        """
+        content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
+        columns = self.misfit.columns(self.impact, self.time_shift)
+        rows = [columns, *zip(*columns.values(), strict=True)]
+        return {
+            "fit.json": f"{content}\n".encode(),
+            "fit.csv": "".join(f"{','.join(map(str, row))}\n" for row in rows).encode(),
+            "fitted.nml": case_text(self.case),
+        }
+
+    def save(
+        self,
+        directory: str | os.PathLike[str],
+        units: Mapping[str, tuple[str, float]] | None = None,
+        *,
+        figures: bool = True,
+    ) -> list[Path]:
+        """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
+
+        Older files of these names are replaced.
+
+        Parameters
+        ----------
+        directory
+            Where they are written.
+        units
+            Other units of the figures by parameter, as in `table`; files have SI units.
+        figures
+            Draw the figures too.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        OSError
+            Where a file cannot be written.
+        """
+        folder = Path(directory)
+        folder.mkdir(parents=True, exist_ok=True)
+        return save(folder, self.files(), self.figures(units) if figures else {})
 
 
 def _digits(value: float, error: float) -> int:

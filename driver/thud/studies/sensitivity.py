@@ -12,15 +12,16 @@ from thud.errors import InputError
 from thud.levels import get_bands
 from thud.studies.dataset import coordinate
 from thud.studies.designs import MIN_SAMPLES
-from thud.studies.run import sweep
-from thud.studies.study import read_study
+from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:
     import os
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.studies.run import How
+    from thud.studies.kind import How
+    from thud.studies.sets import SetStudy
     from thud.studies.study import Source
 
 INDICES = {
@@ -72,6 +73,34 @@ class Sensitivity:
         return "\n".join((*lines, "")).encode()
 
 
+class SensitivityKind(SetKind[Sensitivity]):
+    """Sensitivity as a kind of study."""
+
+    name = "sensitivity"
+    designs = ("saltelli",)
+
+    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
+        """Return the Sobol indices of all sets."""
+        return _indices(study, dataset.load())
+
+    def other_files(self, study: SetStudy) -> list[str]:
+        """Return the names of figures and table."""
+        return [*super().other_files(study), f"{study.name}_indices.csv"]
+
+    def files(self, result: Sensitivity, study: SetStudy) -> dict[str, bytes]:
+        """Return the table of all indices."""
+        return {f"{study.name}_indices.csv": result.csv()}
+
+    def draw(self, result: Sensitivity) -> Figure:
+        """Return the indices as bars."""
+        from thud.plot import draw_sensitivity  # noqa: PLC0415 - takes its time
+
+        return draw_sensitivity(result)
+
+
+KIND = SensitivityKind()
+
+
 def sensitivity(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
 ) -> Sensitivity:
@@ -88,42 +117,44 @@ def sensitivity(
     Returns
     -------
     Sensitivity
-        Indices of the force that the base case judges, with confidence intervals.
+        Indices of the force that the case judges, with confidence intervals.
 
     Raises
     ------
     InputError
         As `sweep`; also where too few sets have results.
     """
-    plan = read_study(study, "sensitivity")
-    dataset = sweep(plan, output, **how).load()
-    force = plan.base.levels.force
+    return KIND.run(study, output, **how)
+
+
+def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
+    """Return the Sobol indices of the sets of a study."""
+    force = study.case.levels.force
     levels = dataset[f"{force}_level"].values
     peak = "peak_force" if force == "elastic" else "peak_floor_force"
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)} | {
         name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)
     }
-    dimension = len(plan.parameters)
+    dimension = len(study.parameters)
     usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_SAMPLES:
         reason = next(text for text in dataset["reason"].values if text)
-        message = f"only {usable.sum()} of {plan.size} base samples have results ({reason})"
+        message = f"only {usable.sum()} of {study.size} base samples have results ({reason})"
         message += "; allowed: ranges in which sets have some"
         raise InputError(message)
     rows = np.repeat(usable, dimension + 2)
-    found = [sobol_indices(values[rows], dimension, plan.seed) for values in outputs.values()]
+    found = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]
     variables = {
-        name: (("output", "parameter"), np.stack([one[i] for one in found]), _about(meaning))
+        name: (
+            ("output", "parameter"),
+            np.stack([one[i] for one in found]),
+            {"units": "1", "long_name": meaning},
+        )
         for i, (name, meaning) in enumerate(INDICES.items())
     }
-    names = {"output": list(outputs), "parameter": list(map(coordinate, plan.parameters))}
+    names = {"output": list(outputs), "parameter": list(map(coordinate, study.parameters))}
     left_out = int((~usable).sum())
     return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)
-
-
-def _about(meaning: str) -> dict[str, str]:
-    """Return the attributes of an index."""
-    return {"units": "1", "long_name": meaning}
 
 
 def sobol_indices(

@@ -1,114 +1,79 @@
-"""Files of a study: finished blocks while it runs, one file or Zarr group at its end."""
+"""Files of sets: finished blocks while a study runs, one file or Zarr group at its end."""
 
 from __future__ import annotations
 
-import os
+import json
 import shutil
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.checks import lock, replace_file, require_own, uninterrupted
 from thud.errors import InputError
-from thud.studies import sets
+from thud.files import replace_file, uninterrupted
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterator
 
     from thud.studies.evaluation import Block
-    from thud.studies.sets import Columns
-    from thud.studies.study import Study
+    from thud.studies.sets import Columns, SetStudy
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
+# The file beside the blocks that says what they belong to.
+MARK = "study"
 
 
-class Store:
-    """The directory of a study: a context, in which no other process computes it.
+class Blocks:
+    """The finished blocks of a study in its directory, and what becomes of them at its end.
 
     Parameters
     ----------
     folder
-        The directory; it is made where there is none.
+        The directory, taken for the study.
     study
-        The study that it belongs to.
+        The study.
     size
         Sets in a block.
-
-    Raises
-    ------
-    InputError
-        Where what lies there belongs to another study.
-    OSError
-        Where nothing can be written there.
     """
 
-    def __init__(self, folder: str | os.PathLike[str], study: Study, size: int) -> None:
+    def __init__(self, folder: Path, study: SetStudy, size: int) -> None:
         self._study = study
-        self._size = size
-        self._descriptor: int | None = None
-        large = disk_space(study) > LARGE
-        ending = "zarr" if study.format == "zarr" or (large and study.format == "auto") else "nc"
-        self.path = Path(folder) / f"{study.name}.{ending}"
+        self.path = folder / result_names(study)[0]
         self._partial = self.path.with_suffix(".partial")
+        self._identity = {**study.identity, "sets in a block": f"{size}"}
 
-    def __enter__(self) -> Self:
-        """Take the directory, unless it belongs to another study or to another run of this one."""
-        try:
-            with _named(self.path):
-                self.path.parent.mkdir(parents=True, exist_ok=True)
-                if self.complete:
-                    self._require_own(self.path)
-                else:
-                    self._require_space()
-                    self._partial.mkdir(exist_ok=True)
-                    # Nothing is looked at or changed while another run may be writing.
-                    self._descriptor = lock(self._partial, self.path)
-                    self._require_own(self._partial)
-                    replace_file(self._mark, self._identity.encode())
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
+    def open(self) -> None:
+        """Begin the study, or go on with it.
 
-    def __exit__(self, *_: object) -> None:
-        """Let others in again."""
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-        self._descriptor = None
-
-    @property
-    def _mark(self) -> Path:
-        """The file that says whose blocks these are."""
-        return self._partial / "study"
-
-    @property
-    def _identity(self) -> str:
-        """What stands in it."""
-        return f"{self._study.fingerprint} {self._size}\n"
+        Raises
+        ------
+        InputError
+            Where the disk is too small, or the blocks have another size.
+        OSError
+            Where nothing can be written.
+        """
+        with _named(self.path):
+            self._require_space()
+            self._partial.mkdir(exist_ok=True)
+            if self._blocks():
+                before = json.loads((self._partial / MARK).read_bytes())
+                if before != self._identity:
+                    # Blocks of another size have gaps or overlap.
+                    shutil.rmtree(self._partial)
+                    self._partial.mkdir()
+            replace_file(self._partial / MARK, json.dumps(self._identity).encode())
 
     @property
     def complete(self) -> bool:
         """The study is done."""
         return self.path.exists()
 
-    def _require_own(self, path: Path) -> None:
-        """Complain about results of another study."""
-        if path == self._partial:
-            # A directory without blocks, whatever a kill has left there, holds nothing to be lost.
-            mine = not self._blocks() or (
-                self._mark.exists() and self._mark.read_bytes() == self._identity.encode()
-            )
-        else:
-            with _open(path) as dataset:
-                mine = dataset.attrs.get("fingerprint") == self._study.fingerprint
-        require_own(path, mine=mine)
-
     def _require_space(self) -> None:
-        """Complain about a disk that is too small."""
+        """Raise InputError where the disk is too small."""
         free = shutil.disk_usage(self.path.parent).free
         needed = disk_space(self._study) - sum(path.stat().st_size for path in self._blocks())
         if needed > free:
@@ -120,7 +85,7 @@ class Store:
 
     def _blocks(self) -> list[Path]:
         """Return the files of the blocks that are finished, in their order."""
-        return sorted(self._partial.glob("block_*.nc"))
+        return block_paths(self._partial)
 
     def _block(self, start: int) -> Path:
         """Return the file of a block."""
@@ -133,7 +98,7 @@ class Store:
     def keep(self, block: Block, found: Columns) -> None:
         """Write the results of a block, completely or not at all."""
         stop = block.start + len(found["status"])
-        columns = sets.parameter_columns(self._study, block.start, stop)
+        columns = self._study.parameter_columns(block.start, stop)
         _write(new_dataset(self._study, columns, found), self._block(block.start))
 
     def finish(self) -> None:
@@ -168,6 +133,34 @@ class Store:
             shutil.rmtree(part, ignore_errors=True)
 
 
+def result_names(study: SetStudy) -> list[str]:
+    """Return the names that results of a study may have; the first is that of its end."""
+    large = disk_space(study) > LARGE
+    endings = ["nc", "zarr", "partial"]
+    if study.format == "zarr" or (large and study.format == "auto"):
+        endings = ["zarr", "nc", "partial"]
+    return [f"{study.name}.{ending}" for ending in endings]
+
+
+def block_paths(partial: Path) -> list[Path]:
+    """Return the files of the blocks that are finished, in their order."""
+    return sorted(partial.glob("block_*.nc"))
+
+
+def read_identity(path: Path) -> dict[str, str] | None:
+    """Return what results depend on; None where they have no finished block."""
+    if path.suffix == ".partial":
+        if not block_paths(path):
+            return None
+        content = json.loads((path / MARK).read_bytes())
+        del content["sets in a block"]
+    else:
+        with _open(path) as dataset:
+            content = json.loads(dataset.attrs["identity"])
+    identity: dict[str, str] = content
+    return identity
+
+
 def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     """Read the results of a study, also of one that was interrupted.
 
@@ -189,7 +182,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     place = Path(path)
     if place.suffix == ".partial":
-        paths = sorted(place.glob("block_*.nc"))
+        paths = block_paths(place)
         if not paths:
             message = f"{place} holds no finished sets; allowed: results of a study"
             raise InputError(message)
@@ -241,7 +234,7 @@ def _open_zarr(path: Path) -> xr.Dataset:
 
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
-    """Complain about what is not a dataset."""
+    """Raise InputError where there is no dataset."""
     try:
         yield
     except (OSError, ValueError, KeyError, RuntimeError) as error:

@@ -1,7 +1,8 @@
-"""Stores of studies: whatever ends a study, nothing finished is lost and nothing is mixed up."""
+"""Directories of studies: whatever ends a study, nothing finished is lost or mixed up."""
 
 from __future__ import annotations
 
+import re
 import resource
 import signal
 import subprocess
@@ -16,12 +17,15 @@ import pytest
 
 import thud
 from thud import cli
-from thud.studies import evaluation
+from thud.studies import evaluation, fit
+from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
-from thud.studies.store import Store
+from thud.studies.sweep import KIND
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from thud.studies.sets import SetStudy
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 # Several blocks of the modal ball, about one second.
@@ -44,7 +48,7 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert (tmp_path / "a.zarr").is_dir()
     assert values(found).identical(expected)
     # Whatever is larger than a byte is Zarr now, and written one variable at a time.
-    monkeypatch.setattr("thud.studies.store.LARGE", 1)
+    monkeypatch.setattr("thud.studies.blocks.LARGE", 1)
     found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
     assert values(found).identical(expected)
@@ -141,7 +145,7 @@ def test_full_disk_is_told_and_loses_nothing(
     (tmp_path / "long.toml").write_text(LONG)
     arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    size = evaluation.block_size(thud.read_study(tmp_path / "long.toml").base)
+    size = evaluation.block_size(thud.read_study(tmp_path / "long.toml").case)
     blocks = -(-whole.sizes["set"] // size)
     assert blocks > 1
     block, end = (
@@ -172,9 +176,9 @@ def test_disk_that_is_full_for_zarr_is_told_and_loses_nothing(
     path = tmp_path / "long.toml"
     path.write_text('format = "zarr"' + LONG)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    write = Store._write_zarr  # noqa: SLF001
+    write = Blocks._write_zarr  # noqa: SLF001
 
-    def without_space(store: Store, paths: list[Path]) -> None:
+    def without_space(store: Blocks, paths: list[Path]) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (1, hard))
         try:
             write(store, paths)
@@ -182,7 +186,7 @@ def test_disk_that_is_full_for_zarr_is_told_and_loses_nothing(
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
     with monkeypatch.context() as patch:
-        patch.setattr(Store, "_write_zarr", without_space)
+        patch.setattr(Blocks, "_write_zarr", without_space)
         assert cli.main(["sweep", str(path), "-q", "-o", str(tmp_path)]) == 1
     errors = capsys.readouterr().err
     assert "File too large; allowed: a place that you may write to" in errors
@@ -201,19 +205,24 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
     before = (tmp_path / "a.nc").read_bytes()
     other = {"name": "a", "parameters": {"height": {"values": [1]}}}
-    with pytest.raises(thud.InputError, match=r"a\.nc belongs to another study.*allowed: another"):
+    told = "height = { values = [50.0, 100.0], unit = 'cm' } is now { values = [1.0] }; allowed: "
+    words = re.escape(f"another version of this study: [parameters] {told}another directory, or --")
+    with pytest.raises(thud.InputError, match=rf"a\.nc belongs to {words}"):
         thud.sweep(other, tmp_path)
     (tmp_path / "a.nc").rename(tmp_path / "b.nc")
-    with pytest.raises(thud.InputError, match=r"b\.nc belongs to another study"):
+    with pytest.raises(thud.InputError, match=r"b\.nc belongs to another version of this study"):
         thud.sweep({**other, "name": "b"}, tmp_path)
     assert (tmp_path / "b.nc").read_bytes() == before
     (tmp_path / "c.nc").write_text("no dataset")
     with pytest.raises(thud.InputError, match=r"c\.nc cannot be read; allowed: "):
         thud.sweep({**other, "name": "c"}, tmp_path)
     (tmp_path / "d.partial").mkdir()
-    (tmp_path / "d.partial/study").write_text("something else")
+    (tmp_path / "d.partial/study").write_text('{"thud": "0.0.1", "sets in a block": "9"}')
     (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
-    with pytest.raises(thud.InputError, match=r"d\.partial belongs to another study"):
+    with pytest.raises(
+        thud.InputError,
+        match=rf"d\.partial belongs to .*: thud = 0\.0\.1 is now {thud.__version__}, kind = ",
+    ):
         thud.sweep({**other, "name": "d"}, tmp_path)
     assert len(list((tmp_path / "d.partial").iterdir())) == 2
     (tmp_path / "e.partial").mkdir()
@@ -230,7 +239,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
 def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     study = thud.read_study(HEIGHTS)
     with (
-        Store(tmp_path, study, 4),
+        KIND.take(study, tmp_path),
         pytest.raises(thud.InputError, match="is being computed; allowed: wait, or another"),
     ):
         thud.sweep(study, tmp_path)
@@ -240,14 +249,62 @@ def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
 def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
     other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
     study = thud.read_study(HEIGHTS)
-    with Store(tmp_path, study, 1), pytest.raises(thud.InputError, match="is being computed"):
-        thud.sweep(other, tmp_path)
+    with (
+        KIND.take(study, tmp_path),
+        pytest.raises(thud.InputError, match="is being computed"),
+    ):
+        thud.sweep(other, tmp_path, replace=True)
     # Nothing was finished, so that the directory may change hands, but with nothing in it.
-    with Store(tmp_path, study, 1) as store:
-        block = evaluation.Block(0, study.base, {"height": np.array([0.5])}, thud.__version__)
-        store.keep(block, evaluation.evaluate(block))
-    with pytest.raises(thud.InputError, match="belongs to another study"):
+    with KIND.take(study, tmp_path):
+        keep_one_block(study, tmp_path)
+    with pytest.raises(thud.InputError, match="belongs to another version of this study"):
         thud.sweep(other, tmp_path)
+    assert thud.sweep(other, tmp_path, replace=True)["height"].values.tolist() == [0.7, 0.8]
+
+
+def keep_one_block(study: SetStudy, folder: Path) -> None:
+    """Begin a study and finish its first set only."""
+    blocks = Blocks(folder, study, 1)
+    blocks.open()
+    block = evaluation.Block(0, study.case, {"height": np.array([0.5])}, thud.__version__)
+    blocks.keep(block, evaluation.evaluate(block))
+
+
+def test_replace_leaves_nothing_of_an_older_version(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text("parameters.height.values = [0.5, 1]")
+    sweep = ["sweep", "-q", str(path), "-o", str(tmp_path / "here")]
+    assert cli.main(sweep) == 0
+    path.write_text("format = 'zarr'\nparameters.height.values = [0.5, 1, 2]")
+    assert cli.main(sweep) == 1
+    assert cli.main([*sweep, "--no-figures", "--replace"]) == 0
+    assert [found.name for found in (tmp_path / "here").iterdir()] == ["a.zarr"]
+
+
+def test_replace_keeps_what_is_of_this_version(tmp_path: Path) -> None:
+    study = thud.read_study(HEIGHTS)
+    thud.sweep(study, tmp_path)
+    before = (tmp_path / "python.nc").read_bytes()
+    thud.sweep(study, tmp_path, replace=True)
+    assert (tmp_path / "python.nc").read_bytes() == before
+
+
+def test_replace_does_not_remove_what_is_of_something_else(tmp_path: Path) -> None:
+    (tmp_path / "python.nc").write_text("a paper")
+    with pytest.raises(thud.InputError, match="cannot be read; allowed: results of a study"):
+        thud.sweep(HEIGHTS, tmp_path, replace=True)
+    (tmp_path / "fit.json").write_text("[]")
+    study = {"target": {"levels": [39, 31, 23, 17, 12]}, "parameters": {"mass": {}}}
+    with pytest.raises(thud.InputError, match="of something else, or of an older thud; allowed"):
+        fit.KIND.run(study, tmp_path, replace=True)
+    assert (tmp_path / "fit.json").read_text() == "[]"
+
+
+def test_unfinished_blocks_of_another_size_are_computed_anew(tmp_path: Path) -> None:
+    study = thud.read_study(HEIGHTS)
+    keep_one_block(study, tmp_path)
+    assert thud.sweep(study, tmp_path).identical(thud.sweep(study).assign_attrs(
+        thud.read_sweep(tmp_path / "python.nc").attrs))  # fmt: skip
 
 
 def children(pid: int) -> list[int]:

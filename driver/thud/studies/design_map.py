@@ -10,18 +10,21 @@ from thud.case import Case
 from thud.errors import InputError
 from thud.keys import DENSITY
 from thud.studies.dataset import coordinate
-from thud.studies.parameters import Parameter, Uniform
-from thud.studies.run import sweep
-from thud.studies.sets import wall_volume
-from thud.studies.study import Study, read_study, value_in
+from thud.studies.set_kind import SetKind
+from thud.studies.study import value_in, wall_volume
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
+    from pathlib import Path
 
     import xarray as xr
+    from matplotlib.figure import Figure
 
-    from thud.studies.run import How
-    from thud.studies.study import Source
+    from thud.studies.kind import How
+    from thud.studies.parameter import Parameter
+    from thud.studies.sets import SetStudy
+    from thud.studies.study import Source, Study
 
 _AXES = 2
 
@@ -33,14 +36,14 @@ class DesignMap:
     Attributes
     ----------
     dataset : Dataset
-        Every set, on a grid of the two parameters in ascending order; ``margin`` is the least
+        Every set, on a grid of the two parameters in ascending order; ``margin`` is the minimum
         distance of an octave level to its limits, dB, and ``conforms`` the whole verdict.
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
-        Where the ball of the paper, or else the base case, lies; None where it has no such place.
+        Where the ball of the paper, or else the case, lies; None where it has no such place.
     mark_name : str
-        Which of both it is.
+        ``"paper's ball"`` or ``"case"``.
     """
 
     dataset: xr.Dataset
@@ -64,6 +67,35 @@ class DesignMap:
         return rows
 
 
+class DesignMapKind(SetKind[DesignMap]):
+    """Maps of a design as a kind of study."""
+
+    name = "design"
+    designs = ("grid",)
+
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
+        """Return a study of two numeric parameters."""
+        found = super().complete(study, given, folder)
+        if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
+            message = "[parameters] are no map; allowed: two numeric ones of two values or more"
+            raise InputError(message)
+        return found
+
+    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:
+        """Return the map of all sets."""
+        first, second = map(coordinate, study.parameters)
+        return DesignMap(dataset.load().sortby([first, second]), (first, second), *_mark(study))
+
+    def draw(self, result: DesignMap) -> Figure:
+        """Return the margin over both parameters."""
+        from thud.plot import draw_design_map  # noqa: PLC0415 - takes its time
+
+        return draw_design_map(result)
+
+
+KIND = DesignMapKind()
+
+
 def design_map(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
 ) -> DesignMap:
@@ -79,45 +111,38 @@ def design_map(
     Returns
     -------
     DesignMap
-        Margin and verdict of the force that the base case judges.
+        Margin and verdict of the force that the case judges.
 
     Raises
     ------
     InputError
         As `sweep`; also where there are not two numeric parameters with two values or more.
     """
-    plan = read_study(study, "design")
-    if len(plan.parameters) != _AXES or not all(map(_is_axis, plan.parameters)):
-        message = "[parameters] are no map; allowed: two numeric ones of two values or more"
-        raise InputError(message)
-    first, second = map(coordinate, plan.parameters)
-    dataset = sweep(plan, output, **how).load().sortby([first, second])
-    return DesignMap(dataset, (first, second), *_mark(plan))
+    return KIND.run(study, output, **how)
 
 
 def _is_axis(parameter: Parameter) -> bool:
     """Return whether a parameter has two numbers or more."""
-    spread = parameter.spread
     # Very many values between two ends are not made for this.
-    return parameter.numeric and (isinstance(spread, Uniform) or len(set(spread.grid())) > 1)
+    return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
 
 
-def _mark(plan: Study) -> tuple[tuple[float, float] | None, str]:
-    """Return where the ball of the paper lies if the rest is as in the paper, or the base case."""
-    names = [parameter.name for parameter in plan.parameters]
-    paper, base = _ball_and_drop(Case(), None), _ball_and_drop(plan.base, plan.density)
-    by_density = plan.density is not None or DENSITY.name in names
+def _mark(study: SetStudy) -> tuple[tuple[float, float] | None, str]:
+    """Return where the ball of the paper lies if the rest is as in the paper, or the case."""
+    names = [parameter.name for parameter in study.parameters]
+    paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
+    by_density = study.density is not None or DENSITY.name in names
     rest = set(paper) - set(names) - {"mass" if by_density else DENSITY.name}
-    of_paper = set(names) <= set(paper) and all(math.isclose(base[n], paper[n]) for n in rest)
-    values = paper if of_paper else base
-    places: list[Any] = [values.get(name, value_in(plan.base, name)) for name in names]
-    ends = [(min(grid), max(grid)) for grid in (p.spread.grid() for p in plan.parameters)]
+    of_paper = set(names) <= set(paper) and all(math.isclose(ours[n], paper[n]) for n in rest)
+    values = paper if of_paper else ours
+    places: list[Any] = [values.get(name, value_in(study.case, name)) for name in names]
+    ends = [(min(grid), max(grid)) for grid in (p.grid() for p in study.parameters)]
     inside = all(
         place is not None and low <= float(place) <= high
         for place, (low, high) in zip(places, ends, strict=True)
     )
     x, y = places
-    return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "base case"
+    return (float(x), float(y)) if inside else None, "paper's ball" if of_paper else "case"
 
 
 def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:

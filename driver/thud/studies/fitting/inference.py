@@ -1,4 +1,4 @@
-"""What residuals and Jacobian of a fit tell of its parameters."""
+"""Covariance and identifiability of the parameters of a fit, from residuals and Jacobian."""
 
 from __future__ import annotations
 
@@ -95,14 +95,14 @@ def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def worst_directions(
-    covariance: NDArray[np.float64], most: float
+    covariance: NDArray[np.float64], maximum: float
 ) -> list[tuple[float, NDArray[np.float64]]]:
     """Return directions of scaled parameters with a larger standard deviation than allowed."""
     finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
     found = []
     for variance, vector in zip(variances[::-1], vectors.T[::-1], strict=True):
-        if variance > most**2:
+        if variance > maximum**2:
             direction = np.zeros(len(covariance))
             direction[finite] = vector
             found.append((float(np.sqrt(variance)), direction))
@@ -114,14 +114,12 @@ def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
     part = _parts(names, direction)
     if len(part) == 1:
         return f"{part[0][0]} has no effect on what is compared: it cannot be fitted to this target"
-    apart = (
-        f"the data do not tell {_join([name for name, _ in part])} apart: {_change(part)} together"
-    )
-    return f"{apart} leave what is compared as it is{_product(part)}"
+    change = f"{_join([name for name, _ in part])} are not identifiable: {_change(part)} together"
+    return f"{change} leave what is compared as it is{_product(part)}"
 
 
 def weak_sentence(
-    names: Sequence[str], direction: NDArray[np.float64], width: float, level: float
+    names: Sequence[str], direction: NDArray[np.float64], width: float, confidence: float
 ) -> str:
     """Return what a direction in which little is known means.
 
@@ -131,19 +129,19 @@ def weak_sentence(
         The parameters, and how they change together.
     width
         Half the confidence interval of that change, relative.
-    level
+    confidence
         Confidence of the interval.
     """
     part = _parts(names, direction)
     share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
     if len(part) == 1:
         return (
-            f"the data tell little of {part[0][0]}: its {level:.0%} interval is +-{share} of its "
-            "value"
+            f"{part[0][0]} is hardly identifiable: its {confidence:.0%} interval is +-{share} of "
+            "its value"
         )
     return (
-        f"the data hardly tell {_join([name for name, _ in part])} apart: along {_change(part)} "
-        f"the {level:.0%} interval is +-{share}{_product(part)}"
+        f"{_join([name for name, _ in part])} are hardly identifiable: along {_change(part)} "
+        f"the {confidence:.0%} interval is +-{share}{_product(part)}"
     )
 
 
@@ -178,12 +176,12 @@ def _product(part: Sequence[tuple[str, float]]) -> str:
     return f"; only {first} * {second}^{power:.3g} is determined, close to these values"
 
 
-def coverage_factor(level: float, freedom: int | None) -> float:
+def coverage_factor(confidence: float, freedom: int | None) -> float:
     """Return how many standard errors a two-sided interval reaches.
 
     Parameters
     ----------
-    level
+    confidence
         Confidence of the interval.
     freedom
         Degrees of freedom of Student's t; None where the noise is known.
@@ -191,15 +189,15 @@ def coverage_factor(level: float, freedom: int | None) -> float:
     Raises
     ------
     InputError
-        Where the level is not between 0 and 1.
+        Where the confidence is not between 0 and 1.
     """
-    require_level(level)
-    place = (1 + level) / 2
+    require_confidence(confidence)
+    place = (1 + confidence) / 2
     return float(stats.norm.ppf(place) if freedom is None else stats.t.ppf(place, freedom))
 
 
-def require_level(level: object) -> None:
-    """Complain about a confidence that is none."""
-    if not (isinstance(level, float | np.floating) and 0 < level < 1):
-        message = f"level = {shown(level)} is not allowed; allowed: 0 < level < 1"
+def require_confidence(confidence: object) -> None:
+    """Raise InputError where a confidence is not between 0 and 1."""
+    if not (isinstance(confidence, float | np.floating) and 0 < confidence < 1):
+        message = f"confidence = {shown(confidence)} is not allowed; allowed: 0 < confidence < 1"
         raise InputError(message)

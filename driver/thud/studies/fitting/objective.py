@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.errors import NumericalError, ThudError
-from thud.fitting.parameters import with_values
 from thud.impact import Impact, solve_case
+from thud.studies.fitting.ranges import with_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from tqdm import tqdm
 
     from thud.case import Case
-    from thud.fitting.misfit import Misfit
-    from thud.fitting.parameters import Range
+    from thud.studies.fitting.misfit import Misfit
+    from thud.studies.fitting.ranges import Range
 
 # Relative step of the central differences. The forces are smooth to 1e-13, but samples at which
 # contact ends or begins bend them: 1e-3 would step over such bends, 1e-5 hardly ever does, and its
@@ -34,8 +34,8 @@ class Objective:
         self.count = len(ranges)
         self.scale = np.array([entry.scale for entry in ranges] + [SHIFT_SCALE] * misfit.free_shift)
         shift = [np.inf] * misfit.free_shift
-        self.lower = np.array([entry.lower for entry in ranges] + [-x for x in shift]) / self.scale
-        self.upper = np.array([entry.upper for entry in ranges] + shift) / self.scale
+        self.low = np.array([entry.low for entry in ranges] + [-x for x in shift]) / self.scale
+        self.high = np.array([entry.high for entry in ranges] + shift) / self.scale
         self.evaluations = self.failures = 0
         self.error: ThudError | None = None
         self._last: tuple[bytes, Impact] | None = None
@@ -87,7 +87,7 @@ class Objective:
     ) -> NDArray[np.float64]:
         """Return the derivative with one parameter; of one side where the other is impossible."""
         ends = []
-        for beside in (min(place[i] + step, self.upper[i]), max(place[i] - step, self.lower[i])):
+        for beside in (min(place[i] + step, self.high[i]), max(place[i] - step, self.low[i])):
             other = place.copy()
             other[i] = beside
             value = self.residual(other)

@@ -124,7 +124,7 @@ def test_base_case_is_marked_where_the_paper_has_no_value() -> None:
         "parameters": {"loss_factor": {"values": [0.1, 0.2]}, "height": {"values": [2.0, 1.5]}},
     }
     result = thud.design_map(study)
-    assert (result.mark, result.mark_name) == (None, "base case")
+    assert (result.mark, result.mark_name) == (None, "case")
     axes, _ = thud.plot.draw_design_map(result).axes
     assert axes.get_legend() is None
     study["parameters"]["height"] = {"values": [1.0, 1.5]}
@@ -137,7 +137,7 @@ def test_ball_is_that_of_the_paper_only_if_all_of_it_is() -> None:
     assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
     for fixed in ({"outer_radius": 0.07}, {"gravity": 1.6}):
         result = thud.design_map({"fixed": fixed, "parameters": axes})
-        assert (result.mark, result.mark_name) == ((2.5, 1.0), "base case")
+        assert (result.mark, result.mark_name) == ((2.5, 1.0), "case")
 
 
 def test_density_of_the_paper_is_marked() -> None:
@@ -148,10 +148,11 @@ def test_density_of_the_paper_is_marked() -> None:
     assert (result.mark, result.mark_name) == (pytest.approx((density, 1.0)), "paper's ball")
     result = thud.design_map({"fixed": {"outer_radius": 0.088}, "parameters": axes})
     heavier = 2.5 / (4 / 3 * np.pi * (0.088**3 - 0.056**3))
-    assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "base case")
-    assert thud.design_map({"fixed": {"outer_radius": 0}, "parameters": axes}).mark is None
+    assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "case")
+    with pytest.raises(thud.InputError, match=r"\[fixed\]: &ball: outer_radius = 0.0 is not al"):
+        thud.design_map({"fixed": {"outer_radius": 0}, "parameters": axes})
     axes = {"wall_thickness": {"values": [0.03, 0.034]}, **height}
-    for given, name in ((density, "paper's ball"), (1000, "base case")):
+    for given, name in ((density, "paper's ball"), (1000, "case")):
         result = thud.design_map({"fixed": {"density": given}, "parameters": axes})
         assert (result.mark, result.mark_name) == ((0.032, 1.0), name)
 

@@ -24,7 +24,7 @@ class Misfit(Protocol):
 
     @property
     def known_noise(self) -> bool:
-        """The standard deviations were given; else the residuals tell their common factor."""
+        """The standard deviations were given; else their common factor is estimated."""
 
     @property
     def free_shift(self) -> bool:
@@ -36,7 +36,7 @@ class Misfit(Protocol):
 
     @property
     def deviation_unit(self) -> str:
-        """Unit of a standard deviation that the residuals tell."""
+        """Unit of a standard deviation that is estimated."""
 
     def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:
         """Return model minus target over standard deviation, shape (size,)."""
@@ -70,7 +70,7 @@ def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
 
 
 def require_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    """Complain about a word that is not one of those that are allowed."""
+    """Raise InputError where a word is not one of those that are allowed."""
     if value not in allowed:
         listed = ", ".join(map(repr, allowed))
         message = f"target: {name} = {value!r} is not known; allowed: {listed}"
@@ -78,7 +78,7 @@ def require_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
 
 
 def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - that is the question
-    """Complain about what is not a number above 0."""
+    """Raise InputError where a value is no number above 0."""
     require_number(f"target: {name}", value)
     if not value > 0:
         message = f"target: {name} = {value!r} is not allowed; allowed: numbers above 0, {unit}"

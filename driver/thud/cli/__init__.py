@@ -1,0 +1,123 @@
+"""The command ``thud-driver``: cases with figures, studies, and the figures of the paper."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from thud._api import version
+from thud.cli.command import (
+    NO_FIGURES,
+    QUIET,
+    Command,
+    argument,
+    exit_code,
+    output,
+    sentence,
+)
+from thud.cli.compare import compare_cases
+from thud.cli.figures import draw_figures
+from thud.cli.run import run_cases
+from thud.cli.studies import study_commands
+from thud.errors import InputError, ThudError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+INTERRUPTED = 130
+
+COMMANDS = {
+    "run": Command(
+        "run cases, write their results and figures",
+        (
+            argument("cases", nargs="+", metavar="CASE.nml", help="namelist files"),
+            output(
+                "the results; one below it for each of several cases (default: outputs/<case name>)"
+            ),
+            argument("--check", action="store_true", help="exit with 3 where a source fails"),
+            NO_FIGURES,
+            argument(
+                "--animation", action="store_true", help="also motion.gif, of cases with snapshots"
+            ),
+            QUIET,
+        ),
+        run_cases,
+    ),
+    "compare": Command(
+        "models and recordings of one drop on one page",
+        (
+            argument(
+                "cases",
+                nargs="+",
+                metavar="CASE.nml|RECORD.csv",
+                help="namelist files, and recordings with columns of time, s, and force, N",
+            ),
+            output("the page (default: outputs/comparison)", default="outputs/comparison"),
+            argument("--force", choices=("elastic", "floor"), default="floor"),
+            argument("--source", choices=("rubber_ball", "tyre"), default="rubber_ball"),
+            QUIET,
+        ),
+        compare_cases,
+        "a page is kept only when it is done",
+    ),
+    **study_commands(),
+    "figures": Command(
+        "draw the figures of the paper and of the documentation",
+        (output("the figures (default: outputs/figures)", default="outputs/figures"), QUIET),
+        draw_figures,
+    ),
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments
+        Words of the command line; by default those of this process.
+
+    Returns
+    -------
+    int
+        0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming,
+        130 interrupted.
+    """
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit as stop:
+        # argparse leaves with 2 for bad usage, which is a numerical failure here.
+        return InputError.exit_code if stop.code else 0
+    command = COMMANDS[options.name]
+    try:
+        code = command.function(options)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        print(f"thud-driver: interrupted; {command.kept}", file=sys.stderr)
+        return INTERRUPTED
+    except (ThudError, OSError) as error:
+        if isinstance(error, OSError) and error.filename is None:
+            # A screen that is full or closed; what Python still wants to write goes nowhere.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        print(f"thud-driver: {sentence(error)}", file=sys.stderr)
+        return exit_code(error)
+    return code
+
+
+def _parser() -> argparse.ArgumentParser:
+    """Return the parser of the command line."""
+    parser = argparse.ArgumentParser(
+        prog="thud-driver",
+        description="Cases with figures, studies, and the figures of the paper.",
+        epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
+        "3 not conforming (run --check), 130 interrupted.",
+    )
+    parser.add_argument("--version", action="version", version=f"thud {version()}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="name")
+    for name, command in COMMANDS.items():
+        one = commands.add_parser(name, help=command.help)
+        for names, settings in command.arguments:
+            one.add_argument(*names, **settings)
+    return parser

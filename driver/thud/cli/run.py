@@ -1,0 +1,109 @@
+"""The command that runs cases as the executable does, and draws them."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+from thud._api import api, call, text
+from thud.case import Case, read_case
+from thud.checks import require_output
+from thud.cli.command import exit_code, sentence
+from thud.errors import InputError, ThudError
+from thud.files import add_files
+from thud.free_modes import new_modes
+from thud.impact import new_impact
+
+if TYPE_CHECKING:
+    import argparse
+    from collections.abc import Iterator
+
+    from thud._api import Bundle
+
+NOT_CONFORMING = 3
+
+
+def run_cases(options: argparse.Namespace) -> int:
+    """Run cases, a bad one or not; return the exit code."""
+    worst = 0
+    options.done = {}
+    for path in tqdm(options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet):
+        try:
+            conforms = _run_case(path, options)
+        except (ThudError, OSError) as error:
+            tqdm.write(f"thud-driver: {sentence(error)}", file=sys.stderr)
+            failure = exit_code(error)
+            worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
+        else:
+            if options.check and not conforms and worst == 0:
+                worst = NOT_CONFORMING
+    return worst
+
+
+def _run_case(path: str, options: argparse.Namespace) -> bool:
+    """Run one case as the executable does, then draw it; return whether it conforms."""
+    require_output(options.output)
+    case = read_case(path)
+    output = options.output or ""
+    if output and len(options.cases) > 1:
+        output = os.path.join(output, case.name)  # noqa: PTH118 - may be ""
+    if case.name in options.done:
+        message = (
+            f"{path}: its name {case.name!r} is that of {options.done[case.name]}, "
+            "whose results it would replace; allowed: cases of different names, or one by one"
+        )
+        raise InputError(message)
+    options.done[case.name] = path
+    with _interruptible():
+        found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
+    if found["remark"]:
+        tqdm.write(f"thud-driver: {text(found['remark'])}", file=sys.stderr)
+    folder = Path(output or os.fsdecode(found["directory"]))
+    pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
+    if pictures:
+        add_files(folder, pictures, found["case"])
+    if not options.quiet:
+        tqdm.write(f"{text(found['table'])}\n  Results: {folder}\n")
+    return bool(found["conforms"])
+
+
+def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, bytes]:
+    """Return the files of the figures of a run, drawn from what it has in memory."""
+    if not (figures or animation):
+        return {}
+    from thud import plot  # noqa: PLC0415 - matplotlib takes its time
+
+    case = Case.from_text(text(found["case"]))
+    impact = new_impact(case, found) if "samples" in found else None
+    modes = new_modes(case.ball, found) if "modes" in found else None
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        if figures:
+            plot.save_all(plot.case_figures(impact, modes), folder)
+        if animation and impact is not None and impact.motion:
+            plot.animate(impact, folder / "motion.gif")
+        return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@contextmanager
+def _interruptible() -> Iterator[None]:
+    """Let an interrupt end the process at once; Python would wait for the end of the call.
+
+    Nothing is lost: results are written as a whole, or not at all.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    usual = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

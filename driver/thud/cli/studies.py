@@ -1,0 +1,94 @@
+"""The commands that run studies: one for each kind."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+from thud.checks import require_output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.errors import NumericalError, ThudError
+from thud.studies.kinds import KINDS, get_kind
+
+if TYPE_CHECKING:
+    import argparse
+
+    from thud.studies.kind import How
+
+_STUDY = argument("study", metavar="STUDY.toml", help="case, parameters, and what the kind needs")
+_SETS = (
+    argument("--yes", action="store_true", help="start however many sets there are"),
+    argument(
+        "--backend",
+        choices=("threads", "processes", "dask"),
+        help="where sets are computed; the results are the same (default: threads)",
+    ),
+    argument("--workers", type=int, metavar="N", help="threads or processes"),
+    argument("--scheduler", metavar="ADDRESS", help="of Dask, tcp://host:8786"),
+)
+_REPLACE = argument(
+    "--replace", action="store_true", help="remove results of another version of the study"
+)
+
+
+def study_commands() -> dict[str, Command]:
+    """Return the commands of all kinds of studies."""
+    return {
+        name: Command(
+            entry.help,
+            (
+                _STUDY,
+                output(
+                    "the results"
+                    + ("; an interrupted study goes on there" if entry.has_sets else "")
+                    + " (default: outputs/<study name>)"
+                ),
+                *(_SETS if entry.has_sets else ()),
+                _REPLACE,
+                NO_FIGURES,
+                QUIET,
+            ),
+            run_study,
+            Command._field_defaults["kept"]
+            if entry.has_sets
+            else "a fit is kept only when it is done",
+        )
+        for name, entry in KINDS.items()
+    }
+
+
+def run_study(options: argparse.Namespace) -> int:
+    """Run a study, print what it tells, save files and figures; return the exit code."""
+    require_output(options.output)
+    kind = get_kind(options.name)
+    study = kind.read_study(options.study)
+    how: How = {"progress": not options.quiet}
+    if KINDS[options.name].has_sets:
+        how |= {
+            "backend": options.backend,
+            "workers": options.workers,
+            "scheduler": options.scheduler,
+            "yes": options.yes,
+        }
+    kind.require(study, **how)
+    folder = Path(options.output or Path("outputs", study.name))
+    if not options.quiet:
+        print(kind.describe(study), file=sys.stderr)
+    with kind.take(study, folder, replace=options.replace) as directory:
+        try:
+            result = kind.compute(study, directory, **how)
+        except ThudError as error:
+            message = f"{options.study}: {error}"
+            raise type(error)(message) from error
+        if not options.quiet:
+            tqdm.write(kind.table(result, study))
+        for remark in kind.remarks(result):
+            tqdm.write(f"thud-driver: {options.study}: {remark}", file=sys.stderr)
+        figures = {} if options.no_figures else kind.figures(result, study)
+        directory.save(kind.files(result, study), figures)
+    if not options.quiet:
+        tqdm.write(f"Results: {folder}")
+    return 0 if kind.succeeded(result) else NumericalError.exit_code

@@ -1,0 +1,294 @@
+"""Fits: parameters of a model from a force history or from levels."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import warnings
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, Unpack
+
+from thud.case import Case
+from thud.checks import (
+    LARGEST_SEED,
+    refuse_old_words,
+    require_kind,
+    require_number,
+    require_whole,
+    require_words,
+    shown,
+)
+from thud.columns import read_table
+from thud.errors import FitWarning, InputError
+from thud.recording import Recording
+from thud.studies.directory import FORMATS
+from thud.studies.fitting.force_target import ForceTarget
+from thud.studies.fitting.inference import require_confidence
+from thud.studies.fitting.level_target import LevelTarget
+from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
+from thud.studies.fitting.result import Fit
+from thud.studies.fitting.search import search
+from thud.studies.kind import Kind
+from thud.studies.parameter import quantity
+from thud.studies.study import Study, table_of, with_density
+from thud.units import power_of, scaled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from thud.impact import Impact
+    from thud.studies.directory import Directory
+    from thud.studies.kind import How
+    from thud.studies.parameter import Parameter
+
+# Options of a search, and their defaults.
+OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
+# More starts, or steps of a search, than this come to no end.
+_MAXIMUM = 100_000
+# What [target] may hold, and the units of its numbers.
+FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
+LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
+TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
+
+
+@refuse_old_words
+def fit(  # noqa: PLR0913 - what there is to choose
+    target: ForceTarget | LevelTarget | Recording | Impact | tuple[ArrayLike, ArrayLike],
+    parameters: Iterable[str] | Mapping[str, Parameter | float | None],
+    case: Case | None = None,
+    *,
+    confidence: float = 0.95,
+    starts: int = 1,
+    seed: int = 0,
+    max_steps: int = 100,
+    progress: bool = False,
+) -> Fit:
+    """Estimate parameters of a model from a force history or from levels, by least squares.
+
+    Trust-region reflective steps (`scipy.optimize.least_squares`) within the limits, parameters
+    measured in their starts. A point at which the model cannot be computed is stepped away from.
+
+    Parameters
+    ----------
+    target
+        What is fitted; a recording, an impact or arrays of time, s, and force, N, are the record
+        of a `ForceTarget`.
+    parameters
+        Names of keys of ball, drop or model that take real numbers; as a mapping, with their
+        starts or `Parameter`.
+    case
+        Everything else; by default the ball of the paper in the model of the paper.
+    confidence
+        Confidence of the intervals.
+    starts
+        Number of starts: the given one, and others spread over the limits (over a factor of 2 to
+        both sides where a limit is not given). The best end counts.
+    seed
+        Seed of the other starts.
+    max_steps
+        Maximum number of steps from each start.
+    progress
+        Show how many impacts were computed.
+
+    Returns
+    -------
+    Fit
+        Values, covariance, intervals, residuals and warnings, also issued as `FitWarning`.
+
+    Raises
+    ------
+    InputError
+        Where target or parameters cannot be used.
+    NumericalError
+        Where the model cannot be computed around the best point.
+
+    Examples
+    --------
+    >>> from thud.case import Ball
+    >>> from thud.impact import solve
+    >>> truth = solve(Ball(youngs_modulus=1.8e6))
+    >>> round(fit(truth, ["youngs_modulus"]).values["youngs_modulus"])
+    1800000
+    """
+    case = Case() if case is None else case
+    require_kind("case", case, Case)
+    options = {"confidence": confidence, "starts": starts, "seed": seed, "max_steps": max_steps}
+    _require_options(options)
+    ranges = get_ranges(case, bound_parameters(case, parameters))
+    if not isinstance(target, ForceTarget | LevelTarget):
+        target = ForceTarget(target)
+    found = search(case, ranges, target.misfit(), options, progress=progress)
+    for sentence in found.warnings:
+        warnings.warn(sentence, FitWarning, stacklevel=3)
+    return found
+
+
+def _require_options(options: Mapping[str, Any]) -> None:
+    """Raise InputError where an option of a search cannot be used."""
+    require_confidence(options["confidence"])
+    require_whole("starts", options["starts"], 1, _MAXIMUM)
+    require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
+    require_whole("seed", options["seed"], 0, LARGEST_SEED)
+
+
+@dataclass(frozen=True)
+class FitStudy(Study):
+    """A fit as a file describes it.
+
+    Attributes
+    ----------
+    target : ForceTarget or LevelTarget
+        What is fitted.
+    tables : dict
+        The file as JSON holds it.
+    options : dict
+        Confidence of the intervals, starts, seed and maximum number of steps.
+    """
+
+    target: ForceTarget | LevelTarget = field(default_factory=lambda: LevelTarget(()))
+    tables: dict[str, Any] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
+
+    @property
+    def units(self) -> dict[str, tuple[str, float]]:
+        """Units of the file by parameter: name, and how many SI units it is."""
+        shown = {p.name: p.shown_unit for p in self.parameters if p.unit}
+        return {name: (unit, scaled(1.0, power)) for name, (unit, power) in shown.items()}
+
+    def own_identity(self) -> dict[str, str]:
+        """Return target and search."""
+        vector = self.target.misfit().target_vector()
+        return {
+            **{f"[target] {key}": f"{value!r}" for key, value in self.tables["target"].items()},
+            "numbers of [target]": hashlib.sha256(vector.tobytes()).hexdigest()[:16],
+            **{name: f"{value!r}" for name, value in self.options.items()},
+        }
+
+
+class FitKind(Kind[FitStudy, Fit]):
+    """Fits as a kind of study."""
+
+    name = "fit"
+    words = ("target", *OPTIONS)
+
+    def new_parameter(self, name: str, given: object, case: Case, centre: object) -> Parameter:  # noqa: ARG002
+        """Return a parameter that is fitted."""
+        return fitted_parameter(name, given, case)
+
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> FitStudy:
+        """Return a study with its target."""
+        names = {parameter.name for parameter in study.parameters}
+        if study.density is not None and names & {"outer_radius", "wall_thickness"}:
+            message = (
+                "[fixed] density is not allowed beside a geometry that is fitted; allowed: mass"
+            )
+            raise InputError(message)
+        case = study.case
+        if study.density is not None:
+            case = with_density(case, study.density)
+        target = _read_target(table_of(given, "target"), folder)
+        options = {name: given.get(name, default) for name, default in OPTIONS.items()}
+        _require_options(options)
+        get_ranges(case, study.parameters)
+        target.misfit()
+        # JSON knows neither dates nor infinity.
+        tables = json.loads(json.dumps(given, default=str), parse_constant=str)
+        head = {**vars(study), "case": case}
+        return FitStudy(**head, target=target, tables=tables, options=options)
+
+    def compute(self, study: FitStudy, directory: Directory | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
+        """Return the fit."""
+        return search(
+            study.case,
+            get_ranges(study.case, study.parameters),
+            study.target.misfit(),
+            study.options,
+            progress=how.get("progress", False),
+        )
+
+    def results(self, study: FitStudy) -> list[str]:  # noqa: ARG002
+        """Return the name of the file that says which fit it is."""
+        return ["fit.json"]
+
+    def identity_in(self, path: Path) -> dict[str, str]:
+        """Return the identity of a fit."""
+        return dict(json.loads(path.read_bytes())["identity"])
+
+    def other_files(self, study: FitStudy) -> list[str]:  # noqa: ARG002
+        """Return the names of the other files."""
+        figures = [f"{name}{ending}" for name in ("fit", "confidence") for ending in FORMATS]
+        return ["fit.csv", "fitted.nml", *figures]
+
+    def table(self, result: Fit, study: FitStudy) -> str:
+        """Return the fit as text."""
+        return f"{study.name}\n\n{result.table(study.units)}"
+
+    def remarks(self, result: Fit) -> list[str]:
+        """Return the warnings."""
+        return list(result.warnings)
+
+    def succeeded(self, result: Fit) -> bool:
+        """Return whether the search has converged."""
+        return result.converged
+
+    def files(self, result: Fit, study: FitStudy) -> dict[str, bytes]:
+        """Return the numbers of the fit and its case."""
+        return result.files(study=study.tables, identity=study.identity)
+
+    def figures(self, result: Fit, study: FitStudy) -> dict[str, Figure]:
+        """Return target and fit, and confidence regions."""
+        return result.figures(study.units)
+
+
+KIND = FitKind()
+
+
+def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarget:
+    """Return the target of a study."""
+    if ("file" in table) == ("levels" in table):
+        message = (
+            "[target] takes one of file and levels; allowed: file = 'record.csv' or levels = [...]"
+        )
+        raise InputError(message)
+    require_words("[target]", table, FORCE_KEYS if "file" in table else LEVEL_KEYS)
+    options = {
+        name: quantity(f"[target] {name}", value, TARGET_UNITS[name])
+        if name in TARGET_UNITS
+        else value
+        for name, value in table.items()
+    }
+    if "levels" in table:
+        for name, unit in (("contact_time", "s"), ("restitution", "")):
+            if name in options:
+                options[name] = _measured(f"[target] {name}", options[name], unit)
+        return LevelTarget(**options)
+    if not isinstance(options.get("time_shift", True), bool):
+        given = options["time_shift"]
+        message = f"[target] time_shift = {given!r} is not allowed; allowed: true, false"
+        raise InputError(message)
+    name = options.pop("file")
+    if not isinstance(name, str) or not name.strip():
+        message = f"[target] file = {name!r} is not allowed; allowed: text in quotes"
+        raise InputError(message)
+    samples = read_table(folder / name)
+    Recording.from_arrays(samples, str(folder / name))  # refuses what is no recording
+    return ForceTarget((samples[:, 0], samples[:, 1]), **options)
+
+
+def _measured(place: str, given: object, unit: str) -> tuple[float, float]:
+    """Return value and standard deviation of a table, in the unit of a key."""
+    words = ("value", "uncertainty")
+    if not isinstance(given, dict) or not set(words) <= set(given):
+        message = (
+            f"{place} = {shown(given)} is not allowed; allowed: a table of value, uncertainty, unit"
+        )
+        raise InputError(message)
+    require_words(place, given, (*words, "unit"))
+    power = power_of(given.get("unit", unit or "1"), unit, place)
+    for word in words:
+        require_number(f"{place}: {word}", given[word])
+    return scaled(given["value"], power), scaled(given["uncertainty"], power)

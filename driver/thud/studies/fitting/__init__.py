@@ -1,0 +1,1 @@
+"""What fits are made of: targets, ranges, search, inference, result."""

@@ -1,0 +1,165 @@
+"""Parameters that can be fitted: the real numbers of ball, drop and model, with their ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._schema import KEYS
+from thud.checks import require_kind
+from thud.errors import InputError
+from thud.keys import limits, put
+from thud.studies.parameter import fitted
+
+if TYPE_CHECKING:
+    from thud.case import Case
+    from thud.key import Key
+    from thud.studies.parameter import Parameter
+
+# A start that lies on a limit is moved away from it by this part of itself.
+INSIDE = 0.01
+# A limit of the library that is this much larger than the start does not guide the search.
+FAR = 10.0
+# Other starts lie within this factor of the first where no limits are given.
+SPREAD = 2.0
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter with everything that the search needs, SI units.
+
+    Attributes
+    ----------
+    name, unit : str
+        Name of the key, with the place in brackets where it takes a list; its unit.
+    start, low, high : float
+        Start and limits of the search.
+    scale : float
+        What the parameter is measured in: its start, or a tenth of the range where that is 0.
+    spread : tuple of float
+        Between these lie other starts.
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    scale: float
+    spread: tuple[float, float]
+
+
+def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
+    """Return key and value of everything that can be fitted, by name.
+
+    Entries of lists are counted from 1, as in a namelist: ``"frequency(1)"``.
+    """
+    model = case.model
+    if model is None:
+        message = "&model is missing; allowed: a case with a source model"
+        raise InputError(message)
+    found: dict[str, tuple[Key, float]] = {}
+    for key in KEYS:
+        if key.group not in {"ball", "drop"} and key.owner != model.name:
+            continue
+        value = getattr(model if key.owner else getattr(case, key.group), key.name)
+        if key.kind == "real":
+            found[key.name] = key, value
+        elif key.kind == "list" and not key.whole:
+            found |= {f"{key.name}({i})": (key, v) for i, v in enumerate(value, start=1)}
+    return found
+
+
+def with_values(case: Case, values: Mapping[str, float]) -> Case:
+    """Return a case with other values of some parameters."""
+    return put(case, {name: float(value) for name, value in values.items()})
+
+
+def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
+    """Return a parameter of a fit.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be fitted; lists those that can.
+    """
+    known = known_parameters(case)
+    if name not in known:
+        model = case.model.name if case.model else ""
+        message = (
+            f"[parameters] {name} is not a parameter of {model} that can be fitted; "
+            f"allowed: {', '.join(known)}"
+        )
+        raise InputError(message)
+    return fitted(name, given, case.model.name)  # type: ignore[union-attr]
+
+
+def bound_parameters(
+    case: Case, parameters: Iterable[str] | Mapping[str, Parameter | float | None]
+) -> tuple[Parameter, ...]:
+    """Return the parameters that a fit is called with.
+
+    Raises
+    ------
+    InputError
+        Where there is none, or one cannot be fitted.
+    """
+    require_kind("parameters", parameters, Iterable)
+    if isinstance(parameters, str):
+        parameters = [parameters]
+    if not isinstance(parameters, Mapping):
+        parameters = dict.fromkeys(parameters)
+    if not parameters:
+        message = f"parameters: none is given; allowed: {', '.join(known_parameters(case))}"
+        raise InputError(message)
+    return tuple(fitted_parameter(name, given, case) for name, given in parameters.items())
+
+
+def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
+    """Return start, limits and scale of the parameters of a fit.
+
+    Raises
+    ------
+    InputError
+        Where start and limits do not fit together.
+    """
+    found = list(parameters)
+    # Ends of ranges that are other keys are those at the start.
+    begin = with_values(case, {p.name: p.start for p in found if p.start is not None})
+    return [_get_range(begin, parameter) for parameter in found]
+
+
+def _get_range(case: Case, given: Parameter) -> Range:
+    """Return start, limits and scale of one parameter of a case that has the starts."""
+    name, key = given.name, given.key
+    start = float(known_parameters(case)[name][1])
+    lower, upper = limits(key, case)
+    scale = abs(start) or ((given.high or upper) - (given.low or lower)) / 10
+    low = lower if given.low is None else given.low
+    high = upper if given.high is None else given.high
+    if not lower <= low < high <= upper:
+        message = (
+            f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed; "
+            f"allowed: {lower:g} <= low < high <= {upper:g} {key.unit}".rstrip()
+        )
+        raise InputError(message)
+    if not low <= start <= high:
+        message = (
+            f"[parameters] {name}: start = {start:g} is not allowed; "
+            f"allowed: {low:g} <= start <= {high:g} {key.unit}".rstrip()
+        )
+        raise InputError(message)
+    spread = (
+        max(low, start - scale / SPREAD) if given.low is None else low,
+        min(high, start + scale * (SPREAD - 1)) if given.high is None else high,
+    )
+    if given.high is None and high > FAR * scale:
+        high = np.inf
+    if given.low is None and low < -FAR * scale:
+        low = -np.inf
+    margin = min(INSIDE * scale, (high - low) / 4)
+    start = min(max(start, low + margin), high - margin)
+    return Range(name, key.unit, start, low, high, scale, spread)

@@ -1,0 +1,152 @@
+"""What a kind of study is: how it is read, computed, printed and saved."""
+
+from __future__ import annotations
+
+import dataclasses
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
+
+from thud.checks import require_words
+from thud.errors import InputError
+from thud.studies.directory import Directory
+from thud.studies.study import Study, read_common, read_content
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+    from thud.case import Case
+    from thud.keys import Value
+    from thud.studies.parameter import Parameter
+    from thud.studies.study import Source
+
+S = TypeVar("S", bound=Study)
+R = TypeVar("R")
+
+
+class How(TypedDict, total=False):
+    """How a study is computed.
+
+    Attributes
+    ----------
+    backend : str or None
+        ``"threads"`` (the default), ``"processes"`` or ``"dask"``: all give the same results.
+    workers : int or None
+        Number of threads or processes; by default one per processor.
+    scheduler : str or None
+        Address of a Dask scheduler.
+    yes : bool
+        Start however many sets there are.
+    progress : bool
+        Show a progress bar.
+    replace : bool
+        Remove results of another version of the study from the directory.
+    """
+
+    backend: str | None
+    workers: int | None
+    scheduler: str | None
+    yes: bool
+    progress: bool
+    replace: bool
+
+
+class Kind(ABC, Generic[S, R]):
+    """A kind of study: what its file may hold, how it is computed, what it prints and writes."""
+
+    name: ClassVar[str]
+    # What its file may hold besides what every study has.
+    words: ClassVar[tuple[str, ...]]
+
+    def read_study(self, source: Source) -> S:
+        """Return a study of this kind; see `thud.studies.kinds.read_study`."""
+        if isinstance(source, Study):
+            if source.kind != self.name:
+                message = f"{source.name} is a {source.kind} study; allowed: a {self.name} study"
+                raise InputError(message)
+            return source  # type: ignore[return-value]
+        study: S = read_content(source, self._read)
+        return study
+
+    def _read(self, given: dict[str, Any], folder: Path, name: str, text: str) -> S:
+        """Return the study that some tables describe."""
+        given.setdefault("name", name)
+        common = read_common(given, folder, self.name, self.words, self.new_parameter)
+        return self.complete(dataclasses.replace(common, text=text), given, folder)
+
+    def run(
+        self,
+        source: Source,
+        output: str | os.PathLike[str] | None = None,
+        **how: Unpack[How],
+    ) -> R:
+        """Return what a study gives; an output directory is taken for it."""
+        require_words("keywords", how, How.__annotations__)
+        study = self.read_study(source)
+        self.require(study, **how)
+        if output is None:
+            return self.compute(study, None, **how)
+        with self.take(study, output, replace=how.get("replace", False)) as directory:
+            result = self.compute(study, directory, **how)
+            directory.save(self.files(result, study), {})
+            return result
+
+    def take(self, study: S, folder: str | os.PathLike[str], *, replace: bool = False) -> Directory:
+        """Return a results directory to be taken for a study."""
+        return Directory(folder, self, study, replace=replace)
+
+    @abstractmethod
+    def new_parameter(
+        self, name: str, given: object, case: Case, centre: Value | None
+    ) -> Parameter:
+        """Return a parameter of its name, table, case and value there."""
+
+    @abstractmethod
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> S:
+        """Return a study with what only this kind has."""
+
+    def require(self, study: S, **how: Unpack[How]) -> None:
+        """Raise InputError where a study cannot be computed this way."""
+
+    def describe(self, study: S) -> str:
+        """Return a study in one line."""
+        return f"{study.name}: {', '.join(p.name for p in study.parameters)} of {study.model}"
+
+    @abstractmethod
+    def compute(self, study: S, directory: Directory | None, **how: Unpack[How]) -> R:
+        """Return the result, kept in a directory if there is one."""
+
+    @abstractmethod
+    def results(self, study: S) -> list[str]:
+        """Return the names of files that hold an identity; the first stands for a study done."""
+
+    @abstractmethod
+    def identity_in(self, path: Path) -> dict[str, str] | None:
+        """Return the identity of results; None where there is nothing to be lost."""
+
+    @abstractmethod
+    def other_files(self, study: S) -> list[str]:
+        """Return the names of the other files that a study may write."""
+
+    @abstractmethod
+    def table(self, result: R, study: S) -> str:
+        """Return the result as text."""
+
+    @abstractmethod
+    def remarks(self, result: R) -> list[str]:
+        """Return what is to be said besides, as sentences."""
+
+    @abstractmethod
+    def succeeded(self, result: R) -> bool:
+        """Return whether there is a result to speak of."""
+
+    def files(self, result: R, study: S) -> dict[str, bytes]:  # noqa: ARG002 - most have none
+        """Return further files by their names."""
+        return {}
+
+    @abstractmethod
+    def figures(self, result: R, study: S) -> dict[str, Figure]:
+        """Return figures by the names of their files."""

@@ -1,0 +1,108 @@
+"""The list of kinds of studies; what they need is imported when one is asked for."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from thud.studies.kind import Kind
+    from thud.studies.study import Source, Study
+
+
+class Entry(NamedTuple):
+    """One kind of study.
+
+    Attributes
+    ----------
+    module : str
+        Module of this package with a public function of the same name, and the `Kind` as ``KIND``.
+    help : str
+        What the command line says of it.
+    has_sets : bool
+        It computes sets of drops, on any backend.
+    """
+
+    module: str
+    help: str
+    has_sets: bool = True
+
+
+# By the name of the command.
+KINDS = {
+    "sweep": Entry("sweep", "drops over a grid, a list or a random design of parameters"),
+    "sensitivity": Entry("sensitivity", "Sobol indices: which parameter matters for what"),
+    "design": Entry("design_map", "which geometry and material conform to the standards"),
+    "uncertainty": Entry("uncertainty", "how tolerances spread levels and conformity"),
+    "fit": Entry("fit", "parameters of a model from a force or from levels", has_sets=False),
+}
+# Public names by the modules of this package.
+PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
+    "Fit": "fitting.result",
+    "ForceTarget": "fitting.force_target",
+    "LevelTarget": "fitting.level_target",
+    "Parameter": "parameter",
+    "Study": "study",
+    "read_study": "kinds",
+    "read_sweep": "blocks",
+}
+
+
+def load(module: str) -> ModuleType:
+    """Return a module of this package.
+
+    Raises
+    ------
+    InputError
+        Where a package that it needs is not installed.
+    """
+    try:
+        return importlib.import_module(f"thud.studies.{module}")
+    except ModuleNotFoundError as error:
+        message = (
+            f"{error.name} is not installed; allowed: studies with pip install 'thud[studies]'"
+        )
+        raise InputError(message) from error
+
+
+def get_kind(name: str) -> Kind[Any, Any]:
+    """Return a kind of study by its name.
+
+    Raises
+    ------
+    InputError
+        Where there is no such kind; lists those that there are.
+    """
+    if name not in KINDS:
+        message = f"kind = {name!r} is not known; allowed: {', '.join(KINDS)}"
+        raise InputError(message)
+    kind: Kind[Any, Any] = load(KINDS[name].module).KIND
+    return kind
+
+
+def read_study(source: Source, kind: str = "sweep") -> Study:
+    """Read a study.
+
+    Parameters
+    ----------
+    source
+        Path of a TOML file, or what would stand in it; see docs/studies.md.
+    kind
+        ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"`` or ``"fit"``.
+
+    Returns
+    -------
+    Study
+        The study, complete and checked.
+
+    Raises
+    ------
+    InputError
+        Names file, table, key and what is allowed.
+    """
+    study: Study = get_kind(kind).read_study(source)
+    return study

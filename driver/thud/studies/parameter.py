@@ -1,0 +1,361 @@
+"""Parameters of a study: which key varies or is fitted, and its values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from thud.checks import LARGEST, require_number, require_whole, require_words, shown
+from thud.errors import InputError
+from thud.key import Key
+from thud.keys import Value, find_key
+from thud.units import power_of, scaled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Self
+
+    from numpy.typing import NDArray
+
+# More values of a parameter, or base samples, than this do not fit into memory.
+MAX_VALUES = 2**30
+# What a parameter that varies may be given by, and one that is fitted; `unit` may stand beside it.
+FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
+FITTED = ("start", "low", "high")
+NUMBERS = ("real", "whole", "list")
+_SCALES = ("linear", "log")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a study, as its table in ``[parameters]``.
+
+    Attributes
+    ----------
+    start : float or None
+        Where a fit starts; by default the value of the case.
+    low, high : float or None
+        Ends of the values, or of the search of a fit; of a search by default those of the key.
+    values : sequence or None
+        The values one by one; where they are drawn, each is as likely.
+    count : int
+        Number of values from `low` to `high` in a grid.
+    scale : str
+        ``"linear"`` or ``"log"``: the values lie evenly, or evenly in their logarithms.
+    mean, std : float or None
+        Of a normal distribution; the mean is by default the value of the case.
+    unit : str or None
+        Unit of all of them; by default that of the key.
+    name : str
+        Name of the key, entries of lists as ``"frequency(2)"``; set by the study, which also
+        converts the numbers to the unit of the key and keeps `unit` for tables and figures.
+    key : Key
+        The key; set by the study.
+    """
+
+    start: float | None = None
+    low: float | None = None
+    high: float | None = None
+    values: Sequence[Value] | None = None
+    count: int = 0
+    scale: str = _SCALES[0]
+    mean: float | None = None
+    std: float | None = None
+    unit: str | None = None
+    name: str = ""
+    key: Key = field(default=Key("", "", ""), repr=False)
+
+    def __new__(cls, *_: object, **words: object) -> Self:
+        """Raise InputError where a word is not known."""
+        require_words("Parameter()", words, (option.name for option in fields(cls)))
+        return super().__new__(cls)
+
+    @property
+    def numeric(self) -> bool:
+        """The values are numbers."""
+        return self.key.kind in NUMBERS
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What is given of it, by the words of its table."""
+        words = (word for word in vars(self) if word not in {"name", "key"})
+        return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
+
+    @property
+    def shown_unit(self) -> tuple[str, int]:
+        """Unit for tables and figures, and the power of ten that brings it to that of the key."""
+        unit = self.unit or self.key.unit or "1"
+        return unit, power_of(unit, self.key.unit, self.name)
+
+    @property
+    def size(self) -> int:
+        """Number of values in a grid; very many are not made for it, whole numbers are few."""
+        if self.values is not None:
+            return len(self.values)
+        return len(self.grid()) if self.key.kind == "whole" and self.count else self.count
+
+    def grid(self) -> NDArray[Any]:
+        """Return the values of a grid."""
+        if self.values is not None:
+            return np.array(self.values)
+        if self.low is None or self.high is None:
+            return np.empty(0)
+        spaced: Any = np.geomspace if self.scale == "log" else np.linspace
+        values: NDArray[Any] = spaced(self.low, self.high, self.count)
+        return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
+
+    def quantile(self, share: NDArray[np.float64]) -> NDArray[Any]:
+        """Return the values below which a share of all lies."""
+        if self.values is not None:
+            return np.take(self.grid(), (share * len(self.values)).astype(int))
+        if self.std is not None and self.mean is not None:
+            # A share of exactly 0 would be infinitely far out.
+            return np.asarray(self.mean + self.std * ndtri(np.maximum(share, 2.0**-54)))
+        assert self.low is not None  # noqa: S101 - see `varied`
+        assert self.high is not None  # noqa: S101
+        whole = self.key.kind == "whole"
+        # Every whole number has the share between itself and the next.
+        high = self.high + 1 if whole else self.high
+        if self.scale == "log":
+            found = self.low * (high / self.low) ** share
+        else:
+            found = self.low + share * (high - self.low)
+        return np.minimum(np.floor(found), self.high).astype(int) if whole else found
+
+    def trials(self, share: NDArray[np.float64]) -> list[Value]:
+        """Return values to try a case with: the start, or quantiles; none where it has neither."""
+        if self.start is not None:
+            return [self.start] * len(share)
+        if self.values is None and self.std is None and None in {self.low, self.high}:
+            return []
+        found: list[Value] = self.quantile(share).tolist()
+        return found
+
+    def __str__(self) -> str:
+        """Return the parameter as it would stand in a file."""
+        _, power = self.shown_unit
+        entries = {
+            word: [_in_unit(entry, power) for entry in value]
+            if word == "values"
+            else (value if word == "count" else _in_unit(value, power))
+            for word, value in self.given.items()
+        }
+        return f"{{ {', '.join(f'{word} = {value!r}' for word, value in entries.items())} }}"
+
+
+def _in_unit(value: Value, power: int) -> Value:
+    """Return a number in the unit of a study, and anything else as it is."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
+
+
+def varied(name: str, given: object, model: str, centre: Value | None) -> Parameter:
+    """Return a parameter that varies.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    given
+        Its table.
+    model
+        The source model.
+    centre
+        Value of the key in the case: the mean where none is given.
+
+    Raises
+    ------
+    InputError
+        Where there is no such key, or it takes no such values.
+    """
+    words = [word for form in FORMS.values() for word in form]
+    place, key, given, power = _begin(name, given, model, words)
+    form = next((form for form in FORMS if form in given), None)
+    if form is None:
+        message = (
+            f"{place} = {shown(given)} has no values; allowed: a table with values = [...], or "
+            "low and high, or std, and unit"
+        )
+        raise InputError(message)
+    require_words(f"{place} with {form}", given, (*FORMS[form], "unit"))
+    unit = given.get("unit")
+    if form == "values":
+        values = given["values"]
+        if not isinstance(values, list | tuple) or not values:
+            message = f"{place}: values = {values!r} is empty or no list; allowed: [one, or, more]"
+            raise InputError(message)
+        found = tuple(checked(f"{place}: values", key, value, power) for value in values)
+        return Parameter(values=found, unit=unit, name=name, key=key)
+    if key.kind not in NUMBERS:
+        allowed = ", ".join(map(repr, key.choices)) or "true, false"
+        message = f"{place} is not a number; allowed: values = [...] of {allowed}"
+        raise InputError(message)
+    read = _between if form == "low" else _normal
+    return replace(read(place, key, given, power, centre), unit=unit, name=name, key=key)
+
+
+def fitted(name: str, given: object, model: str) -> Parameter:
+    """Return a parameter that is fitted.
+
+    Parameters
+    ----------
+    name
+        Its name.
+    given
+        Its table, a `Parameter`, its start, or None.
+    model
+        The source model.
+
+    Raises
+    ------
+    InputError
+        Where there is no such key, or it takes no such values.
+    """
+    if isinstance(given, Parameter):
+        given = given.given
+    elif given is None:
+        given = {}
+    elif not isinstance(given, Mapping):
+        given = {"start": given}
+    place, key, given, power = _begin(name, given, model, FITTED)
+    numbers: dict[str, Any] = {}
+    for word, value in given.items():
+        if word != "unit" and value is not None:
+            require_number(f"{place}: {word}", value)
+            numbers[word] = scaled(value, power)
+    return Parameter(**numbers, unit=given.get("unit"), name=name, key=key)
+
+
+def _begin(
+    name: str, given: object, model: str, words: Sequence[str]
+) -> tuple[str, Key, Mapping[str, Any], int]:
+    """Return place, key, table and power of ten of its unit of a parameter."""
+    place = f"[parameters] {name}"
+    key, entry = find_key(name, model)
+    if key.kind == "list" and entry is None:
+        message = f"{place} is a list; allowed: one entry of it, such as {name + '(1)'!r}"
+        raise InputError(message)
+    if not isinstance(given, Mapping):
+        message = f"{place} = {shown(given)} is no table; allowed: {', '.join(words)}, unit"
+        raise InputError(message)
+    require_words(place, given, (*words, "unit"))
+    unit = key.unit or "1" if given.get("unit") is None else given["unit"]
+    return place, key, given, power_of(unit, key.unit, place)
+
+
+def checked(place: str, key: Key, value: object, power: int) -> Value:
+    """Return one value in the unit of its key.
+
+    Raises
+    ------
+    InputError
+        Where the key takes no such value.
+    """
+    if key.kind == "choice" and value in key.choices:
+        return str(value)
+    if key.kind == "flag" and isinstance(value, bool):
+        return value
+    if key.kind in NUMBERS and _is_number(value):
+        number = scaled(value, power)  # type: ignore[arg-type]
+        if key.kind != "whole" and math.isfinite(number):
+            return number
+        if number.is_integer():
+            return int(number)
+    allowed = {
+        "choice": ", ".join(map(repr, key.choices)),
+        "flag": "true, false",
+        "whole": "whole numbers",
+    }.get(key.kind, "finite numbers")
+    message = f"{place} = {shown(value)} is not allowed; allowed: {allowed}"
+    raise InputError(message)
+
+
+def _is_number(value: object) -> bool:
+    """Return whether a value is a finite number that a float holds."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return -LARGEST < value < LARGEST
+
+
+def _between(
+    place: str, key: Key, given: Mapping[str, Any], power: int, _: Value | None
+) -> Parameter:
+    """Return values between two ends."""
+    if "high" not in given:
+        message = f"{place} has no high end; allowed: high beside low"
+        raise InputError(message)
+    low, high = (float(checked(f"{place}: {e}", key, given[e], power)) for e in ("low", "high"))
+    whole = key.kind == "whole"
+    # Ends that are other keys depend on the set.
+    lower = -math.inf if isinstance(key.lower, str) else key.lower
+    upper = math.inf if isinstance(key.upper, str) else key.upper
+    if whole and not lower <= low <= high <= upper:
+        message = (
+            f"{place}: low = {low:g} and high = {high:g} are not allowed; "
+            f"allowed: {lower:g} <= low < high <= {upper:g}"
+        )
+        raise InputError(message)
+    count, scale = given.get("count", 0), given.get("scale", _SCALES[0])
+    if scale not in _SCALES:
+        message = f"{place}: scale = {scale!r} is not known; allowed: {', '.join(_SCALES)}"
+        raise InputError(message)
+    if not low < high or (scale == "log" and low <= 0):
+        message = f"{place}: low = {given['low']!r} is not allowed; allowed: low < high"
+        raise InputError(message + (", 0 < low" if scale == "log" else ""))
+    if "count" in given:
+        require_whole(f"{place}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
+    return Parameter(low=low, high=high, count=count, scale=scale)
+
+
+def _normal(
+    place: str, key: Key, given: Mapping[str, Any], power: int, centre: Value | None
+) -> Parameter:
+    """Return a normal distribution, by default around the value of the case."""
+    if key.kind == "whole":
+        message = f"{place} is a whole number; allowed: values = [...], or low and high"
+        raise InputError(message)
+    std = float(checked(f"{place}: std", key, given["std"], power))
+    if not std > 0:
+        message = f"{place}: std = {given['std']!r} is not allowed; allowed: 0 < std"
+        raise InputError(message)
+    if "mean" in given:
+        centre = checked(f"{place}: mean", key, given["mean"], power)
+    if centre is None or not math.isfinite(float(centre)):
+        message = f"{place} has no mean; allowed: mean beside std"
+        raise InputError(message)
+    return Parameter(mean=float(centre), std=std)
+
+
+def quantity(place: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
+    """Return a value, or the numbers of a list, in the unit of a key.
+
+    Parameters
+    ----------
+    place
+        Where it stands, for messages.
+    given
+        The value, or a table with ``value`` and ``unit``.
+    unit
+        Unit of the key.
+
+    Raises
+    ------
+    InputError
+        Where the table or its unit cannot be used.
+    """
+    if not isinstance(given, Mapping):
+        return given
+    require_words(place, given, ("value", "unit"))
+    power = power_of(given.get("unit", unit or "1"), unit, place)
+    value: Any = given.get("value")
+    entries = value if isinstance(value, list) else [value]
+    if "unit" in given:
+        for entry in entries:
+            require_number(place, entry)
+        entries = [scaled(entry, power) for entry in entries]
+    return entries if isinstance(value, list) else entries[0]

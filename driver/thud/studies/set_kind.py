@@ -1,0 +1,228 @@
+"""Kinds of studies that compute sets of drops: design, blocks, backend, dataset."""
+
+from __future__ import annotations
+
+import sys
+from abc import abstractmethod
+from collections import Counter
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
+
+import numpy as np
+from tqdm import tqdm
+
+from thud._api import version
+from thud._schema import KEYS
+from thud.errors import InputError
+from thud.keys import OF_FILES
+from thud.studies.backends import checked_backend, run_blocks
+from thud.studies.blocks import Blocks, read_identity, read_sweep, result_names
+from thud.studies.dataset import disk_space, grid_of, new_dataset
+from thud.studies.designs import read_design
+from thud.studies.directory import FORMATS
+from thud.studies.evaluation import Block, block_size
+from thud.studies.kind import Kind
+from thud.studies.parameter import varied
+from thud.studies.sets import SetStudy, read_temperature
+from thud.studies.study import table_of
+from thud.tables import format_rows
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from pathlib import Path
+
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+    from thud.case import Case
+    from thud.keys import Value
+    from thud.studies.directory import Directory
+    from thud.studies.kind import How
+    from thud.studies.parameter import Parameter
+    from thud.studies.sets import Columns
+    from thud.studies.study import Study
+
+R = TypeVar("R")
+
+# More sets than this have to be confirmed.
+MAX_SETS = 100_000
+_FILE_FORMATS = ("auto", "netcdf", "zarr")
+
+
+class SetKind(Kind[SetStudy, R]):
+    """A kind of study that computes sets of drops."""
+
+    words = ("format", "design", "temperature")
+    # The designs that it takes, the default first.
+    designs: ClassVar[tuple[str, ...]]
+
+    def new_parameter(
+        self, name: str, given: object, case: Case, centre: Value | None
+    ) -> Parameter:
+        """Return a parameter that varies."""
+        if name == "bands":
+            message = (
+                "[parameters] bands is not allowed; allowed: bands in [fixed], alike for all sets"
+            )
+            raise InputError(message)
+        return varied(name, given, case.model.name, centre)  # type: ignore[union-attr]
+
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:  # noqa: ARG002
+        """Return a study with its design."""
+        written = given.get("format", _FILE_FORMATS[0])
+        if written not in _FILE_FORMATS:
+            message = f"format = {written!r} is not known; allowed: {', '.join(_FILE_FORMATS)}"
+            raise InputError(message)
+        law = table_of(given, "temperature") if "temperature" in given else None
+        temperature = read_temperature(law, study.parameters)
+        design = read_design(table_of(given, "design"), self.designs, study.parameters)
+        # Sets need neither snapshots nor free modes.
+        case = replace(study.case, modes=None)
+        files = {
+            key.name: 0.0 for key in KEYS if key.owner == study.model and key.group == OF_FILES
+        }
+        if case.model and files:
+            case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
+        return SetStudy(
+            *(study.name, study.kind, case, study.parameters, study.density, study.text),
+            *design,
+            temperature,
+            written,
+        )
+
+    def describe(self, study: SetStudy) -> str:
+        """Return how many sets a study has and how much disk it needs."""
+        space = disk_space(study) / 1e6
+        amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
+        return f"{study.name}: {study.count} sets of {study.model}, about {amount} on disk"
+
+    def require(self, study: SetStudy, **how: Unpack[How]) -> None:
+        """Raise InputError where there are too many sets, or no such backend."""
+        if study.count > MAX_SETS and not how.get("yes"):
+            message = (
+                f"{self.describe(study)}; "
+                f"allowed: up to {MAX_SETS} sets, more with yes=True (--yes)"
+            )
+            raise InputError(message)
+        checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
+
+    def compute(self, study: SetStudy, directory: Directory | None, **how: Unpack[How]) -> R:
+        """Return what the sets of a study tell."""
+        return self.conclude(study, compute_sets(study, directory, how))
+
+    @abstractmethod
+    def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
+        """Return what the results of all sets tell."""
+
+    def rows(self, result: R) -> Sequence[Sequence[str]]:
+        """Return header and rows of text."""
+        rows: Sequence[Sequence[str]] = result.table()  # type: ignore[attr-defined]
+        return rows
+
+    @abstractmethod
+    def draw(self, result: R) -> Figure:
+        """Return the figure of a result."""
+
+    def dataset(self, result: R) -> xr.Dataset:
+        """Return every set of a result."""
+        dataset: xr.Dataset = result.dataset  # type: ignore[attr-defined]
+        return dataset
+
+    def results(self, study: SetStudy) -> list[str]:
+        """Return the names of the dataset and of the directory of blocks."""
+        return result_names(study)
+
+    def identity_in(self, path: Path) -> dict[str, str] | None:
+        """Return the identity of results."""
+        return read_identity(path)
+
+    def other_files(self, study: SetStudy) -> list[str]:
+        """Return the names of the figures."""
+        return [f"{study.name}{ending}" for ending in FORMATS]
+
+    def table(self, result: R, study: SetStudy) -> str:  # noqa: ARG002 - sets know their units
+        """Return the result as text."""
+        return format_rows(self.rows(result))
+
+    def remarks(self, result: R) -> list[str]:
+        """Return how many sets have no results, and why."""
+        dataset = self.dataset(result)
+        failed = dataset["status"].values != 0
+        if not failed.any():
+            return []
+        ((reason, _),) = Counter(dataset["reason"].values[failed]).most_common(1)
+        return [f"{failed.sum()} of {failed.size} sets have no results, such as: {reason}"]
+
+    def succeeded(self, result: R) -> bool:
+        """Return whether any set has results."""
+        return bool((self.dataset(result)["status"] == 0).any())
+
+    def figures(self, result: R, study: SetStudy) -> dict[str, Figure]:
+        """Return the figure by the name of the study."""
+        return {study.name: self.draw(result)} if self.succeeded(result) else {}
+
+
+def compute_sets(study: SetStudy, directory: Directory | None, how: How) -> xr.Dataset:
+    """Compute every set of a study; one that was interrupted goes on in its directory.
+
+    Parameters
+    ----------
+    study
+        The study.
+    directory
+        Where results are kept; None: they are not written.
+    how
+        Backend and progress.
+
+    Returns
+    -------
+    Dataset
+        A grid has one dimension per parameter, other designs the dimension ``set``.
+
+    Raises
+    ------
+    NumericalError
+        Where the backend loses sets; single sets that fail have a status and a reason instead.
+    OSError
+        Where the results cannot be written.
+    """
+    total, size = study.count, block_size(study.case)
+    blocks = Blocks(directory.folder, study, size) if directory else None
+    memory: dict[int, Columns] = {}
+
+    def keep(block: Block, found: Columns) -> None:
+        if blocks:
+            blocks.keep(block, found)
+        else:
+            memory[block.start] = found
+        bar.update(len(found["status"]))
+
+    if not (blocks and blocks.complete):
+        if blocks:
+            blocks.open()
+        starts = [start for start in range(0, total, size) if not (blocks and blocks.has(start))]
+        left = sum(min(size, total - start) for start in starts)
+        hidden = not how.get("progress", False)
+        with tqdm(
+            total=total, initial=total - left, unit="set", disable=hidden, file=sys.stderr
+        ) as bar:
+            run_blocks(
+                _blocks(study, starts, size),
+                keep,
+                *checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler")),
+            )
+    if blocks:
+        blocks.finish()
+        return read_sweep(blocks.path)
+    whole = {
+        name: np.concatenate([memory[start][name] for start in sorted(memory)])
+        for name in memory[0]
+    }
+    return grid_of(study, new_dataset(study, study.parameter_columns(0, total), whole))
+
+
+def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
+    """Yield the blocks that begin with some sets."""
+    for start in starts:
+        columns = study.parameter_columns(start, min(start + size, study.count))
+        yield Block(start, study.case, study.key_columns(columns), version())

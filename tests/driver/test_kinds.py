@@ -1,0 +1,51 @@
+"""The list of kinds: what follows from a line of it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+from thud.studies.kinds import KINDS, get_kind
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_follows_from_its_line(name: str) -> None:
+    kind = get_kind(name)
+    assert kind.name == name
+    assert callable(getattr(thud, KINDS[name].module))
+    assert cli.COMMANDS[name].help == KINDS[name].help
+
+
+def test_unknown_kind_is_told() -> None:
+    with pytest.raises(thud.InputError, match="kind = 'cube' is not known; allowed: sweep, sens"):
+        thud.read_study({}, "cube")
+
+
+def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
+    text = (REPOSITORY / "docs/studies.md").read_text().partition("## How to add a kind")[2]
+    module, line = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    copy = tmp_path / "thud"
+    shutil.copytree(Path(thud.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    (copy / "studies/scatter.py").write_text(module)
+    kinds = copy / "studies/kinds.py"
+    kinds.write_text(kinds.read_text().replace("KINDS = {\n", f"KINDS = {{\n{line}"))
+    (tmp_path / "mass.toml").write_text("design.size = 9\nparameters.mass.std = 0.1")
+    for command in (
+        ["-m", "thud.cli", "scatter", "mass.toml"],
+        ["-c", "import thud; print(thud.scatter('mass.toml').table())"],
+    ):
+        done = subprocess.run(
+            [sys.executable, *command], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert "peak force, N" in done.stdout
+    names = sorted(path.name for path in (tmp_path / "outputs/mass").iterdir())
+    assert names == ["mass.nc", "mass.png", "mass.svg"]
