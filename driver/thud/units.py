@@ -42,7 +42,8 @@ def power_of(unit: object, key_unit: str, place: str) -> int:
     InputError
         Where the unit does not fit; lists those that do.
     """
-    multiples = MULTIPLES[key_unit]
+    # Units without multiples are taken as they are.
+    multiples = MULTIPLES.get(key_unit, {key_unit: 0})
     if not isinstance(unit, str) or unit not in multiples:
         message = f"{place}: unit {unit!r} does not fit; allowed: {', '.join(multiples)}"
         raise InputError(message)

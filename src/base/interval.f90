@@ -66,14 +66,14 @@ contains
       end if
    end subroutine read_end
 
-   !> Whether a text begins as numbers do.
+   !> Whether a text is a number and no expression.
    pure function is_number(text) result(yes)
       !> The text, without blanks before it.
       character(len=*), intent(in) :: text
       !> It does.
       logical :: yes
 
-      yes = scan(text(1:1), '0123456789+-.') == 1
+      yes = scan(text(1:1), '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
    end function is_number
 
    !> Sets the ends that depend on other keys.

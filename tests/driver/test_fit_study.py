@@ -14,7 +14,7 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
-from thud.checks import lock
+from thud.files import lock
 from thud.studies.fit import KIND
 
 if TYPE_CHECKING:

@@ -30,7 +30,8 @@ def test_unknown_kind_is_told() -> None:
 
 
 def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
-    text = (REPOSITORY / "docs/studies.md").read_text().partition("## How to add a kind")[2]
+    page = (REPOSITORY / "docs/how_to_add.md").read_text()
+    text = page.partition("## A kind of study")[2].partition("## A figure")[0]
     module, line = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     copy = tmp_path / "thud"
     shutil.copytree(Path(thud.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))

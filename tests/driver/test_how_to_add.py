@@ -1,0 +1,150 @@
+"""What docs/how_to_add.md says of Fortran, carried out on a copy of the sources."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from conftest import REPOSITORY
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+CASE = """&ball mass = 2.5 /
+&drop height = 1.0 /
+&model name = 'linear_spring' /
+&linear_spring stiffness = 62000.0 /
+&levels bands = 'low_third' /
+&limits source = 'sandbag' /
+"""
+DRIVE = """
+import math, sys, thud
+assert thud.LinearSpring().travel == 0.1
+impact = thud.solve(model="linear_spring", stiffness=62000.0)
+print(repr(impact.contact_time))
+many = thud.solve_many({"stiffness": [5e4, 6e4, -1.0]}, model="linear_spring", threads=2)
+assert many.status.tolist() == [0, 0, 1], many.reason
+for k, time in zip([5e4, 6e4], many.contact_time):
+    assert abs(time / (math.pi * math.sqrt(2.5 / k)) - 1) < 1e-9
+study = {"fixed": {"model": "linear_spring"}, "parameters": {"stiffness": {"values": [5e4, 6e4]}}}
+assert thud.sweep(study).contact_time.values.tolist() == many.contact_time[:2].tolist()
+found = thud.fit(impact, {"stiffness": 5e4}, thud.Case(model=thud.LinearSpring()))
+assert abs(found.values["stiffness"] - 62000.0) < 1.0, found
+assert len(thud.get_bands("low_third").nominal) == 4
+try:
+    thud.solve(model="linear_spring", travel=20.0)
+except thud.InputError as error:
+    assert "0 < travel <= 600000/stiffness = 10 m" in str(error), error
+else:
+    sys.exit("a key beyond its range passed")
+"""
+
+
+def example(page: str, name: str) -> str:
+    """Return the block of code with a name after its language."""
+    (block,) = re.findall(rf"```{name}\n(.*?)```", page, re.DOTALL)
+    return str(block)
+
+
+def insert(path: Path, after: str, text: str) -> None:
+    """Put a text behind the one place of another."""
+    content = path.read_text()
+    assert content.count(after) == 1
+    path.write_text(content.replace(after, after + text))
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a copy of the sources with everything that the page adds, built."""
+    root = tmp_path_factory.mktemp("copy")
+    for name in ("CMakeLists.txt", "cmake", "src", "driver", "docs"):
+        source = REPOSITORY / name
+        if source.is_dir():
+            ignored = shutil.ignore_patterns("__pycache__", "_core*.so")
+            shutil.copytree(source, root / name, ignore=ignored)
+        else:
+            shutil.copy(source, root / name)
+    page = (REPOSITORY / "docs/how_to_add.md").read_text()
+    model = root / "src/source/linear_spring.f90"
+    model.write_text(example(page, "fortran"))
+    insert(root / "src/CMakeLists.txt", "  measured_modes\n", example(page, "cmake"))
+    insert(model, "      real(wp) :: stiffness = 6.0e4_wp\n", example(page, "fortran component"))
+    insert(model, "      fields = [ &\n", example(page, "fortran field"))
+    insert(
+        root / "src/level/band.f90",
+        "      band_set_type('octave', width=3, first=-15, last=-3), &\n",
+        example(page, "fortran band"),
+    )
+    insert(
+        root / "src/level/source_limits.f90",
+        "sources(*) = [ &\n",
+        example(page, "fortran source"),
+    )
+    configure = [
+        *("cmake", "-S", str(root), "-B", str(root / "build"), "-G", "Ninja"),
+        *(
+            "-DCMAKE_BUILD_TYPE=MinSizeRel",
+            "-DCMAKE_Fortran_FLAGS_MINSIZEREL=-O0",
+            "-DTHUD_TESTS=OFF",
+        ),
+        *("-DTHUD_NATIVE=OFF", "-DTHUD_PYTHON=ON", f"-DPython_EXECUTABLE={sys.executable}"),
+    ]
+    for command in (configure, ["cmake", "--build", str(root / "build")]):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    (extension,) = (root / "build").rglob("_core*.so")
+    shutil.copy(extension, root / "driver/thud")
+    schema = subprocess.run([root / "build/src/thud", "--schema"], capture_output=True, check=True)
+    generate = [sys.executable, root / "driver/generate_schema.py", root]
+    subprocess.run(generate, input=schema.stdout, check=True)
+    return root
+
+
+def test_executable_knows_what_was_added(copy: Path, tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text(CASE)
+    (tmp_path / "table.csv").write_text("stiffness;height\n62000,0;1,0\n31000;1\n")
+    for arguments in ([], ["--sets", "table.csv"]):
+        command = [copy / "build/src/thud", "case.nml", *arguments]
+        subprocess.run(command, cwd=tmp_path, capture_output=True, check=True)
+    expected = math.pi * math.sqrt(2.5 / 62000)
+    with (tmp_path / "outputs/case_sets/sets.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert float(rows[0]["contact_time_s"]) == pytest.approx(expected, rel=1e-9)
+    assert float(rows[1]["contact_time_s"]) == pytest.approx(expected * math.sqrt(2), rel=1e-9)
+    assert "floor_low_third_10_Hz_dB" in rows[0]
+    levels = (tmp_path / "outputs/case/levels.csv").read_text()
+    assert [line.split(",")[0] for line in levels.splitlines()[1:]] == ["low_third"] * 4
+    summary = (tmp_path / "outputs/case/summary.nml").read_text()
+    assert "source = 'sandbag'" in summary
+    keys = subprocess.run([copy / "build/src/thud", "--keys"], capture_output=True, check=True)
+    assert b"&linear_spring" in keys.stdout
+
+
+def test_python_knows_what_was_added(copy: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": str(copy / "driver")}
+    done = subprocess.run(
+        [sys.executable, "-c", DRIVE], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) == pytest.approx(math.pi * math.sqrt(2.5 / 62000), rel=1e-9)
+    assert "`&linear_spring`" in (copy / "docs/keys.md").read_text()
+
+
+def test_schema_of_the_repository_is_fresh(executable: str, tmp_path: Path) -> None:
+    """`./bootstrap schema` was run after the latest change of a key."""
+    for name in ("driver/thud", "docs"):
+        (tmp_path / name).mkdir(parents=True)
+    schema = subprocess.run([executable, "--schema"], capture_output=True, check=True).stdout
+    generate = [sys.executable, REPOSITORY / "driver/generate_schema.py", tmp_path]
+    subprocess.run(generate, input=schema, check=True)
+    for name in ("driver/thud/_schema.py", "docs/keys.md"):
+        assert (tmp_path / name).read_text() == (REPOSITORY / name).read_text(), name
+    assert {entry["group"] for entry in json.loads(schema)["keys"]} >= {"ball", "mesh", "limits"}
