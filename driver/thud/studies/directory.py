@@ -86,6 +86,8 @@ class Directory:
             return
         try:
             before = self._kind.identity_in(path)
+        except InputError:
+            raise
         except (ValueError, LookupError, TypeError, FileNotFoundError) as error:
             message = (
                 f"{path} is of something else, or of an older thud; "
@@ -105,10 +107,6 @@ class Directory:
             raise InputError(message)
         for name in (*self._kind.results(self._study), *self._kind.other_files(self._study)):
             remove(self.folder / name)
-
-    def save(self, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
-        """Write files by their names, and figures as PNG and SVG; return their paths."""
-        return save(self.folder, files, figures)
 
 
 def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
