@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 def compare_cases(options: argparse.Namespace) -> int:
     """Compare cases and recordings; return the exit code."""
-    from thud.comparison import HEADER, compare, read_all  # noqa: PLC0415 - takes its time
+    from thud import comparison  # noqa: PLC0415 - matplotlib takes its time
 
     require_output(options.output)
-    found = read_all(options.cases)
-    page = compare(found, options.force, options.source, progress=not options.quiet)
+    found = comparison.read_all(options.cases)
+    page = comparison.compare(found, options.force, options.source, progress=not options.quiet)
     paths = page.save(options.output)
     if not options.quiet:
-        print(aligned([HEADER, *page.table()]))
+        print(aligned([comparison.HEADER, *page.table()]))
         print(f"Page: {paths[-1]}")
     return 0

@@ -8,10 +8,13 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.checks import require_output
-from thud.studies.directory import save
+from thud.studies.directory import FORMATS
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Callable
+
+    from matplotlib.figure import Figure
 
 
 def draw_figures(options: argparse.Namespace) -> int:
@@ -21,10 +24,17 @@ def draw_figures(options: argparse.Namespace) -> int:
     require_output(options.output)
     folder = Path(options.output)
     folder.mkdir(parents=True, exist_ok=True)
-    for name, draw in tqdm(
-        get_figures().items(), unit="figure", disable=options.quiet, leave=False
-    ):
-        save(folder, {}, {name: draw()})
+    draw_all(folder, get_figures(), quiet=options.quiet)
     if not options.quiet:
         print(f"Figures: {folder}")
     return 0
+
+
+def draw_all(folder: Path, figures: dict[str, Callable[[], Figure]], *, quiet: bool = True) -> None:
+    """Draw figures and save them as PNG and SVG."""
+    from thud.plot import save  # noqa: PLC0415 - matplotlib takes its time
+
+    for name, draw in tqdm(figures.items(), unit="figure", disable=quiet, leave=False):
+        figure = draw()
+        for ending in FORMATS:
+            save(figure, folder / f"{name}{ending}")

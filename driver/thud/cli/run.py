@@ -16,11 +16,11 @@ from thud._api import api, call, text
 from thud.case import Case, read_case
 from thud.checks import require_output
 from thud.cli.command import exit_code, sentence
+from thud.cli.figures import draw_all
 from thud.errors import InputError, ThudError
 from thud.free_modes import free_modes
 from thud.models import FiniteElement
 from thud.results import read_results
-from thud.studies.directory import save
 
 if TYPE_CHECKING:
     import argparse
@@ -71,8 +71,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     # The library pads its answer with blanks; a directory of the user's may end with them.
     folder = Path(output or os.fsdecode(directory.rstrip()))
     if not options.no_figures:
-        for name, draw in _case_figures(case, folder).items():
-            save(folder, {}, {name: draw()})
+        draw_all(folder, _case_figures(case, folder))
     if options.animation and (folder / "motion.pvd").exists():
         from thud.mesh_plot import animate  # noqa: PLC0415 - plotly takes its time
 
@@ -100,22 +99,23 @@ def _interruptible() -> Iterator[None]:
 
 def _case_figures(case: Case, folder: Path) -> dict[str, Callable[[], Figure]]:
     """Return the figures of a case whose results are in a directory."""
-    from thud.mesh_plot import loss_factor, mode_shapes, motion  # noqa: PLC0415 - takes its time
-    from thud.plot import force_history, levels  # noqa: PLC0415
+    from thud import mesh_plot, plot  # noqa: PLC0415 - matplotlib takes its time
 
     figures: dict[str, Callable[[], Figure]] = {}
     if case.modes:
         modes = free_modes(case.ball, **vars(case.modes))
-        figures["modes"] = lambda: mode_shapes(modes)
+        figures["modes"] = lambda: mesh_plot.mode_shapes(modes)
     if case.model:
         impact = read_results(folder)
         name = case.name.replace("_", " ")
         source = case.limits.source
-        figures["force"] = lambda: force_history({name: impact}, force=None)
-        figures["levels"] = lambda: levels({name: impact}, source=source)
+        figures["force"] = lambda: plot.force_history({name: impact}, force=None)
+        figures["levels"] = lambda: plot.levels({name: impact}, source=source)
         if impact.motion:
-            figures["motion"] = lambda: motion(impact)
+            figures["motion"] = lambda: mesh_plot.motion(impact)
         model = case.model
         if isinstance(model, FiniteElement) and model.viscosity != "none":
-            figures["loss_factor"] = lambda: loss_factor({model.viscosity.replace("_", " "): model})
+            figures["loss_factor"] = lambda: mesh_plot.loss_factor(
+                {model.viscosity.replace("_", " "): model}
+            )
     return figures
