@@ -153,7 +153,9 @@ def test_lost_scheduler_is_told_and_its_study_goes_on_elsewhere(
         doomed.kill()
     _, errors = process.communicate()
     assert process.returncode == 2
-    assert errors.startswith("thud-driver: the backend lost a block of sets (CancelledError); what")
+    assert errors.startswith(
+        f"thud-driver: {study}: the backend lost a block of sets (CancelledError); what"
+    )
     assert errors.count("\n") == 1
     finished = thud.read_sweep(tmp_path / "some.partial")
     assert 0 < finished.sizes["set"] < 400

@@ -62,8 +62,6 @@ def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert (tmp_path / "six.zarr").is_dir()
 
 
-# h5netcdf stumbles over what it could not open when it throws it away.
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_damaged_results_are_told(tmp_path: Path) -> None:
     thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
     whole = (tmp_path / "a.nc").read_bytes()
@@ -76,7 +74,8 @@ def test_damaged_results_are_told(tmp_path: Path) -> None:
         except thud.InputError as error:
             told += 1
             assert f"{path} cannot be read; allowed: results of a" in str(error)
-    assert 0 < told < len(whole) // 256
+    # The last places may lie in the checksum, where nothing is lost.
+    assert told >= len(range(0, len(whole), 256)) - 1
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +148,7 @@ def test_full_disk_is_told_and_loses_nothing(
     blocks = -(-whole.sizes["set"] // size)
     assert blocks > 1
     block, end = (
-        len(bytes(part.to_netcdf(engine="h5netcdf")))
+        len(bytes(part.to_netcdf(engine="h5netcdf"))) + 44
         for part in (whole.isel(set=slice(0, size)), whole)
     )
     # The disk is full for the first block already, then for the end, which is larger.

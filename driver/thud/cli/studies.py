@@ -11,6 +11,7 @@ from tqdm import tqdm
 from thud.checks import require_output
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
 from thud.errors import NumericalError, ThudError
+from thud.studies.directory import save
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def run_study(options: argparse.Namespace) -> int:
         for remark in kind.remarks(result):
             tqdm.write(f"thud-driver: {options.study}: {remark}", file=sys.stderr)
         figures = {} if options.no_figures else kind.figures(result, study)
-        directory.save(kind.files(result, study), figures)
+        save(directory.folder, kind.files(result, study), figures)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if kind.succeeded(result) else NumericalError.exit_code

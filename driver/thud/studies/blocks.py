@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 LARGE = 256 * 2**20
 # The file beside the blocks that says what they belong to.
 MARK = "study"
+# What stands between a NetCDF file and its checksum, which HDF5 does not see.
+_SEAL = b"thud sha256 "
 
 
 class Blocks:
@@ -221,8 +224,11 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
     """Open a file or Zarr group to be read."""
     with _readable(path):
         with uninterrupted():
-            zarr = path.suffix == ".zarr"
-            dataset = _open_zarr(path) if zarr else xr.open_dataset(path, engine="h5netcdf")
+            if path.suffix == ".zarr":
+                dataset = _open_zarr(path)
+            else:
+                _require_whole(path)
+                dataset = xr.open_dataset(path, engine="h5netcdf")
         with dataset:
             yield dataset
 
@@ -245,7 +251,17 @@ def _readable(path: Path) -> Iterator[None]:
 def _write(dataset: xr.Dataset, path: Path) -> None:
     """Write a NetCDF file, completely or not at all."""
     with uninterrupted():
-        replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
+        content = bytes(dataset.to_netcdf(engine="h5netcdf"))
+        replace_file(path, content + _SEAL + sha256(content).digest())
+
+
+def _require_whole(path: Path) -> None:
+    """Raise ValueError where a NetCDF file is damaged: HDF5 may search such a file for ever."""
+    content, seal, digest = path.read_bytes().rpartition(_SEAL)
+    # Files of an older thud have no checksum.
+    if seal and sha256(content).digest() != digest:
+        message = "wrong checksum"
+        raise ValueError(message)
 
 
 @contextmanager

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 FORMATS = (".png", ".svg")
 # More differences than this are counted only.
-_MAX_TOLD = 3
+_MAX_SHOWN = 3
 
 
 class Directory:
@@ -86,6 +86,8 @@ class Directory:
             return
         try:
             before = self._kind.identity_in(path)
+        except InputError:
+            raise
         except (ValueError, LookupError, TypeError, FileNotFoundError) as error:
             message = (
                 f"{path} is of something else, or of an older thud; "
@@ -94,21 +96,17 @@ class Directory:
             raise InputError(message) from error
         if before is None:
             return
-        told = differences(before, self._study.identity)
-        if not told:
+        changes = differences(before, self._study.identity)
+        if not changes:
             return
         if not self._replace:
             message = (
-                f"{path} belongs to another version of this study: {told}; "
+                f"{path} belongs to another version of this study: {changes}; "
                 "allowed: another directory, or --replace (replace=True) to compute it anew"
             )
             raise InputError(message)
         for name in (*self._kind.results(self._study), *self._kind.other_files(self._study)):
             remove(self.folder / name)
-
-    def save(self, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
-        """Write files by their names, and figures as PNG and SVG; return their paths."""
-        return save(self.folder, files, figures)
 
 
 def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
@@ -141,13 +139,13 @@ def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:
     >>> differences({"[design] size": "500"}, {"[design] size": "1000", "[design] seed": "1"})
     '[design] size = 500 is now 1000, [design] seed = 1 is new'
     """
-    told = []
+    changes = []
     for key in {**before, **now}:
         if key not in before:
-            told.append(f"{key} = {now[key]} is new")
+            changes.append(f"{key} = {now[key]} is new")
         elif key not in now:
-            told.append(f"{key} = {before[key]} is gone")
+            changes.append(f"{key} = {before[key]} is gone")
         elif before[key] != now[key]:
-            told.append(f"{key} = {before[key]} is now {now[key]}")
-    more = [f"{len(told) - _MAX_TOLD} more"] if len(told) > _MAX_TOLD else []
-    return ", ".join(told[:_MAX_TOLD] + more)
+            changes.append(f"{key} = {before[key]} is now {now[key]}")
+    more = [f"{len(changes) - _MAX_SHOWN} more"] if len(changes) > _MAX_SHOWN else []
+    return ", ".join(changes[:_MAX_SHOWN] + more)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Un
 
 from thud.checks import require_words
 from thud.errors import InputError
-from thud.studies.directory import Directory
+from thud.studies.directory import Directory, save
 from thud.studies.study import Study, read_common, read_content
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Kind(ABC, Generic[S, R]):
             return self.compute(study, None, **how)
         with self.take(study, output, replace=how.get("replace", False)) as directory:
             result = self.compute(study, directory, **how)
-            directory.save(self.files(result, study), {})
+            save(directory.folder, self.files(result, study), {})
             return result
 
     def take(self, study: S, folder: str | os.PathLike[str], *, replace: bool = False) -> Directory:

@@ -29,7 +29,7 @@ Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
 
 # What every study may hold.
 WORDS = ("name", "case", "fixed", "parameters")
-# Texts longer than this are told by their beginning where results are compared.
+# Longer texts are compared by their beginning and a checksum.
 _LONG = 300
 # Where spreads are tried for whether a case with fixed values can be valid.
 _SHARES = np.array([0.01, 0.5, 0.99])
@@ -86,7 +86,7 @@ class Study:
 
 
 def _shortened(text: str) -> str:
-    """Return a text, or the beginning of a long one with a number that tells it from others."""
+    """Return a text, or the beginning of a long one with its checksum."""
     if len(text) <= _LONG:
         return text
     import hashlib  # noqa: PLC0415 - seldom needed
