@@ -22,16 +22,6 @@ MANIFEST = ".thud"
 PART = ".thud.new"
 
 
-def require_own(path: Path, *, mine: bool) -> None:
-    """Raise InputError where the results of another study stand."""
-    if not mine:
-        message = (
-            f"{path} belongs to another study, or to another version of this one; "
-            f"allowed: another directory, or remove it first"
-        )
-        raise InputError(message)
-
-
 def lock(folder: Path, result: Path) -> int:
     """Keep other runs away from a directory until the descriptor is closed that it returns.
 

@@ -1,11 +1,12 @@
 !> The flat API for Python to levels and verdicts; see `thud_api`.
 module thud_level_api
    use thud_band, only: band_set_names, band_type, find_bands, get_set_bands => get_bands
+   use thud_constants, only: recorded_band
    use thud_error, only: error_type, get_status
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
-      get_source_limits, recorded_band, source_limits_type, source_names
+      get_source_limits, source_limits_type, source_names
    use thud_transform, only: get_low_pass
    implicit none (type, external)
    private

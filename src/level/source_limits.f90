@@ -2,6 +2,7 @@
 !> (JIS A 1418-2:2019 tables A.1 and A.2, ISO 10140-5:2021 table F.1, ISO 16283-2:2020 table A.1).
 module thud_source_limits
    use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_constants, only: recorded_band
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_text, only: join_quoted, quoted
@@ -9,7 +10,7 @@ module thud_source_limits
    implicit none (type, external)
    private
 
-   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits, recorded_band
+   public :: conforms, criterion_type, get_criteria, get_peak_count, get_source_limits
    public :: criterion_count, source_limits_type, source_names
 
    !> Criteria of a verdict: the octaves, contact time, restitution, peaks, mass, drop height.
@@ -19,10 +20,6 @@ module thud_source_limits
    !> The standards ask for a single peak without defining one; ripples of a few percent do not
    !> make a second impact.
    real(wp), parameter :: peak_prominence = 0.1_wp
-
-   !> Upper edge of the band that force plates are read in, Hz (paper section 3); the standards' limits
-   !> end at 707 Hz.
-   real(wp), parameter :: recorded_band = 1250.0_wp
 
    !> Minimum and maximum conforming values of one source.
    type :: source_limits_type

@@ -116,12 +116,9 @@ def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]
         paths.append(folder / name)
         replace_file(paths[-1], content)
     if figures:
-        from thud.plot import save as save_figure  # noqa: PLC0415 - matplotlib takes its time
+        from thud.plot import save_all  # noqa: PLC0415 - matplotlib takes its time
 
-        for name, figure in figures.items():
-            for ending in FORMATS:
-                paths.append(folder / f"{name}{ending}")
-                save_figure(figure, paths[-1])
+        paths += save_all(figures, folder)
     return paths
 
 

@@ -66,7 +66,7 @@ contains
       !> The time, s.
       real(wp) :: cost
 
-      cost = 6.0e-3_wp*(options%rings/44.0_wp)**2
+      cost = 6.0e-3_wp*(options%rings/44.0_wp)
    end function get_cost
 
    !> Force history of one drop.
