@@ -102,6 +102,7 @@ contains
       real(wp) :: value
       real(wp) :: operand
       integer :: start, length, place, status
+      character(len=len(expression)) :: word
       character(len=1) :: operator
 
       value = 1.0_wp
@@ -109,15 +110,14 @@ contains
       start = 1
       do
          length = scan(expression(start:)//'*', '*/') - 1
-         associate (word => adjustl(expression(start:start + length - 1)))
-            place = findloc(keys == word, .true., dim=1)
-            if (place > 0) then
-               operand = values(place)
-            else
-               read (word, *, iostat=status) operand
-               if (status /= 0) operand = ieee_value(operand, ieee_quiet_nan)
-            end if
-         end associate
+         word = adjustl(expression(start:start + length - 1))
+         place = findloc(keys == word, .true., dim=1)
+         if (place > 0) then
+            operand = values(place)
+         else
+            read (word, *, iostat=status) operand
+            if (status /= 0) operand = ieee_value(operand, ieee_quiet_nan)
+         end if
          if (operator == '*') value = value*operand
          if (operator == '/') value = value/operand
          start = start + length + 1
