@@ -18,9 +18,8 @@ from thud.case import Case, read_case, write_case
 from thud.ensemble import Ensemble, solve_many
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import Impact, solve, solve_case
+from thud.impact import Impact, Motion, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
-from thud.motion import Motion
 from thud.recording import Recording
 from thud.results import read_results
 from thud.studies import kinds

@@ -5,6 +5,7 @@ Bundles of the library become dictionaries, its status codes exceptions.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -15,16 +16,12 @@ from thud.errors import InputError, NumericalError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     # By name: text, number, array, or more of them.
     Bundle = dict[str, Any]
 
 api = _core.thud_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
-
 
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
@@ -91,20 +88,12 @@ def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
             place[name] = texts[at["text"] : at["text"] + length]
             at["text"] += length
         else:
-            place[name] = _shaped(values, at["values"], extents, length)
+            chunk = values[at["values"] : at["values"] + length]
+            place[name] = chunk.reshape(extents, order="F") if extents else float(chunk[0])
             at["values"] += length
     if status:
         raise _ERRORS.get(status, NumericalError)(text(found["message"]))
     return found
-
-
-def _shaped(
-    values: NDArray[np.float64], start: int, extents: tuple[int, ...], length: int
-) -> float | NDArray[np.float64]:
-    """Return a number, or an array of the library."""
-    if not extents:
-        return float(values[start])
-    return values[start : start + length].reshape(extents, order="F")
 
 
 @lru_cache(maxsize=64)
@@ -118,10 +107,7 @@ def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
             items.append((group, name, None, int(form[1:])))
             continue
         extents = tuple(int(extent) for extent in form.split(",") if extent)
-        length = 1
-        for extent in extents:
-            length *= extent
-        items.append((group, name, extents, length))
+        items.append((group, name, extents, math.prod(extents)))
     return items
 
 
@@ -141,6 +127,5 @@ def version() -> str:
 
 
 def compiler() -> str:
-    """Compiler of the library, with its options but for the places of files."""
-    # Options that name places say nothing.
+    """Compiler of the library and its options, without those that hold paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))

@@ -23,12 +23,11 @@ from thud._schema import (
     Modes,
     Sampling,
 )
-from thud.checks import LARGEST, require_kind, shown
+from thud.checks import LARGEST, require_choice, require_kind, require_words, shown
 from thud.errors import InputError
 from thud.files import replace_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from dataclasses import Field
     from typing import Any, Self
 
@@ -52,20 +51,9 @@ def new_model(name: str, options: dict[str, object]) -> ModelOptions:
     InputError
         Where the model or an option is not known; lists those that are.
     """
-    if name not in MODELS:
-        message = f"&model: name = {name!r} is not allowed; allowed: {_listed(MODELS)}"
-        raise InputError(message)
-    known = [option.name for option in fields(MODELS[name])]
-    for option in options:
-        if option not in known:
-            message = f"&{name}: {option} is not a known key; allowed: {_listed(known)}"
-            raise InputError(message)
+    require_choice("&model: name", name, MODELS)
+    require_words(f"&{name}", options, [option.name for option in fields(MODELS[name])])
     return MODELS[name](**options)  # type: ignore[arg-type]
-
-
-def _listed(words: Iterable[str]) -> str:
-    """Return words in quotes with commas between."""
-    return ", ".join(map(repr, words))
 
 
 @dataclass(frozen=True)

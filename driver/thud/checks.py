@@ -11,9 +11,10 @@ import numpy as np
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Container, Iterable
     from types import UnionType
 
+    from numpy.typing import ArrayLike, NDArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -36,6 +37,39 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         )
         message = f"{name} = {shown(value)} is not allowed; allowed: an object of {expected}"
         raise InputError(message)
+
+
+def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
+    """Raise InputError where a word is not one of those that are allowed."""
+    choices = list(allowed)
+    if value not in choices:
+        message = f"{name} = {shown(value)} is not known; allowed: {', '.join(map(repr, choices))}"
+        raise InputError(message)
+
+
+def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
+    """Return an array; raise InputError where it is ragged, masked or of other dimensions."""
+    allowed = "allowed: one dimension" + (", or a scalar" if 0 in dimensions else "")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # rows of different length
+        message = f"{name} is not an array of numbers; {allowed}"
+        raise InputError(message) from error
+    if array.ndim not in dimensions:
+        message = f"{name} has {array.ndim} dimensions; {allowed}"
+        raise InputError(message)
+    if np.ma.is_masked(values):
+        message = f"{name} has masked entries; allowed: values only"
+        raise InputError(message)
+    return array
+
+
+def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
+    """Return an array as float64; raise InputError where it holds other than real numbers."""
+    if array.size and array.dtype.kind not in kinds:
+        message = f"{name} is not an array of real numbers; allowed: one dimension of them"
+        raise InputError(message)
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
@@ -89,10 +123,3 @@ def refuse_old_words(function: Callable[P, R]) -> Callable[P, R]:
         return function(*arguments, **keywords)
 
     return checked
-
-
-def require_output(output: str | None) -> None:
-    """Raise InputError where the directory of a command line has no name."""
-    if output is not None and not output.strip():
-        message = "--output has no value; allowed: a directory"
-        raise InputError(message)

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from thud._api import call, collect, ensemble_api, text
 from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
-from thud.checks import require_kind, require_whole
+from thud.checks import require_array, require_choice, require_kind, require_real, require_whole
 from thud.errors import InputError
 from thud.impact import FORCES
 from thud.keys import find_key
@@ -300,7 +300,7 @@ def _columns(
         if key not in KEYS:
             message = f"{key.name!r} is a parameter of studies; allowed: keys of the input"
             raise InputError(message)
-    given = [_array(name, values) for name, values in parameters.items()]
+    given = [require_array(name, values, (0, 1)) for name, values in parameters.items()]
     numbers = [_numbers(key, array) for key, array in zip(keys, given, strict=True)]
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, given))
@@ -317,32 +317,10 @@ def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
     if key.kind == "choice":
         words, index = np.unique(array.astype(str), return_inverse=True)
         for word in words:
-            if word not in key.choices:
-                allowed = ", ".join(map(repr, key.choices))
-                message = f"{key.name} = {str(word)!r} is not allowed; allowed: {allowed}"
-                raise InputError(message)
+            require_choice(key.name, str(word), key.choices)
         places = np.array([key.choices.index(word) + 1.0 for word in words])
         return places[index].reshape(array.shape)
-    if array.size and array.dtype.kind not in ("b" if key.kind == "flag" else "iuf"):
-        message = f"{key.name} is not an array of real numbers; allowed: one dimension of them"
-        raise InputError(message)
-    return array.astype(np.float64)
-
-
-def _array(key: str, values: ArrayLike) -> NDArray[Any]:
-    """Return an array of at most one dimension."""
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError) as error:  # rows of different length
-        message = f"{key} is not an array; allowed: one dimension"
-        raise InputError(message) from error
-    if array.ndim > 1:
-        message = f"{key} has {array.ndim} dimensions; allowed: one, or a scalar"
-        raise InputError(message)
-    if np.ma.is_masked(values):
-        message = f"{key} has masked entries; allowed: values only"
-        raise InputError(message)
-    return array
+    return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")
 
 
 def _threads(threads: int | None) -> int:

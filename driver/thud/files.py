@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
 # The file that lists which files of a result directory are not the user's.
 MANIFEST = ".thud"
@@ -44,17 +44,24 @@ def lock(folder: Path, result: Path) -> int:
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Hold an interrupt back until something short is done: libraries of files leave noise else."""
+def on_interrupt(handler: Callable[[int, object], object] | signal.Handlers) -> Iterator[None]:
+    """Handle interrupts by another handler; only the main thread can, others leave it as it is."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    held: list[int] = []
-    usual = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    usual = signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Defer an interrupt until a short operation is done; file libraries print errors otherwise."""
+    held: list[int] = []
+    with on_interrupt(lambda number, _: held.append(number)):
+        yield
     if held:
         raise KeyboardInterrupt
 

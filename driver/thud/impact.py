@@ -10,10 +10,9 @@ import numpy as np
 from thud._api import api, call
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
-from thud.checks import require_kind
+from thud.checks import require_choice, require_kind
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
-from thud.motion import Motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,6 +20,41 @@ if TYPE_CHECKING:
     from thud._api import Bundle
 
 FORCES = ("elastic", "floor")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Snapshots of the half section of the ball, the floor at height 0.
+
+    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
+    components are the distance from the axis and the height.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n_snapshot,)
+        Times since the record began, s.
+    start : ndarray, shape (n_line, n_ring, 2)
+        Positions of the nodes before the impact, m.
+    position : ndarray, shape (n_snapshot, n_line, n_ring, 2)
+        Positions of the nodes, m.
+    velocity : ndarray, shape (n_snapshot, n_line, n_ring, 2)
+        Velocities of the nodes, m/s.
+    contact_pressure : ndarray, shape (n_snapshot, n_line)
+        Pressure on the floor at the nodes of the outer surface, Pa.
+    cavity_pressure : ndarray, shape (n_snapshot,)
+        Overpressure of the gas in the ball, Pa.
+    """
+
+    time: NDArray[np.float64]
+    start: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    contact_pressure: NDArray[np.float64]
+    cavity_pressure: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        """Return the size of the snapshots; their arrays would fill pages."""
+        return f"<Motion: {len(self.time)} snapshots of {self.start[..., 0].size} nodes>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +159,7 @@ class Impact:
 
     def force(self, kind: str = "elastic") -> NDArray[np.float64]:
         """Return the ``"elastic"`` or the ``"floor"`` force, N, shape (n_sample,)."""
-        if kind not in FORCES:
-            message = f"force = {kind!r} is not known; allowed: {', '.join(map(repr, FORCES))}"
-            raise InputError(message)
+        require_choice("force", kind, FORCES)
         return self.elastic_force if kind == "elastic" else self.floor_force
 
     def levels(

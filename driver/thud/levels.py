@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._api import call_direct, level_api, trimmed
+from thud.checks import require_array, require_choice, require_real
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -108,8 +109,7 @@ def get_bands(bands: str = "octave") -> Bands:
         Where `bands` is something else.
     """
     if not isinstance(bands, str):
-        message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
-        raise InputError(message)
+        require_choice("bands", bands, BANDWIDTHS)
     return _bands(bands)
 
 
@@ -280,21 +280,7 @@ def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
     """Return a record as the library takes it."""
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError) as error:  # rows of different length
-        message = f"{name} is not an array of numbers; allowed: one dimension of real numbers"
-        raise InputError(message) from error
-    if array.ndim != 1:
-        message = f"{name} has {array.ndim} dimensions; allowed: one, of real numbers"
-        raise InputError(message)
-    if array.size and array.dtype.kind not in "iuf":
-        message = f"{name} is not an array of real numbers; allowed: one dimension of them"
-        raise InputError(message)
-    if np.ma.is_masked(values):
-        message = f"{name} has masked entries; allowed: numbers only"
-        raise InputError(message)
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
 def _number(name: str, value: object) -> float:

@@ -13,8 +13,7 @@ import numpy as np
 from thud._schema import SCALARS
 from thud.case import Case
 from thud.errors import InputError
-from thud.impact import Impact
-from thud.motion import Motion
+from thud.impact import Impact, Motion
 
 if TYPE_CHECKING:
     import os

@@ -8,17 +8,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from thud._api import version
-from thud.cli.command import (
-    NO_FIGURES,
-    QUIET,
-    Command,
-    argument,
-    exit_code,
-    output,
-    sentence,
-)
-from thud.cli.compare import compare_cases
-from thud.cli.figures import draw_figures
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
 from thud.errors import InputError, ThudError
@@ -92,6 +83,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return InputError.exit_code if stop.code else 0
     command = COMMANDS[options.name]
     try:
+        if options.output is not None and not options.output.strip():
+            message = "--output has no value; allowed: a directory"
+            raise InputError(message)
         code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -15,16 +13,14 @@ from tqdm import tqdm
 
 from thud._api import api, call, text
 from thud.case import Case, read_case
-from thud.checks import require_output
 from thud.cli.command import exit_code, sentence
 from thud.errors import InputError, ThudError
-from thud.files import add_files
+from thud.files import add_files, on_interrupt
 from thud.free_modes import new_modes
 from thud.impact import new_impact
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
 
     from thud._api import Bundle
 
@@ -50,7 +46,6 @@ def run_cases(options: argparse.Namespace) -> int:
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
     """Run one case as the executable does, then draw it; return whether it conforms."""
-    require_output(options.output)
     case = read_case(path)
     output = options.output or ""
     if output and len(options.cases) > 1:
@@ -62,7 +57,9 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[case.name] = path
-    with _interruptible():
+    # An interrupt ends the process at once: Python would wait for the library, and results are
+    # switched in one step.
+    with on_interrupt(signal.SIG_DFL):
         found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
     if found["remark"]:
         tqdm.write(f"thud-driver: {text(found['remark'])}", file=sys.stderr)
@@ -91,19 +88,3 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
         if animation and impact is not None and impact.motion:
             plot.animate(impact, folder / "motion.gif")
         return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let an interrupt end the process at once; Python would wait for the end of the call.
-
-    Nothing is lost: results are written as a whole, or not at all.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    usual = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)

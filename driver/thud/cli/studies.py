@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.checks import require_output
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
 from thud.errors import NumericalError, ThudError
 from thud.studies.directory import save
@@ -63,7 +62,6 @@ def study_commands() -> dict[str, Command]:
 
 def run_study(options: argparse.Namespace) -> int:
     """Run a study, print what it tells, save files and figures; return the exit code."""
-    require_output(options.output)
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
     how: How = {"progress": not options.quiet}

@@ -5,8 +5,15 @@ where it belongs: ``thud-driver run`` leaves ``IMPACT_FIGURES`` and ``MODES_FIGU
 results of a case, ``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
 """
 
-from thud.plot.catalogue import case_figures as case_figures
-from thud.plot.catalogue import documentation_figures as documentation_figures
+import importlib
+import pkgutil
+from collections.abc import Callable
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from thud.free_modes import FreeModes
+from thud.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
@@ -34,3 +41,40 @@ from thud.plot.motion import motion as motion
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
 from thud.plot.sweep import draw_sweep as draw_sweep
 from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
+
+
+def case_figures(impact: Impact | None = None, modes: FreeModes | None = None) -> dict[str, Figure]:
+    """Draw the figures of a case.
+
+    Parameters
+    ----------
+    impact
+        The impact, of a case with a source model.
+    modes
+        The free modes, of a case that asks for them.
+
+    Returns
+    -------
+    dict of str to Figure
+        Figures by the names of their files, without those that have nothing to show.
+    """
+    given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes}
+    drawn = {
+        name: draw(results)
+        for kind, results in given.items()
+        if results
+        for name, draw in _declared(kind).items()
+    }
+    return {name: figure for name, figure in drawn.items() if figure}
+
+
+def documentation_figures() -> dict[str, Callable[[], Figure]]:
+    """Return functions that compute and draw the figures of the documentation, by name."""
+    return _declared("DOCUMENTATION_FIGURES")
+
+
+def _declared(kind: str) -> dict[str, Callable[..., Any]]:
+    """Return what the files of this package declare under a name."""
+    found = pkgutil.iter_modules(__path__, f"{__name__}.")
+    modules = [importlib.import_module(file.name) for file in found]
+    return {name: draw for module in modules for name, draw in getattr(module, kind, {}).items()}
