@@ -42,7 +42,7 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
 def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
     """Raise InputError where a word is not one of those that are allowed."""
     choices = list(allowed)
-    if value not in choices:
+    if not isinstance(value, str) or value not in choices:
         message = f"{name} = {shown(value)} is not known; allowed: {', '.join(map(repr, choices))}"
         raise InputError(message)
 
