@@ -55,8 +55,7 @@ __all__ = [  # noqa: PLE0604 - the first are strings too
 ]
 
 
-# What needs matplotlib, plotly, SciPy or xarray is imported when it is first asked for: that takes
-# time.
+# What needs matplotlib, plotly, SciPy or xarray is imported at first use: these are slow to import.
 _LATE = {
     "plot": None,
     "comparison": None,
@@ -66,7 +65,7 @@ _LATE = {
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it
-    """Import modules that take their time when they are first asked for."""
+    """Import slow modules at first use."""
     if name in kinds.PUBLIC:
         return getattr(kinds.load(kinds.PUBLIC[name]), name)
     if name in _LATE:

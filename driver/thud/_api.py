@@ -27,7 +27,7 @@ _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
 def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
-    """Call a procedure of the library and return what it gives by name.
+    """Call a procedure of the library and return its results by name.
 
     Parameters
     ----------
@@ -39,8 +39,7 @@ def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
     Returns
     -------
     dict
-        Texts, numbers and arrays; those with a dot in their name stand in dictionaries of what is
-        before the dot.
+        Texts, numbers and arrays; those named ``group.name`` are in a dictionary for each group.
 
     Raises
     ------
@@ -51,7 +50,7 @@ def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
 
 
 def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
-    """Call a procedure that gives its results directly, and return them.
+    """Call a procedure that returns its results directly.
 
     Parameters
     ----------
@@ -77,7 +76,7 @@ def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> 
 
 
 def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
-    """Return what the library has left under a handle; see `call`."""
+    """Return the results that the library holds under a handle; see `call`."""
     data, values = api.collect(handle, n_byte, n_value)
     header, _, texts = data.tobytes().partition(b"\0")
     found: Bundle = {}
@@ -98,7 +97,7 @@ def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
 
 @lru_cache(maxsize=64)
 def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
-    """Return group, name, extents and length of what a header names; texts have no extents."""
+    """Return group, name, extents and length of each item of a header; texts have no extents."""
     items: list[tuple[str, str, tuple[int, ...] | None, int]] = []
     for line in header.decode().splitlines():
         full, _, form = line.partition("\t")
@@ -112,20 +111,20 @@ def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
 
 
 def text(value: bytes) -> str:
-    """Return a text of the library; bytes that are no UTF-8 stay what they are."""
+    """Return a text of the library; invalid UTF-8 is kept by surrogate escapes."""
     return value.decode(errors="surrogateescape")
 
 
 def trimmed(value: bytes) -> str:
-    """Text of the library without the blanks behind it."""
+    """Return a text of the library without trailing blanks."""
     return text(value).rstrip()
 
 
 def version() -> str:
-    """Version of the library."""
+    """Return the version of the library."""
     return text(call(api.describe_library)["version"])
 
 
 def compiler() -> str:
-    """Compiler of the library and its options, without those that hold paths."""
+    """Return the compiler of the library and its options, without those that hold paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))

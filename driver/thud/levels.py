@@ -50,16 +50,16 @@ class Bands:
 
 @dataclass(frozen=True)
 class Criterion:
-    """One quantity and the range that the standards ask for.
+    """One quantity and the range that the standards require.
 
     Attributes
     ----------
     name, unit : str
         Name and unit of the quantity; levels in dB re 1 N.
     value, lower, upper : float
-        Value of the source and the ends of the range, which belong to it.
+        Value of the source, and the limits, which are allowed values.
     conforms : bool
-        The value lies in the range.
+        Whether the value lies within the limits.
     """
 
     name: str
@@ -87,7 +87,7 @@ class Conformity:
 
     @property
     def conforms(self) -> bool:
-        """All criteria are met."""
+        """Whether all criteria are met."""
         return all(criterion.conforms for criterion in self.criteria)
 
     def __bool__(self) -> bool:
@@ -106,7 +106,7 @@ def get_bands(bands: str = "octave") -> Bands:
     Raises
     ------
     InputError
-        Where `bands` is something else.
+        Where `bands` is not one of these.
     """
     if not isinstance(bands, str):
         require_choice("bands", bands, BANDWIDTHS)
@@ -115,7 +115,7 @@ def get_bands(bands: str = "octave") -> Bands:
 
 @cache
 def _bands(name: str) -> Bands:
-    """Return the bands of a set."""
+    """Return the bands of a name."""
     (n_band,) = call_direct(level_api.count_bands, _word(name))
     columns = level_api.get_bands(name, n_band)
     for column in columns:
@@ -140,20 +140,20 @@ def force_exposure_levels(
     bands
         ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
     method
-        ``"exact"``: the energy of the record as it is; ``"fft"``: the sum over the 1 Hz bins of
-        a record of 1 s, as in the paper.
+        ``"exact"``: the band energy of the finite record; ``"fft"``: the sum over the 1 Hz bins
+        of a record of 1 s, as in the paper.
 
     Returns
     -------
     ndarray, shape (n_band,)
-        Levels in ascending bands, dB re 1 N and 1 s. Bands whose energy is lost in the rounding
-        of the whole (156 dB below it) have the level of that rounding.
+        Levels in ascending bands, dB re 1 N and 1 s. The rounding error, 156 dB below the total
+        energy, is the minimum level of a band.
 
     Raises
     ------
     InputError
         Where the record is empty, zero throughout, not finite or not one-dimensional, or the
-        rate, the bands or the method cannot be used.
+        rate, the bands or the method are invalid.
     """
     count = len(get_bands(bands).nominal)
     record = _record(force)
@@ -164,7 +164,7 @@ def force_exposure_levels(
 
 
 def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
-    """Return what a force plate records of a force: the part below 1.25 kHz (paper, section 3).
+    """Return the part of a force that a force plate records, below 1.25 kHz (paper, section 3).
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
     Returns
     -------
     ndarray, shape (n_sample,)
-        The part, N.
+        Recorded force, N.
     """
     recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
     return recorded
@@ -188,7 +188,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     Parameters
     ----------
     force : array_like, shape (n_sample,)
-        Force, N, that starts and ends at zero; the part below 1.25 kHz counts.
+        Force, N, that starts and ends at zero; only its part below 1.25 kHz is used.
     sample_rate : float
         Samples per second, Hz.
 
@@ -233,14 +233,14 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     mass
         Mass of the source, kg.
     drop_height
-        Height of drop, m.
+        Drop height, m.
     source
         ``"rubber_ball"`` or ``"tyre"``.
 
     Raises
     ------
     InputError
-        Where the source is not known or `levels` does not hold five numbers.
+        Where the source is not known or `levels` are not five numbers.
     """
     octaves = _record(levels, "levels")
     nominal = get_bands(BANDWIDTHS[0]).nominal
@@ -279,12 +279,12 @@ def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
-    """Return a record as the library takes it."""
+    """Return a record as a contiguous array."""
     return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
 def _number(name: str, value: object) -> float:
-    """Return a number as a float."""
+    """Return a number as float; raise InputError where it is not one."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError) as error:
@@ -294,5 +294,5 @@ def _number(name: str, value: object) -> float:
 
 
 def _word(value: object) -> bytes:
-    """Return a word for the library, which knows those of ASCII only."""
+    """Return a word in ASCII, for the library."""
     return str(value).encode("ascii", "replace")

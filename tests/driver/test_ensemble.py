@@ -215,7 +215,7 @@ def test_scalars_and_defaults() -> None:
             {},
             "'radius' is not a key of hollow_sphere; allowed: outer_radius, wall_th",
         ),
-        ({"height": [1, 2], "mass": [1, 2, 3]}, {}, "do not fit each other: height (2,), mass"),
+        ({"height": [1, 2], "mass": [1, 2, 3]}, {}, "differ in length: height (2,), mass"),
         ({"height": [[1]]}, {}, "height has 2 dimensions"),
         ({"height": [[1], [1, 2]]}, {}, "height is not an array"),
         ({"height": ["one"]}, {}, "height is not an array of real numbers"),

@@ -27,7 +27,7 @@ COMMANDS = {
             output(
                 "the results; one below it for each of several cases (default: outputs/<case name>)"
             ),
-            argument("--check", action="store_true", help="exit with 3 where a source fails"),
+            argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
             NO_FIGURES,
             argument(
                 "--animation", action="store_true", help="also motion.gif, of cases with snapshots"
@@ -51,7 +51,7 @@ COMMANDS = {
             QUIET,
         ),
         compare_cases,
-        "a page is kept only when it is done",
+        "nothing is written",
     ),
     **study_commands(),
     "figures": Command(
@@ -73,13 +73,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming,
+        0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (``run --check``),
         130 interrupted.
     """
     try:
         options = _parser().parse_args(arguments)
     except SystemExit as stop:
-        # argparse leaves with 2 for bad usage, which is a numerical failure here.
+        # argparse exits with 2 for bad usage, which is a numerical failure here.
         return InputError.exit_code if stop.code else 0
     command = COMMANDS[options.name]
     try:
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
-            # A screen that is full or closed; what Python still wants to write goes nowhere.
+            # Standard output is full or closed: discard what is still buffered.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"thud-driver: {sentence(error)}", file=sys.stderr)
         return exit_code(error)

@@ -28,7 +28,7 @@ NOT_CONFORMING = 3
 
 
 def run_cases(options: argparse.Namespace) -> int:
-    """Run cases, a bad one or not; return the exit code."""
+    """Run all cases, even where one fails; return the exit code."""
     worst = 0
     options.done = {}
     for path in tqdm(options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet):
@@ -53,7 +53,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     if case.name in options.done:
         message = (
             f"{path}: its name {case.name!r} is that of {options.done[case.name]}, "
-            "whose results it would replace; allowed: cases of different names, or one by one"
+            "whose results it would replace; allowed: different names, or separate runs"
         )
         raise InputError(message)
     options.done[case.name] = path
@@ -73,7 +73,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
 
 
 def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, bytes]:
-    """Return the files of the figures of a run, drawn from what it has in memory."""
+    """Return the files of the figures of a run, drawn from its results in memory."""
     if not (figures or animation):
         return {}
     from thud import plot  # noqa: PLC0415 - matplotlib takes its time
