@@ -35,7 +35,7 @@ contains
       type(error_type), allocatable :: error
 
       allocate (bundle)
-      call read_case(text, 'python', case, error)
+      call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) then
          call new_many(case, .true., many)
          call bundle%add_number('outcome', real(outcome_count, wp))
@@ -106,7 +106,7 @@ contains
       integer :: i
 
       allocate (bundle)
-      call read_case(text, 'python', case, error)
+      call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
          call take_many(many)
