@@ -64,7 +64,7 @@ _LATE = {
 }
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or an object of it
     """Import slow modules at first use."""
     if name in kinds.PUBLIC:
         return getattr(kinds.load(kinds.PUBLIC[name]), name)

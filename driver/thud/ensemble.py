@@ -182,7 +182,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     # Without parameters there is one drop, that of the case.
     columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
     sizes = call(ensemble_api.size_many, content)
-    width = _threads(threads)
+    width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
+    require_whole("threads", width, 1, MAX_THREADS)
     results = _allocate(len(numbers), sizes, forces=forces)
     work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
     with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
@@ -244,7 +245,7 @@ def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[A
         raise InputError(message) from error
 
 
-def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
+def _compute(  # noqa: PLR0913, PLR0917 - those of the library
     content: bytes,
     columns: Mapping[str, Any],
     numbers: NDArray[np.float64],
@@ -322,11 +323,3 @@ def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
         places = np.array([key.choices.index(word) + 1.0 for word in words])
         return places[index].reshape(array.shape)
     return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")
-
-
-def _threads(threads: int | None) -> int:
-    """Return the number of threads."""
-    if threads is None:
-        return min(len(os.sched_getaffinity(0)), MAX_THREADS)
-    require_whole("threads", threads, 1, MAX_THREADS)
-    return int(threads)

@@ -1,8 +1,8 @@
 """Figures, each in a file of its own.
 
 A file holds the function that draws its figure, as wide as a column of a journal page, and declares
-where it belongs: ``thud-driver run`` leaves ``IMPACT_FIGURES`` and ``MODES_FIGURES`` beside the
-results of a case, ``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
+its use: ``thud-driver run`` adds ``IMPACT_FIGURES`` and ``MODES_FIGURES`` to the results of a case,
+``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
 """
 
 import importlib
@@ -44,19 +44,9 @@ from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
 
 
 def case_figures(impact: Impact | None = None, modes: FreeModes | None = None) -> dict[str, Figure]:
-    """Draw the figures of a case.
+    """Draw the figures of a case that has an impact, free modes or both.
 
-    Parameters
-    ----------
-    impact
-        The impact, of a case with a source model.
-    modes
-        The free modes, of a case that asks for them.
-
-    Returns
-    -------
-    dict of str to Figure
-        Figures by the names of their files, without those that have nothing to show.
+    Return the figures by the names of their files, without those that have nothing to show.
     """
     given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes}
     drawn = {
@@ -74,7 +64,7 @@ def documentation_figures() -> dict[str, Callable[[], Figure]]:
 
 
 def _declared(kind: str) -> dict[str, Callable[..., Any]]:
-    """Return what the files of this package declare under a name."""
+    """Return the figures that the files of this package declare under a name."""
     found = pkgutil.iter_modules(__path__, f"{__name__}.")
     modules = [importlib.import_module(file.name) for file in found]
     return {name: draw for module in modules for name, draw in getattr(module, kind, {}).items()}

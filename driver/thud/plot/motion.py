@@ -45,7 +45,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     Raises
     ------
     InputError
-        Where the impact has no snapshots, or no figure has so many panels.
+        Where the impact has no snapshots, or there are too many instants.
     """
     shown = _snapshots(impact)
     require_panels("instants", instants)
@@ -121,7 +121,7 @@ def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
 
 
 def _label(impact: Impact) -> str:
-    """Return what colours and arrows mean."""
+    """Return the meaning of colours and arrows."""
     return f"Displacement, mm (arrows: a third of the radius is {impact.impact_velocity:.1f} m/s)"
 
 
