@@ -27,47 +27,18 @@ _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
 def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
-    """Call a procedure of the library and return its results by name.
+    """Call a procedure whose results are a status, a handle and sizes; return its bundle.
 
-    Parameters
-    ----------
-    routine
-        Procedure of `api` whose results are a status, a handle and sizes.
-    *arguments
-        Its arguments.
-
-    Returns
-    -------
-    dict
-        Texts, numbers and arrays; those named ``group.name`` are in a dictionary for each group.
-
-    Raises
-    ------
-    InputError, NumericalError
-        With the sentence of the library.
+    It holds texts, numbers and arrays by name; those named ``group.name`` are in a dictionary for
+    each group. Raise InputError or NumericalError with the message of the library.
     """
     return collect(*routine(*arguments))
 
 
 def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
-    """Call a procedure that returns its results directly.
+    """Call a procedure whose last two results are a status and a message; return the others.
 
-    Parameters
-    ----------
-    routine
-        Procedure whose last two results are a status and a message.
-    *arguments
-        Its arguments.
-
-    Returns
-    -------
-    tuple
-        The other results.
-
-    Raises
-    ------
-    InputError, NumericalError
-        With the sentence of the library.
+    Raise InputError or NumericalError with the message.
     """
     *results, status, message = routine(*arguments)
     if status:

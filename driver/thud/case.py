@@ -174,7 +174,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
 
 
 def check_case(case: Case) -> None:
-    """Raise InputError with the sentence of the library where a case cannot be computed."""
+    """Raise InputError with the message of the library where a case is invalid."""
     call(api.check_text, case_text(case))
 
 

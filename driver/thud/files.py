@@ -67,20 +67,7 @@ def uninterrupted() -> Iterator[None]:
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file atomically.
-
-    Parameters
-    ----------
-    path
-        Path of the file; an existing one is replaced.
-    content
-        The whole content.
-
-    Raises
-    ------
-    OSError
-        Where the file cannot be written; names the path.
-    """
+    """Write a file atomically, also over an existing one; an OSError names the path."""
     try:
         target = Path(path)
         _replace(target, content, target.with_name(f".{target.name}.{os.getpid()}.part"))
@@ -94,24 +81,9 @@ def add_files(
 ) -> None:
     """Add files, such as figures, to the results of a run.
 
-    A later run of another input in the same directory removes them.
-
-    Parameters
-    ----------
-    directory
-        Directory of the results.
-    files
-        Contents by name; existing ones are replaced.
-    marker
-        Content of the file that identifies the results, ``effective.nml`` or ``sets.nml``, when
-        the new files were made.
-
-    Raises
-    ------
-    InputError
-        Where another run has replaced the results since then.
-    OSError
-        Where a file cannot be written.
+    Contents are given by name; existing files are replaced. A later run of another input in the
+    same directory removes them. The marker is the content of the file that identifies the results,
+    ``effective.nml`` or ``sets.nml``; raise InputError where another run has replaced them since.
     """
     if not files:
         return

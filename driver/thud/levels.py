@@ -166,17 +166,7 @@ def force_exposure_levels(
 def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
     """Return the part of a force that a force plate records, below 1.25 kHz (paper, section 3).
 
-    Parameters
-    ----------
-    force : ndarray, shape (n_sample,)
-        Force, N, that starts and ends at zero.
-    sample_rate : float
-        Samples per second, Hz.
-
-    Returns
-    -------
-    ndarray, shape (n_sample,)
-        Recorded force, N.
+    Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
     """
     recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
     return recorded
@@ -185,17 +175,9 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
 def peak_count(force: ArrayLike, sample_rate: float) -> int:
     """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
 
-    Parameters
-    ----------
-    force : array_like, shape (n_sample,)
-        Force, N, that starts and ends at zero; only its part below 1.25 kHz is used.
-    sample_rate : float
-        Samples per second, Hz.
-
-    Raises
-    ------
-    InputError
-        Where the record is empty, not finite or not one-dimensional, or the rate is not positive.
+    The force, N, shape (n_sample,), starts and ends at zero; only its part below 1.25 kHz is used.
+    Raise InputError where it is empty, not finite or not one-dimensional, or the rate, Hz, is not
+    positive.
     """
     record = _record(force)
     if not record.size or not np.isfinite(record).all():

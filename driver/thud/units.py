@@ -28,19 +28,7 @@ HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": (
 def power_of(unit: object, key_unit: str, place: str) -> int:
     """Return the power of ten that converts a unit to that of a key.
 
-    Parameters
-    ----------
-    unit
-        The given unit.
-    key_unit
-        The unit of the key.
-    place
-        Place of the unit in the input, for the message.
-
-    Raises
-    ------
-    InputError
-        Where the unit does not fit; lists the allowed ones.
+    Raise InputError with the place of the unit and the allowed ones where it does not fit.
     """
     # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})

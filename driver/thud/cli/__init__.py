@@ -63,19 +63,7 @@ COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Parameters
-    ----------
-    arguments
-        Words of the command line; by default those of this process.
-
-    Returns
-    -------
-    int
-        0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (``run --check``),
-        130 interrupted.
-    """
+    """Run the command with arguments, by default those of this process; return the exit code."""
     try:
         options = _parser().parse_args(arguments)
     except SystemExit as stop:
