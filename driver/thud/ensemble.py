@@ -184,13 +184,25 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     sizes = call(ensemble_api.size_many, content)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
-    results = _allocate(len(numbers), sizes, forces=forces)
     work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
-    with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
-        for start in range(0, len(numbers), work):
-            place = slice(start, min(start + work, len(numbers)))
-            _compute(content, columns, numbers[place], width, results, place, judged=levels)
-            bar.update(place.stop - place.start)
+    parts = []
+    try:
+        with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
+            for start in range(0, max(len(numbers), 1), work):
+                some = numbers[start : start + work]
+                parts.append(
+                    _compute(content, columns, some, width, sizes, judged=levels, forces=forces)
+                )
+                bar.update(len(some))
+        results = (
+            parts[0]
+            if len(parts) == 1
+            else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        )
+    except MemoryError as error:
+        size = f"{len(numbers)} sets" + (f" of {sizes['sample']:.0f} samples" if forces else "")
+        message = f"forces = {forces} for {size} does not fit in memory; allowed: fewer sets"
+        raise InputError(message) from error
     force = results["force"]
     return Ensemble(
         columns,
@@ -223,65 +235,46 @@ def _by_bands(
     return found
 
 
-def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[Any]]:
-    """Return arrays for the results of all sets."""
-    outcome, band, force, sample = (
-        int(sizes[name]) for name in ("outcome", "band", "force", "sample")
-    )
-    try:
-        return {
-            "status": np.zeros(count, dtype=np.int32),
-            "reason": np.full(count, "", dtype=object),
-            "outcome": np.empty((count, outcome)),
-            "level": np.empty((count, force, band)),
-            "conforms": np.zeros((count, force), dtype=bool),
-            "margin": np.empty(count),
-            "verdict": np.zeros(count, dtype=bool),
-            "force": np.empty((count if forces else 1, force, sample if forces else 1)),
-        }
-    except MemoryError as error:
-        size = f"{count} sets of {sample} samples" if forces else f"{count} sets"
-        message = f"forces = {forces} for {size} does not fit in memory; allowed: fewer sets"
-        raise InputError(message) from error
-
-
-def _compute(  # noqa: PLR0913, PLR0917 - those of the library
+def _compute(  # noqa: PLR0913 - those of the library
     content: bytes,
     columns: Mapping[str, Any],
     numbers: NDArray[np.float64],
     threads: int,
-    results: dict[str, NDArray[Any]],
-    place: slice,
+    sizes: Bundle,
     *,
     judged: bool,
-) -> None:
-    """Compute some sets and store their results."""
-    _, force_count, band = results["level"].shape
-    sample = results["force"].shape[-1]
-    forces = sample > 1
+    forces: bool,
+) -> dict[str, NDArray[Any]]:
+    """Return the results of some sets, the sets first."""
+    count = len(numbers)
+    # f2py knows no empty arrays: one set stands in for none.
+    given = numbers if count else np.zeros((1, numbers.shape[1]))
     status, outcome, level, conforms, margin, verdict, force, *left = ensemble_api.drop_many(
         content,
         ",".join(columns).encode("ascii", "replace"),
-        numbers.T,
+        given.T,
         threads,
         int(judged),
-        results["outcome"].shape[1],
-        band,
-        force_count,
-        sample,
-        len(numbers) if forces else 1,
+        int(sizes["outcome"]),
+        int(sizes["band"]),
+        int(sizes["force"]),
+        int(sizes["sample"]) if forces else 1,
+        len(given) if forces else 1,
     )
-    reasons = collect(*left)
-    results["status"][place] = status
-    results["outcome"][place] = outcome.T
-    results["level"][place] = np.moveaxis(level, -1, 0).swapaxes(1, 2)
-    results["conforms"][place] = conforms.T != 0
-    results["margin"][place] = margin
-    results["verdict"][place] = verdict != 0
-    if forces:
-        results["force"][place] = np.moveaxis(force, -1, 0).swapaxes(1, 2)
-    for number, reason in reasons.items():
-        results["reason"][place.start + int(number) - 1] = text(reason)
+    reason = np.full(len(given), "", dtype=object)
+    for number, sentence in collect(*left).items():
+        reason[int(number) - 1] = text(sentence)
+    found = {
+        "status": status,
+        "reason": reason,
+        "outcome": outcome.T,
+        "level": level.T,
+        "conforms": conforms.T != 0,
+        "margin": margin,
+        "verdict": verdict != 0,
+        "force": force.T,
+    }
+    return {name: values[:count] for name, values in found.items()}
 
 
 def get_cost(case: Case) -> float:
