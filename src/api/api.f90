@@ -47,14 +47,9 @@ contains
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> 0; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(error_type), allocatable :: error
 
@@ -67,16 +62,10 @@ contains
    !> The full input of a namelist file.
    subroutine effective_case(path, status, handle, n_byte, n_value)
       ! Not threadsafe: functions of its texts keep their lengths in static memory.
-      !> Path of the file.
       character(len=*), intent(in) :: path
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(error_type), allocatable :: error
@@ -94,16 +83,10 @@ contains
    !> Whether the text of a namelist file is a case.
    subroutine check_text(text, status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> The text.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(error_type), allocatable :: error
@@ -118,14 +101,9 @@ contains
       !f2py threadsafe
       !> Text of a namelist file.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(results_type) :: results
@@ -140,9 +118,7 @@ contains
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, history)
-      !> The bundle.
       type(bundle_type), intent(inout) :: bundle
-      !> The history.
       type(force_history_type), intent(in) :: history
       real(wp) :: scalars(size(scalar_fields))
       integer :: i, n(1)
@@ -183,14 +159,9 @@ contains
       ! Not threadsafe: ARPACK keeps its state in static memory.
       !> Text of a namelist file with the group `&modes`.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(results_type) :: results
@@ -206,9 +177,7 @@ contains
 
    !> Adds free modes to a bundle.
    subroutine add_modes(bundle, modes)
-      !> The bundle.
       type(bundle_type), intent(inout) :: bundle
-      !> The modes.
       type(free_modes_type), intent(in) :: modes
 
       call bundle%add_array('modes.frequency', shape(modes%frequency), modes%frequency)
@@ -230,14 +199,9 @@ contains
       integer, intent(in) :: n
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(n)
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(error_type), allocatable :: error
@@ -259,14 +223,9 @@ contains
       character(len=*), intent(in) :: output
       !> 1 to show progress on a terminal.
       integer, intent(in) :: progress
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(results_type) :: results

@@ -84,7 +84,6 @@ contains
    subroutine say(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
-      !> The text.
       character(len=*), intent(in) :: text
       !> Becomes 1 where the text could not be written.
       integer, intent(inout) :: exit_code
@@ -159,11 +158,9 @@ contains
    subroutine take_value(i, option, allowed, value, error)
       !> Number of the argument, of the option before and of its value after.
       integer, intent(inout) :: i
-      !> The option.
       character(len=*), intent(in) :: option
       !> What it takes.
       character(len=*), intent(in) :: allowed
-      !> The value.
       character(len=:), allocatable, intent(inout) :: value
       !> There is none.
       type(error_type), allocatable, intent(out) :: error
@@ -176,9 +173,7 @@ contains
 
    !> A number of threads.
    subroutine take_threads(text, threads, error)
-      !> The number as text.
       character(len=*), intent(in) :: text
-      !> The number.
       integer, intent(out) :: threads
       !> It is none.
       type(error_type), allocatable, intent(out) :: error
@@ -204,7 +199,6 @@ contains
 
    !> One line on how to call the program.
    pure function usage() result(text)
-      !> The line.
       character(len=:), allocatable :: text
 
       text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--check] [--quiet] | --keys | --schema | ' &

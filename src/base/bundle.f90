@@ -43,11 +43,8 @@ contains
 
    !> Adds a text.
    subroutine add_text(self, name, text)
-      !> The bundle.
       class(bundle_type), intent(inout) :: self
-      !> Name of the text.
       character(len=*), intent(in) :: name
-      !> The text.
       character(len=*), intent(in) :: text
 
       call add_line(self, name, 't'//to_text(len(text)))
@@ -57,11 +54,8 @@ contains
 
    !> Adds a number.
    subroutine add_number(self, name, value)
-      !> The bundle.
       class(bundle_type), intent(inout) :: self
-      !> Name of the number.
       character(len=*), intent(in) :: name
-      !> The number.
       real(wp), intent(in) :: value
 
       call add_line(self, name, '')
@@ -70,9 +64,7 @@ contains
 
    !> Adds an array of any rank.
    subroutine add_array(self, name, extents, values)
-      !> The bundle.
       class(bundle_type), intent(inout) :: self
-      !> Name of the array.
       character(len=*), intent(in) :: name
       !> Its extents: [rank].
       integer, intent(in) :: extents(:)
@@ -91,7 +83,6 @@ contains
 
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
-      !> The bundle.
       type(bundle_type), intent(inout) :: self
       !> Name of the item.
       character(len=*), intent(in) :: name
@@ -104,7 +95,6 @@ contains
 
    !> Adds an array.
    subroutine add_item(self, n, values)
-      !> The bundle.
       type(bundle_type), intent(inout) :: self
       !> Number of elements.
       integer, intent(in) :: n
@@ -127,7 +117,6 @@ contains
 
    !> Number of all numbers.
    pure function count_values(self) result(n)
-      !> The bundle.
       class(bundle_type), intent(in) :: self
       !> Their number.
       integer :: n
@@ -141,7 +130,6 @@ contains
 
    !> All numbers in the order of the header.
    pure subroutine copy_values(self, values)
-      !> The bundle.
       class(bundle_type), intent(in) :: self
       !> The numbers: [count_values].
       real(wp), intent(out) :: values(:)
@@ -158,7 +146,6 @@ contains
 
    !> Leaves a bundle to be collected, of an error its sentence alone.
    subroutine leave(bundle, error, status, handle, n_byte, n_value)
-      !> The bundle.
       type(bundle_type), pointer, intent(inout) :: bundle
       !> What went wrong.
       type(error_type), allocatable, intent(in) :: error
@@ -189,7 +176,6 @@ contains
    subroutine take(handle, bundle)
       !> Handle of a bundle that was left and not yet taken.
       integer(int64), intent(in) :: handle
-      !> The bundle.
       type(bundle_type), pointer, intent(out) :: bundle
       type(c_ptr) :: address
 

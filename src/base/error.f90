@@ -29,7 +29,6 @@ contains
    pure function input_error(message) result(error)
       !> One sentence for the user.
       character(len=*), intent(in) :: message
-      !> The error.
       type(error_type) :: error
       character(len=len(message)) :: text
       integer :: i
@@ -46,7 +45,6 @@ contains
    pure function numerical_error(message) result(error)
       !> One sentence for the user.
       character(len=*), intent(in) :: message
-      !> The error.
       type(error_type) :: error
 
       error = error_type(code=numerical_failure, message=message)

@@ -116,7 +116,6 @@ contains
       type(field_type), intent(in) :: fields(:)
       !> Number of the field.
       integer, intent(in) :: i
-      !> The range.
       type(interval_type) :: interval
       integer, allocatable :: group(:)
       integer :: j
@@ -129,7 +128,6 @@ contains
 
    !> Sets the variable from the text of a namelist assignment.
    subroutine set_from_text(self, text, error)
-      !> The field.
       class(field_type), intent(in) :: self
       !> What stood behind the equals sign.
       character(len=*), intent(in) :: text
@@ -204,7 +202,6 @@ contains
    subroutine set_list(entries, list, status)
       !> The entries, those that were not given hold `unset`: [list_length + 1].
       real(wp), intent(in) :: entries(:)
-      !> The list.
       type(list_type), intent(inout) :: list
       !> Not 0 where there are too many entries or gaps between them.
       integer, intent(out) :: status
@@ -220,7 +217,6 @@ contains
 
    !> Value as a number: of a choice its place among the choices, of a flag 0 or 1.
    function get_number(self) result(number)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The number; 0 for free text and lists.
       real(wp) :: number
@@ -234,9 +230,7 @@ contains
 
    !> Sets the variable from such a number.
    subroutine set_number(self, number, entry, error)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> The number.
       real(wp), intent(in) :: number
       !> Which entry of a list is set; 0 for keys that are no lists.
       integer, intent(in) :: entry
@@ -265,9 +259,7 @@ contains
 
    !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`.
    pure function get_kind(self) result(kind)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> The kind.
       character(len=6) :: kind
 
       kind = 'text'
@@ -280,15 +272,12 @@ contains
 
    !> Error that names group, key, value and allowed range.
    function get_error(self, value, what, interval) result(error)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The value as text.
       character(len=*), intent(in) :: value
       !> What is wrong with it.
       character(len=*), intent(in) :: what
-      !> Allowed range of numbers.
       type(interval_type), intent(in) :: interval
-      !> The error.
       type(error_type) :: error
       character(len=:), allocatable :: allowed
 
@@ -299,7 +288,6 @@ contains
 
    !> The value as it stands in a namelist.
    subroutine get_text(self, text)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
       character(len=:), allocatable, intent(out) :: text
@@ -324,7 +312,6 @@ contains
 
    !> The allowed range in words: `0 < outer_radius <= 10 m`.
    subroutine get_allowed(self, text, interval)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The range with its unit, or the list of allowed words.
       character(len=:), allocatable, intent(out) :: text
@@ -350,7 +337,6 @@ contains
 
    !> Whether the field is a list without entries, which a namelist cannot hold.
    pure function is_empty(self) result(empty)
-      !> The field.
       class(field_type), intent(in) :: self
       !> It is one.
       logical :: empty

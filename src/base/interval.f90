@@ -36,7 +36,6 @@ contains
    pure function new_interval(text) result(interval)
       !> The ends between brackets, round ones where an end is left out; blank for all numbers.
       character(len=*), intent(in) :: text
-      !> The interval.
       type(interval_type) :: interval
       integer :: comma, last
 
@@ -78,7 +77,6 @@ contains
 
    !> Sets the ends that depend on other keys.
    pure subroutine resolve(self, keys, values)
-      !> The interval.
       class(interval_type), intent(inout) :: self
       !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
@@ -97,7 +95,6 @@ contains
       character(len=*), intent(in) :: keys(:)
       !> Their values: [n_key].
       real(wp), intent(in) :: values(:)
-      !> The value.
       real(wp) :: value
       real(wp) :: operand
       integer :: start, length, place
@@ -128,9 +125,7 @@ contains
    elemental function contains_value(self, value) result(inside)
       !> The interval, its ends resolved.
       class(interval_type), intent(in) :: self
-      !> The value.
       real(wp), intent(in) :: value
-      !> It does.
       logical :: inside
 
       inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
@@ -139,9 +134,7 @@ contains
 
    !> The interval around the name of a key: `0 < outer_radius <= 10`.
    subroutine get_range_text(interval, name, text)
-      !> The interval.
       type(interval_type), intent(in) :: interval
-      !> Name of the key.
       character(len=*), intent(in) :: name
       !> The range.
       character(len=:), allocatable, intent(out) :: text
@@ -155,11 +148,9 @@ contains
 
    !> One end as text: an expression with its value, where it is known.
    subroutine to_end_text(number, expression, text)
-      !> Its value.
       real(wp), intent(in) :: number
       !> The expression; blank where the end is a number.
       character(len=*), intent(in) :: expression
-      !> The text.
       character(len=:), allocatable, intent(out) :: text
 
       text = to_text(number)

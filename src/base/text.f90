@@ -27,7 +27,6 @@ contains
 
    !> Integer without blanks.
    pure function integer_to_text(value) result(text)
-      !> The number.
       integer, intent(in) :: value
       !> Its digits.
       character(len=len_trim(format_integer(value))) :: text
@@ -47,7 +46,6 @@ contains
 
    !> Shortest decimal text that reads back as exactly the same number.
    pure function real_to_text(value) result(text)
-      !> The number.
       real(wp), intent(in) :: value
       !> Decimal notation from 1e-4 to 1e7, else with an exponent.
       character(len=len_trim(format_real(value))) :: text
@@ -57,7 +55,6 @@ contains
 
    !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
    pure function fixed(value, decimals) result(text)
-      !> The number.
       real(wp), intent(in) :: value
       !> Digits behind the point.
       integer, intent(in) :: decimals
@@ -69,7 +66,6 @@ contains
 
    !> Integer with blanks behind it.
    pure function format_integer(value) result(buffer)
-      !> The number.
       integer, intent(in) :: value
       !> Its digits.
       character(len=number_length) :: buffer
@@ -79,7 +75,6 @@ contains
 
    !> Number with a fixed count of decimals and blanks behind it.
    pure function format_fixed(value, decimals) result(buffer)
-      !> The number.
       real(wp), intent(in) :: value
       !> Digits behind the point.
       integer, intent(in) :: decimals
@@ -95,9 +90,7 @@ contains
 
    !> Shortest decimal text of a number with blanks behind it.
    pure function format_real(value) result(buffer)
-      !> The number.
       real(wp), intent(in) :: value
-      !> Its text.
       character(len=number_length) :: buffer
       character(len=12) :: form
       real(wp) :: read_back
@@ -154,7 +147,6 @@ contains
    pure function lower_case(text) result(lower)
       !> Any text.
       character(len=*), intent(in) :: text
-      !> The text in lower case.
       character(len=len(text)) :: lower
       integer :: i
 
@@ -226,9 +218,7 @@ contains
 
    !> Words of a list with commas between.
    pure function split(list, n_word) result(words)
-      !> The list.
       character(len=*), intent(in) :: list
-      !> Number of words.
       integer, intent(in) :: n_word
       !> The words: [n_word].
       character(len=32) :: words(n_word)

@@ -51,7 +51,6 @@ contains
 
    !> The default case.
    subroutine new_case(case)
-      !> The case.
       type(case_type), intent(out) :: case
 
       call new_models(case%models)
@@ -59,7 +58,6 @@ contains
 
    !> Number of the chosen model.
    pure function get_model_number(case) result(number)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Its place among the models; 0 where there is no such model.
       integer :: number
@@ -96,11 +94,8 @@ contains
 
    !> Whether a key does something: for the impact, its model, or the free modes.
    pure elemental function is_used(case, field) result(used)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> The key.
       type(field_type), intent(in) :: field
-      !> It does.
       logical :: used
 
       if (field%owner == 'modes') then
@@ -126,7 +121,6 @@ contains
 
    !> Refuses a case whose values lie outside their ranges or do not fit each other.
    subroutine check_case(case, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error

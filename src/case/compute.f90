@@ -43,7 +43,6 @@ contains
    subroutine compute_case(case, results, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
-      !> The results.
       type(results_type), intent(out) :: results
       !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
@@ -57,7 +56,6 @@ contains
 
    !> Loss factor of the material of a case against frequency.
    subroutine get_loss_factors(case, frequency, loss_factor, error)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
@@ -73,9 +71,7 @@ contains
 
    !> Levels and criteria of the force history of a case.
    subroutine judge_case(case, history, verdict, error)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
       !> Levels and criteria of both forces.
       type(verdict_type), intent(out) :: verdict
@@ -99,9 +95,7 @@ contains
 
    !> Levels and criteria of one force.
    subroutine judge_force(case, history, force, bands, level, criteria, error)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
       !> The force, N: [n_sample].
       real(wp), intent(in) :: force(:)
@@ -125,7 +119,6 @@ contains
 
    !> Number of the force that the verdict is on.
    pure function get_judged_force(case) result(number)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Its place in `force_names`.
       integer :: number
@@ -135,9 +128,7 @@ contains
 
    !> Whether the source of a case conforms.
    pure function is_conforming(case, verdict) result(yes)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its verdict.
       type(verdict_type), intent(in) :: verdict
       !> All criteria of the judged force are met.
       logical :: yes

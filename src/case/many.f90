@@ -80,7 +80,6 @@ contains
 
    !> Keys by their names, entries of lists as `frequency(2)`.
    subroutine find_columns(case, names, columns, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> The names: [n_column].
       character(len=*), intent(in) :: names(:)
@@ -122,7 +121,6 @@ contains
 
    !> Prepares for many drops of a case.
    subroutine new_many(case, judged, many)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Levels and verdicts are wanted.
       logical, intent(in) :: judged
@@ -168,7 +166,6 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Their values, as `get_number` of the keys gives them: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Forces are wanted too.
       logical, intent(in) :: forces
@@ -219,9 +216,7 @@ contains
 
    !> Space for the results of a number of drops.
    subroutine set_size(many, n_drop, n_sample)
-      !> The results.
       type(many_type), intent(inout) :: many
-      !> Number of drops.
       integer, intent(in) :: n_drop
       !> Samples of the forces that are wanted.
       integer, intent(in) :: n_sample
@@ -247,7 +242,6 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Values of this one: [n_column].
       real(wp), intent(in) :: values(:)
-      !> Number of the drop.
       integer, intent(in) :: drop
       !> Gets its results.
       type(many_type), intent(inout) :: many
@@ -305,11 +299,9 @@ contains
    !> Whether drops can be computed in batches: by the shell model, with exact levels, if they differ in nothing
    !> but ball, drop and the options of the model.
    function suits_batch(case, columns) result(suits)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> In what the drops differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> They can.
       logical :: suits
       type(field_type), allocatable :: fields(:)
       integer :: i
@@ -326,13 +318,11 @@ contains
 
    !> Drops of the shell model in batches.
    subroutine solve_batch(case, columns, values, threads, many, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> In what the drops differ: [n_column].
       type(column_type), intent(in) :: columns(:)
       !> Their values: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Gets the results.
       type(many_type), intent(inout) :: many

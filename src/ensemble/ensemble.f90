@@ -70,7 +70,6 @@ contains
 
    !> Whether matrices of one serve for the other: same rate, bands and longest window.
    pure function are_alike(one, other) result(alike)
-      !> The one.
       type(projections_type), intent(in) :: one
       !> The other, which may be empty.
       type(projections_type), intent(in) :: other
@@ -88,11 +87,9 @@ contains
    subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, outcomes, levels, met, forces, error)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> Sampling of all.
       type(sampling_type), intent(in) :: sampling
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Levels and verdicts are wanted; without them they are NaN and not conforming.
       logical, intent(in) :: judged
@@ -168,7 +165,6 @@ contains
       type(workspace_type), intent(out) :: workspace
       !> The sampling, for the error.
       type(sampling_type), intent(in) :: sampling
-      !> Limits of the source.
       type(source_limits_type), intent(in) :: limits
       !> Samples of the longest window.
       integer, intent(in) :: n_row
@@ -191,7 +187,6 @@ contains
       type(workspace_type), intent(inout), target :: workspace
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Levels and verdicts are wanted.
       logical, intent(in) :: judged
@@ -254,9 +249,7 @@ contains
 
    !> Makes the matrices of a window unless they are there.
    subroutine require_window(projections, window, error)
-      !> The matrices.
       type(projections_type), intent(inout) :: projections
-      !> Number of the window.
       integer, intent(in) :: window
       !> They cannot be made.
       type(error_type), allocatable, intent(inout) :: error
@@ -275,9 +268,7 @@ contains
    function is_conforming(criteria, set, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
-      !> The set.
       type(set_type), intent(in) :: set
-      !> Its outcome.
       type(set_outcome_type), intent(in) :: outcome
       !> Levels, dB, octaves first: [n_band].
       real(wp), intent(in) :: levels(:)
@@ -285,7 +276,6 @@ contains
       real(wp), intent(in) :: force(:, :)
       !> Row of the force of this set.
       integer, intent(in) :: row
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> They are met.
       logical :: met

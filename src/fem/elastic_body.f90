@@ -53,13 +53,10 @@ contains
 
    !> The ball at rest.
    pure function new_elastic_body(ball, mesh, material) result(body)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh of order 1.
       type(mesh_type), intent(in) :: mesh
-      !> The material.
       type(material_type), intent(in) :: material
-      !> The body.
       type(elastic_body_type) :: body
       integer :: i, n
 

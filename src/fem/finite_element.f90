@@ -58,7 +58,6 @@ contains
 
    !> About the time that one drop takes on one core, s.
    function get_cost(options) result(cost)
-      !> The options.
       class(finite_element_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
@@ -69,9 +68,7 @@ contains
 
    !> Loss factor of the material in shear against frequency.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The options.
       class(finite_element_type), intent(in) :: options
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
@@ -90,9 +87,7 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Mesh, material, contact.
       class(finite_element_type), intent(in) :: options
@@ -127,11 +122,9 @@ contains
 
    !> Marches until the ball has left for good.
    subroutine march(run, start, contacts, options, sampling, history, error)
-      !> The ball.
       type(impact_run_type), intent(inout) :: run
       !> Height of its centre of mass at first touch, m.
       real(wp), intent(in) :: start
-      !> Its contacts.
       type(contacts_type), intent(inout) :: contacts
       !> Bounces, flight, step.
       class(finite_element_options_type), intent(in) :: options
@@ -242,7 +235,6 @@ contains
       type(impact_run_type), intent(in) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: step
-      !> It may.
       logical :: touches
 
       associate (last => ubound(run%position, 2))
@@ -254,7 +246,6 @@ contains
    function place(time) result(text)
       !> Time since the record began, s.
       real(wp), intent(in) :: time
-      !> The beginning.
       character(len=64) :: text
 
       text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
@@ -264,7 +255,6 @@ contains
    subroutine follow_contact(run, contacts, time, step, history)
       !> The ball.
       type(impact_run_type), intent(in) :: run
-      !> Its contacts.
       type(contacts_type), intent(inout) :: contacts
       !> Time since the record began, s.
       real(wp), intent(in) :: time
@@ -291,7 +281,6 @@ contains
 
    !> Complains about a ball that cannot be computed any further.
    subroutine check_run(run, time, first_energy, history, error)
-      !> The ball.
       type(impact_run_type), intent(in) :: run
       !> Time since the record began, s.
       real(wp), intent(in) :: time

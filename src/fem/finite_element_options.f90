@@ -74,7 +74,6 @@ contains
 
    !> Refuses options that do not fit each other, the ball or the memory.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(finite_element_options_type), intent(in) :: options
@@ -105,7 +104,6 @@ contains
 
    !> Size of the snapshots.
    function get_snapshot_shape(options, sampling) result(extents)
-      !> The options.
       class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
@@ -117,11 +115,9 @@ contains
 
    !> Most snapshots of a run.
    pure function get_frame_count(options, sampling) result(n_frame)
-      !> The options.
       class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
-      !> The number.
       integer :: n_frame
 
       n_frame = 0

@@ -83,13 +83,10 @@ contains
 
    !> The lowest elastic modes of a ball.
    subroutine get_free_modes(ball, mesh_options, count, modes, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Numbers of elements.
       type(mesh_options_type), intent(in) :: mesh_options
-      !> Number of modes.
       integer, intent(in) :: count
-      !> The modes.
       type(free_modes_type), intent(out) :: modes
       !> The modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
@@ -176,13 +173,11 @@ contains
 
    !> Shape, harmonic and participation of one mode.
    subroutine describe(ball, matrices, vector, mesh, shape, harmonic, participation)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Matrices of the ball.
       type(mode_matrices_type), intent(in) :: matrices
       !> Displacements at unit modal mass: [n].
       real(wp), intent(in) :: vector(:)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
       !> Displacements, the largest of length 1: [2, 0:n_line, 0:n_ring].
       real(wp), intent(out) :: shape(:, 0:, 0:)
@@ -216,7 +211,6 @@ contains
       real(wp), intent(in) :: normal(:)
       !> Cosine of the angle at these points: [n].
       real(wp), intent(in) :: cosine(:)
-      !> The order.
       integer :: harmonic
       ! Higher orders look like lower ones on so few points.
       real(wp), dimension(0:min(max_harmonic, (size(normal) - 1)/2)) :: value, first, second, coefficient

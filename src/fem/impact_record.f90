@@ -31,11 +31,9 @@ contains
 
    !> A record without force.
    pure function new_impact_record(sampling, impact_velocity) result(history)
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> The record.
       type(force_history_type) :: history
 
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
@@ -54,7 +52,6 @@ contains
       integer, intent(in) :: i
       !> Height of the centre of mass at first touch, m.
       real(wp), intent(in) :: start
-      !> The history.
       type(force_history_type), intent(inout) :: history
 
       history%deflection(i) = start - get_mean_height(run)
@@ -75,7 +72,6 @@ contains
       integer, intent(in) :: last
       !> Height of the centre of mass at first touch, m.
       real(wp), intent(in) :: start
-      !> The history.
       type(force_history_type), intent(inout) :: history
       real(wp) :: mass, speed, rise, time
       integer :: i
@@ -99,9 +95,7 @@ contains
 
    !> Peaks of the impact, and the checks of the balances.
    subroutine finish_record(ball, run, sampling, speed, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling

@@ -66,11 +66,9 @@ contains
 
    !> A ball above the floor, falling.
    pure function new_impact_run(ball, options, material, gravity, gap, speed) result(run)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh and contact.
       class(finite_element_options_type), intent(in) :: options
-      !> The material.
       type(material_type), intent(in) :: material
       !> Gravity, m/s2.
       real(wp), intent(in) :: gravity
@@ -78,7 +76,6 @@ contains
       real(wp), intent(in) :: gap
       !> Velocity downwards, m/s.
       real(wp), intent(in) :: speed
-      !> The run.
       type(impact_run_type) :: run
 
       run%body = new_elastic_body(ball, new_mesh(ball, options%mesh, 1), material)
@@ -98,13 +95,11 @@ contains
 
    !> Number of steps in a sampling interval that keeps the run stable.
    pure subroutine choose_step(run, interval, safety, least, n_step)
-      !> The run.
       type(impact_run_type), intent(inout) :: run
       !> Sampling interval, s.
       real(wp), intent(in) :: interval
       !> Part of the limit of stability to be used.
       real(wp), intent(in) :: safety
-      !> Least number of steps.
       integer, intent(in) :: least
       !> The number so far, 0 at the start; the number to go on with, `max_steps` or more where there
       !> would have to be too many.
@@ -140,7 +135,6 @@ contains
 
    !> First half of a step: forces and energies where the ball is, and velocities half a step on.
    pure subroutine kick(run, interval)
-      !> The run.
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -176,7 +170,6 @@ contains
 
    !> Second half of a step: positions a step on.
    pure subroutine drift(run, interval)
-      !> The run.
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -188,7 +181,6 @@ contains
 
    !> Energy of the latest step, with all that was lost; it should not change.
    pure function get_energy(run) result(energy)
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> The energy, J.
       real(wp) :: energy
@@ -199,7 +191,6 @@ contains
 
    !> Height of the centre of mass.
    pure function get_mean_height(run) result(height)
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> The height, m.
       real(wp) :: height
@@ -209,7 +200,6 @@ contains
 
    !> Velocity of the centre of mass.
    pure function get_mean_velocity(run) result(velocity)
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> The velocity upwards, m/s.
       real(wp) :: velocity

@@ -88,7 +88,6 @@ contains
    subroutine check_material(options, ball, error)
       !> The options, each inside its own range.
       type(material_options_type), intent(in) :: options
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
@@ -115,9 +114,7 @@ contains
    subroutine new_material(options, ball, material, error)
       !> The options, checked.
       type(material_options_type), intent(in) :: options
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The material.
       type(material_type), intent(out) :: material
       !> No Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
@@ -150,7 +147,6 @@ contains
 
    !> Loss factor of the material in shear.
    pure elemental function get_material_loss_factor(material, frequency) result(loss_factor)
-      !> The material.
       type(material_type), intent(in) :: material
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency

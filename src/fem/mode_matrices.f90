@@ -52,11 +52,9 @@ contains
 
    !> Matrices of a ball, factored.
    subroutine new_mode_matrices(ball, mesh, matrices, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh of order 2.
       type(mesh_type), intent(in) :: mesh
-      !> The matrices.
       type(mode_matrices_type), intent(out) :: matrices
       !> The matrix is not positive definite.
       type(error_type), allocatable, intent(out) :: error
@@ -82,7 +80,6 @@ contains
 
    !> Numbers the displacements ring by ring along each polar line, which keeps the band narrow.
    pure subroutine number_unknowns(mesh, matrices)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
       !> Gets its unknowns.
       type(mode_matrices_type), intent(inout) :: matrices
@@ -117,7 +114,6 @@ contains
 
    !> Adds up the matrices of all elements.
    pure subroutine assemble(mesh, shear_modulus, density, matrices)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
       !> Shear modulus, Pa.
       real(wp), intent(in) :: shear_modulus
@@ -160,7 +156,6 @@ contains
 
    !> Mass times displacements.
    pure subroutine apply_mass(matrices, x, y)
-      !> The matrices.
       type(mode_matrices_type), intent(in) :: matrices
       !> Displacements, m: [n].
       real(wp), intent(in) :: x(:)
@@ -172,7 +167,6 @@ contains
 
    !> Displacements under forces on the shifted system, without change of volume at Poisson's ratio 1/2.
    subroutine apply_inverse(matrices, force, x, failed)
-      !> The matrices.
       type(mode_matrices_type), intent(in) :: matrices
       !> Forces, N: [n].
       real(wp), intent(in) :: force(:)

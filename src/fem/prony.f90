@@ -31,7 +31,6 @@ contains
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
-      !> The ratio.
       real(wp) :: ratio
 
       ratio = 1 + sum(share*(omega*time)**2/(1 + (omega*time)**2))
@@ -45,7 +44,6 @@ contains
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
-      !> The loss factor.
       real(wp) :: loss_factor
 
       loss_factor = sum(share*omega*time/(1 + (omega*time)**2))/get_storage_ratio(share, time, omega)
@@ -56,7 +54,6 @@ contains
    !> Loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least
    !> squares over frequencies at equal steps of their logarithm.
    subroutine fit_constant_loss(loss_factor, share, time, error)
-      !> The loss factor.
       real(wp), intent(in) :: loss_factor
       !> Moduli of the branches over the long-term modulus: [n_branch].
       real(wp), allocatable, intent(out) :: share(:)

@@ -23,7 +23,6 @@ contains
 
    !> A direction that every motion has a part of, the fastest ones most.
    pure function get_first_direction(body) result(direction)
-      !> The body.
       type(elastic_body_type), intent(in) :: body
       !> The direction: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: direction(:, :, :)
@@ -45,7 +44,6 @@ contains
    pure subroutine find_growth(body, contact, position, velocity, interval, n_turn, direction, growth)
       !> The body; it stays as it is.
       type(elastic_body_type), intent(inout) :: body
-      !> The contact.
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in), contiguous :: position(0:, 0:, :)
@@ -53,7 +51,6 @@ contains
       real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> Number of turns.
       integer, intent(in) :: n_turn
       !> Direction of the fastest motion, better after each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)

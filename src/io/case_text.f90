@@ -18,11 +18,9 @@ contains
 
    !> Case from the text of a namelist file, complete and inside all ranges.
    subroutine read_case(text, default_name, case, error)
-      !> Text of the file.
       character(len=*), intent(in) :: text
       !> Name of the case where the text gives none.
       character(len=*), intent(in) :: default_name
-      !> The case.
       type(case_type), target, intent(out) :: case
       !> What is wrong, with group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
@@ -55,7 +53,6 @@ contains
    subroutine check_use(groups, case, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Names the group and its line.
       type(error_type), allocatable, intent(out) :: error
@@ -110,7 +107,6 @@ contains
 
    !> Sets the variables of one group.
    subroutine assign_group(group, fields, error)
-      !> The group.
       type(group_type), intent(in) :: group
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
@@ -174,9 +170,7 @@ contains
 
    !> The complete input as a namelist file; reading it gives the same case.
    subroutine get_case_text(case, text)
-      !> The case.
       type(case_type), intent(in), target :: case
-      !> Text of the file.
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: value
       type(field_type), allocatable :: fields(:)

@@ -24,9 +24,7 @@ contains
 
    !> The text of a file.
    subroutine read_text_file(path, text, error)
-      !> Path of the file.
       character(len=*), intent(in) :: path
-      !> Its text.
       character(len=:), allocatable, intent(out) :: text
       !> The file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
@@ -65,7 +63,6 @@ contains
 
    !> Name of a file without directory and ending.
    pure function get_file_stem(path) result(stem)
-      !> Path of the file.
       character(len=*), intent(in) :: path
       !> Its stem: `inputs/ball.nml` gives `ball`.
       character(len=:), allocatable :: stem

@@ -46,9 +46,7 @@ contains
 
    !> Exchanges workspace and directory; nothing has changed where that is impossible.
    subroutine exchange(workspace, place, found, replaced, names, done)
-      !> The workspace.
       character(len=*), intent(in) :: workspace
-      !> The directory.
       character(len=*), intent(in) :: place
       !> Names in it: [n_found].
       character(len=*), intent(in) :: found(:)
@@ -84,9 +82,7 @@ contains
 
    !> Moves the files of the workspace into the directory, so that those of two inputs never stand together.
    subroutine move_files(workspace, place, names, listed, same, error)
-      !> The workspace.
       character(len=*), intent(in) :: workspace
-      !> The directory.
       character(len=*), intent(in) :: place
       !> Names of the files, the last of which says whose they are: [n_file].
       character(len=*), intent(in) :: names(:)
@@ -139,7 +135,6 @@ contains
 
    !> Names in the manifest of a directory.
    subroutine read_names(path, names)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The names, none without a manifest: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
@@ -165,7 +160,6 @@ contains
 
    !> Adds names to the manifest of a directory.
    subroutine add_names(path, names, error)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The names: [n_name].
       character(len=*), intent(in) :: names(:)

@@ -35,7 +35,6 @@ contains
    subroutine open_lines(path, reader, done)
       !> Path of the file.
       character(len=*), intent(in) :: path
-      !> The text.
       type(line_reader_type), intent(out) :: reader
       !> It can be read.
       logical, intent(out) :: done
@@ -100,7 +99,6 @@ contains
 
    !> Closes a text; one that is closed stays so.
    subroutine close_lines(reader)
-      !> The text.
       type(line_reader_type), intent(inout) :: reader
 
       call close_descriptor(reader%descriptor)

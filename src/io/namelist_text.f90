@@ -213,7 +213,6 @@ contains
    pure subroutine get_value(text, value)
       !> Text between an equals sign and the next key.
       character(len=*), intent(in) :: text
-      !> The value.
       character(len=:), allocatable, intent(out) :: value
       integer :: first, last, i
 

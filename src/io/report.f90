@@ -20,7 +20,6 @@ contains
 
    !> Force and motion against time, one line per sample, 17 digits.
    function get_force_csv(history) result(text)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> Text of `force.csv`.
       character(len=:), allocatable :: text
@@ -82,7 +81,6 @@ contains
 
    !> Levels, limits and verdict per band.
    function get_levels_csv(case, verdict) result(text)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
@@ -118,9 +116,7 @@ contains
 
    !> The scalars of a run as a namelist file.
    function get_summary(case, history, verdict) result(text)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
       !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
@@ -152,7 +148,6 @@ contains
 
    !> Numbers that the model chose or found as a namelist group.
    function fact_group(history) result(text)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> The group; empty where there are none.
       character(len=:), allocatable :: text
@@ -169,7 +164,6 @@ contains
 
    !> Where a value lies: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)
-      !> The criterion.
       type(criterion_type), intent(in) :: criterion
       !> The verdict.
       character(len=:), allocatable :: word
@@ -183,7 +177,6 @@ contains
 
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)
-      !> The key.
       character(len=*), intent(in) :: key
       !> Its value as text.
       character(len=*), intent(in) :: value

@@ -44,7 +44,6 @@ contains
 
    !> Refuses a directory that holds anything else than results of the same case.
    subroutine check_owner(path, marker, differs, error)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.
       type(text_file_type), intent(in) :: marker
@@ -112,7 +111,6 @@ contains
 
    !> Ends the writing: all files stand in the directory, or none.
    subroutine close_results(directory, differs, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
@@ -138,7 +136,6 @@ contains
 
    !> Begins a file.
    subroutine begin_file(directory, name, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> Name of the file, one of those given before.
       character(len=*), intent(in) :: name
@@ -155,9 +152,7 @@ contains
 
    !> Adds to the file that was begun last.
    subroutine add_text(directory, text, error)
-      !> The directory.
       type(result_directory_type), intent(in) :: directory
-      !> The text.
       character(len=*), intent(in) :: text
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
@@ -170,7 +165,6 @@ contains
 
    !> Ends the file that was begun last.
    subroutine end_file(directory, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
@@ -183,9 +177,7 @@ contains
 
    !> Writes a whole file.
    subroutine write_file(directory, file, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
-      !> The file.
       type(text_file_type), intent(in) :: file
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
@@ -198,7 +190,6 @@ contains
 
    !> Refuses to go on where a file was not written.
    subroutine require_written(directory, status, error)
-      !> The directory.
       type(result_directory_type), intent(in) :: directory
       !> 0, the number of the system's error, or negative after an interrupt.
       integer, intent(in) :: status
@@ -216,7 +207,6 @@ contains
 
    !> Finds out whose results a directory holds.
    subroutine find_owner(path, marker, owner, error)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.
       type(text_file_type), intent(in) :: marker
@@ -253,7 +243,6 @@ contains
 
    !> Takes the workspace of a directory. Interrupts are kept from then on.
    subroutine take_workspace(directory, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> It cannot be made.
       type(error_type), allocatable, intent(out) :: error
@@ -291,7 +280,6 @@ contains
 
    !> Locks a directory that is there, and finds out whose results it holds.
    subroutine lock_place(directory, owner, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> `nobody`, `same_input` or `other_input`.
       integer, intent(out) :: owner
@@ -306,7 +294,6 @@ contains
 
    !> Puts the files of the workspace in the place of those before.
    subroutine publish(directory, differs, moved, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
@@ -334,9 +321,7 @@ contains
 
    !> Error of a directory that cannot be made or written.
    pure function making_error(path) result(error)
-      !> The directory.
       character(len=*), intent(in) :: path
-      !> The error.
       type(error_type) :: error
 
       error = input_error('--output '//path//' cannot be made; allowed: a directory that you may write to')

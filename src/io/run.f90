@@ -13,7 +13,7 @@ module thud_run
    use thud_result_directory, only: check_owner, write_results
    use thud_system, only: get_free_bytes
    use thud_table, only: get_modes_table, get_table
-   use thud_text, only: fixed, newline, to_text
+   use thud_text, only: fixed, newline
    implicit none (type, external)
    private
 
@@ -44,13 +44,10 @@ contains
 
    !> Runs a namelist file and writes its results.
    subroutine run_case(path, output, case, results, outcome, error)
-      !> Path of the namelist file.
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> The case.
       type(case_type), target, intent(out) :: case
-      !> Its results.
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -69,11 +66,9 @@ contains
 
    !> Computes a case and writes its results.
    subroutine store_case(case, output, results, outcome, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> The results.
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -101,7 +96,6 @@ contains
 
    !> Refuses snapshots that would fill the disk.
    subroutine check_space(case, directory, error)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Directory for the results.
       character(len=*), intent(in) :: directory
@@ -121,9 +115,7 @@ contains
 
    !> Table, verdict and files of results.
    subroutine describe(case, results, files, outcome)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its results.
       type(results_type), intent(in) :: results
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
@@ -161,11 +153,8 @@ contains
 
    !> Number of files of results.
    pure function count_files(case, results) result(n_file)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its results.
       type(results_type), intent(in) :: results
-      !> The number.
       integer :: n_file
 
       n_file = 0
@@ -178,9 +167,7 @@ contains
 
    !> Reads a case from a namelist file.
    subroutine load_case(path, case, error)
-      !> Path of the file.
       character(len=*), intent(in) :: path
-      !> The case.
       type(case_type), intent(out) :: case
       !> Names file, group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error

@@ -48,7 +48,6 @@ contains
 
    !> One key.
    subroutine describe(field, text)
-      !> The key.
       type(field_type), intent(in) :: field
       !> A JSON object.
       character(len=:), allocatable, intent(out) :: text
@@ -83,7 +82,6 @@ contains
 
    !> One end of a range: a number, or an expression in quotes.
    function end_value(number, expression) result(value)
-      !> The number.
       real(wp), intent(in) :: number
       !> The expression, blank where the end is a number.
       character(len=*), intent(in) :: expression
@@ -114,7 +112,6 @@ contains
    pure function list_of(words) result(list)
       !> The words: [n_word].
       character(len=*), intent(in) :: words(:)
-      !> The list.
       character(len=:), allocatable :: list
       integer :: i
 

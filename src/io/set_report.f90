@@ -15,11 +15,9 @@ contains
 
    !> First line of the results.
    subroutine get_set_header(table, many, text)
-      !> The table.
       type(set_table_type), intent(in) :: table
       !> The results, whose bands are known.
       type(many_type), intent(in) :: many
-      !> The line.
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
@@ -44,7 +42,6 @@ contains
 
    !> Lines of the results, 17 digits; what could not be computed is left out.
    subroutine get_set_rows(table, before, values, first, last, many, text)
-      !> The table.
       type(set_table_type), intent(in) :: table
       !> Number of drops before the first of `values`.
       integer, intent(in) :: before
@@ -56,7 +53,6 @@ contains
       integer, intent(in) :: last
       !> Their results.
       type(many_type), intent(in) :: many
-      !> The lines.
       character(len=:), allocatable, intent(out) :: text
       !> Width of a number with its comma, and of all that is none.
       integer, parameter :: number_width = 26, rest_width = 1024
@@ -99,7 +95,6 @@ contains
 
    !> A unit as part of a name.
    pure function underscored(unit) result(name)
-      !> The unit.
       character(len=*), intent(in) :: unit
       !> It without blanks.
       character(len=len(unit)) :: name
@@ -113,7 +108,6 @@ contains
 
    !> A sentence as a cell.
    pure function in_quotes(sentence) result(cell)
-      !> The sentence.
       character(len=*), intent(in) :: sentence
       !> It in quotes, as far as there is space; quotes inside are doubled.
       character(len=2*len(sentence) + 2) :: cell

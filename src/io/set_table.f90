@@ -4,7 +4,7 @@
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length
+   use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_many, only: column_type, find_columns
@@ -46,7 +46,6 @@ contains
       character(len=*), intent(in) :: path
       !> The case, which has the keys.
       type(case_type), intent(in), target :: case
-      !> The table.
       type(set_table_type), intent(out) :: table
       !> The file cannot be read, or a key is not known or given twice.
       type(error_type), allocatable, intent(out) :: error
@@ -82,7 +81,6 @@ contains
 
    !> The next drops.
    subroutine read_sets(table, values, n_set, error)
-      !> The table.
       type(set_table_type), intent(inout) :: table
       !> Their values: [n_column, n_room].
       real(wp), intent(out) :: values(:, :)
@@ -143,7 +141,6 @@ contains
 
    !> Cells of a line: the first of tab, semicolon and comma that it holds stands between them, else blanks do.
    pure subroutine split_line(line, cells)
-      !> The line.
       character(len=*), intent(in) :: line
       !> The cells, without blanks and quotes around them: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
@@ -181,9 +178,7 @@ contains
 
    !> One value of a drop.
    subroutine read_value(table, column, word, value, error)
-      !> The table.
       type(set_table_type), intent(in) :: table
-      !> Number of its column.
       integer, intent(in) :: column
       !> The value as it stands in the table.
       character(len=*), intent(in) :: word
@@ -232,7 +227,6 @@ contains
 
    !> Error of a line.
    function line_error(table, message) result(error)
-      !> The table.
       type(set_table_type), intent(in) :: table
       !> What is wrong with the line.
       character(len=*), intent(in) :: message

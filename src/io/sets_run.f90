@@ -40,9 +40,7 @@ contains
    subroutine run_sets(path, table_path, threads, output, outcome, error)
       !> Path of the namelist file, which gives what the table does not.
       character(len=*), intent(in) :: path
-      !> Path of the table.
       character(len=*), intent(in) :: table_path
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Directory for the results; empty for `outputs/<name of the case>_sets`.
       character(len=*), intent(in) :: output
@@ -87,13 +85,10 @@ contains
 
    !> Computes and writes chunk after chunk.
    subroutine write_sets(case, table, threads, results, tally, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> The table, open.
       type(set_table_type), intent(inout) :: table
-      !> Number of threads.
       integer, intent(in) :: threads
-      !> Directory of the results.
       type(result_directory_type), intent(inout) :: results
       !> What the sets came to.
       type(tally_type), intent(out) :: tally
@@ -135,9 +130,7 @@ contains
    pure function get_chunk_size(cost, threads) result(chunk_size)
       !> Time that one takes, s.
       real(wp), intent(in) :: cost
-      !> Number of threads.
       integer, intent(in) :: threads
-      !> Number of sets.
       integer :: chunk_size
 
       chunk_size = threads*max(1, min(16384/threads, nint(0.5_wp/cost)))
@@ -145,7 +138,6 @@ contains
 
    !> Adds sets to a tally.
    pure subroutine add(tally, many, force)
-      !> The tally.
       type(tally_type), intent(inout) :: tally
       !> The results.
       type(many_type), intent(in) :: many
@@ -170,7 +162,6 @@ contains
 
    !> What the screen shows.
    subroutine describe(case, tally, text)
-      !> The case.
       type(case_type), intent(in) :: case
       !> What the sets came to.
       type(tally_type), intent(in) :: tally

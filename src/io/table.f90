@@ -18,13 +18,10 @@ contains
 
    !> The table that a run shows on the screen.
    function get_table(case, history, verdict) result(text)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
       !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
-      !> The table.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -54,7 +51,6 @@ contains
 
    !> The free modes on the screen.
    function get_modes_table(modes) result(text)
-      !> The modes.
       type(free_modes_type), intent(in) :: modes
       !> The table.
       character(len=:), allocatable :: text
@@ -83,7 +79,6 @@ contains
       type(criterion_type), intent(in), optional :: criterion
       !> Shown unit over SI unit.
       real(wp), intent(in), optional :: scale
-      !> The row.
       character(len=:), allocatable :: row
 
       row = '  '//padded(name, 20)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
@@ -96,7 +91,6 @@ contains
 
    !> Numbers that the model chose or found, as rows.
    function facts(history) result(rows)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> One row each.
       character(len=:), allocatable :: rows
@@ -111,9 +105,7 @@ contains
 
    !> A name with blanks for its underscores.
    pure function spaced(name) result(text)
-      !> The name.
       character(len=*), intent(in) :: name
-      !> The text.
       character(len=len(name)) :: text
       integer :: i
 
@@ -125,9 +117,7 @@ contains
 
    !> A number with four digits.
    function short_scientific(value) result(text)
-      !> The number.
       real(wp), intent(in) :: value
-      !> Its text.
       character(len=:), allocatable :: text
       character(len=10) :: buffer
 
@@ -137,9 +127,7 @@ contains
 
    !> A limit with up to three decimals and no idle zeros.
    pure function short(value) result(text)
-      !> The limit.
       real(wp), intent(in) :: value
-      !> Its text.
       character(len=:), allocatable :: text
 
       text = fixed(value, 3)
@@ -149,11 +137,9 @@ contains
 
    !> Text with blanks behind it.
    pure function padded(text, width) result(cell)
-      !> The text.
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.
       integer, intent(in) :: width
-      !> The cell.
       character(len=:), allocatable :: cell
 
       cell = trim(text)//repeat(' ', max(width - len_trim(text), 0))
@@ -161,11 +147,9 @@ contains
 
    !> Text with blanks before it.
    pure function right(text, width) result(cell)
-      !> The text.
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.
       integer, intent(in) :: width
-      !> The cell.
       character(len=:), allocatable :: cell
 
       cell = repeat(' ', max(width - len(text), 0))//text

@@ -20,7 +20,6 @@ contains
       real(wp), intent(in) :: point(:, :)
       !> Points of each cell, from 1: [n_corner, n_cell].
       integer, intent(in) :: cell(:, :)
-      !> Type of all cells.
       integer, intent(in) :: cell_type
       !> Names of the vectors: [n_vector].
       character(len=*), intent(in) :: vector_name(:)
@@ -56,9 +55,7 @@ contains
 
    !> Adds an array.
    subroutine add_array(name, type, n_component, bytes, text)
-      !> Name of the array.
       character(len=*), intent(in) :: name
-      !> Type of its numbers.
       character(len=*), intent(in) :: type
       !> Numbers of each point or cell.
       integer, intent(in) :: n_component

@@ -76,7 +76,6 @@ contains
 
    !> Bands of a set; none where there is no set of that name.
    pure function get_bands(name) result(bands)
-      !> Name of the set.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable :: bands(:)
@@ -86,7 +85,6 @@ contains
 
    !> Bands of a set that must be known.
    subroutine find_bands(name, bands, error)
-      !> Name of the set.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
@@ -114,9 +112,7 @@ contains
 
    !> Nominal frequency of a band as text: `31.5`, `63`.
    pure function get_band_name(band) result(name)
-      !> The band.
       type(band_type), intent(in) :: band
-      !> Its name.
       character(len=len(fixed(band%nominal, get_decimals(band)))) :: name
 
       name = fixed(band%nominal, get_decimals(band))
@@ -124,7 +120,6 @@ contains
 
    !> Decimals of a nominal frequency.
    pure function get_decimals(band) result(decimals)
-      !> The band.
       type(band_type), intent(in) :: band
       !> 0 or 1.
       integer :: decimals

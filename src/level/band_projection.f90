@@ -114,7 +114,6 @@ contains
 
    !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
    subroutine set_sequences(projection, half_width, failed)
-      !> The projection.
       type(band_projection_type), intent(inout) :: projection
       !> W over the sampling rate.
       real(wp), intent(in) :: half_width
@@ -175,7 +174,6 @@ contains
    elemental function get_node_count(a) result(count)
       !> Largest angle a.
       real(wp), intent(in) :: a
-      !> N.
       integer :: count
       real(wp) :: logarithm
 
@@ -225,7 +223,6 @@ contains
    subroutine get_band_energies(projection, n_record, record, folded, energy, square_sum)
       !> Matrices for the length of the records.
       type(band_projection_type), intent(in) :: projection
-      !> Number of records.
       integer, intent(in) :: n_record
       !> The records, N: [n_record, n_sample].
       real(wp), intent(in) :: record(n_record, projection%n_sample)
@@ -270,7 +267,6 @@ contains
 
    !> Spectra of folded records.
    subroutine project(n_record, folded, sequences, spectra, spectrum)
-      !> Number of records.
       integer, intent(in) :: n_record
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), intent(in) :: sequences(:, :)

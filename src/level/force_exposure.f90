@@ -176,7 +176,6 @@ contains
       real(wp), intent(in) :: m
       !> Angle per sample of the sine.
       real(wp), intent(in) :: h
-      !> The sum.
       real(wp) :: total
       integer, parameter :: block = 32
       real(wp) :: part(block, 4), start_wave(4), angle(2)

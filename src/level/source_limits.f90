@@ -76,7 +76,6 @@ contains
    subroutine get_source_limits(source, limits, error)
       !> One of `source_names`.
       character(len=*), intent(in) :: source
-      !> Its limits.
       type(source_limits_type), intent(out) :: limits
       !> The source is not known.
       type(error_type), allocatable, intent(out) :: error
@@ -129,9 +128,7 @@ contains
 
    !> Name of the level of a band: `octave_31_5`.
    pure function get_level_name(band) result(name)
-      !> The band.
       type(band_type), intent(in) :: band
-      !> Its level's name.
       character(len=24) :: name
       integer :: at
 
@@ -144,13 +141,11 @@ contains
    pure function between(name, unit, value, range) result(criterion)
       !> Name of the quantity.
       character(len=*), intent(in) :: name
-      !> Its unit.
       character(len=*), intent(in) :: unit
       !> Value of the source under test.
       real(wp), intent(in) :: value
       !> Minimum and maximum conforming value: [2].
       real(wp), intent(in) :: range(2)
-      !> The criterion.
       type(criterion_type) :: criterion
 
       criterion = criterion_type(name, unit, value, range(1), range(2))
@@ -158,7 +153,6 @@ contains
 
    !> Whether a criterion is met; a value that is not a number never conforms.
    elemental function conforms(criterion) result(met)
-      !> The criterion.
       type(criterion_type), intent(in) :: criterion
       !> The value lies in the range, its ends included.
       logical :: met
@@ -173,7 +167,6 @@ contains
       real(wp), intent(in) :: whole_force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Peaks.
       integer :: peak_count
       real(wp) :: extreme, threshold
       real(wp) :: force(size(whole_force))

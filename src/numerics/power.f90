@@ -95,9 +95,7 @@ contains
 
    !> Bound of the relative error of `raise`, see above.
    elemental function power_error(base, exponent) result(bound)
-      !> The base.
       real(wp), intent(in) :: base
-      !> The exponent.
       real(wp), intent(in) :: exponent
       !> Largest relative error.
       real(wp) :: bound

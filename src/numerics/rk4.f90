@@ -18,7 +18,6 @@ module thud_rk4
       pure subroutine derivative_interface(self, time, state, rate, valid)
          import :: ode_type, wp
          implicit none (type, external)
-         !> The system.
          class(ode_type), intent(in) :: self
          !> Independent variable.
          real(wp), intent(in) :: time
@@ -74,11 +73,9 @@ contains
       real(wp), intent(in) :: time
       !> State at the beginning: [n_state].
       real(wp), intent(in) :: state(:)
-      !> Length of the full step.
       real(wp), intent(in) :: step
       !> Component that becomes zero.
       integer, intent(in) :: component
-      !> Length of the step that ends at the zero.
       real(wp) :: length
       integer, parameter :: max_iterations = 200
       real(wp) :: left, right, left_value, right_value, value
@@ -117,7 +114,6 @@ contains
       pure function component_after(part) result(component_value)
          !> Length of the part.
          real(wp), intent(in) :: part
-         !> Value of the component.
          real(wp) :: component_value
          real(wp) :: new_state(size(state))
          logical :: valid

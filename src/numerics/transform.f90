@@ -141,7 +141,6 @@ contains
       real(wp), intent(inout) :: signal(:)
       !> Array of its transform: [n/2 + 1].
       complex(wp), intent(inout) :: spectrum(:)
-      !> Its plans.
       type(plans_type), intent(out) :: plans
       integer :: at
 
@@ -168,7 +167,6 @@ contains
 
    !> Ends the use of plans.
    subroutine give_back(plans)
-      !> The plans.
       type(plans_type), intent(in) :: plans
       integer :: at
 

@@ -59,7 +59,6 @@ contains
 
    !> Density of the wall, kg/m3.
    pure function get_density(ball) result(density)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mass over the volume of the wall, kg/m3.
       real(wp) :: density

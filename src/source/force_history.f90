@@ -106,7 +106,6 @@ contains
 
    !> The numbers that describe an impact.
    pure function get_scalars(history) result(values)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> The numbers, SI units: [size(scalar_fields)].
       real(wp) :: values(size(scalar_fields))
@@ -138,7 +137,6 @@ contains
    pure function new_force_history(sample_rate, n_sample, part_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Number of samples.
       integer, intent(in) :: n_sample
       !> Names of the parts of the force: [n_part].
       character(len=*), intent(in) :: part_name(:)

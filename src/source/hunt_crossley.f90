@@ -76,7 +76,6 @@ contains
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(hunt_crossley_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
@@ -95,7 +94,6 @@ contains
 
    !> Right-hand side of the equation of motion.
    pure subroutine get_derivative(self, time, state, rate, valid)
-      !> The spring.
       class(spring_type), intent(in) :: self
       !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
@@ -118,7 +116,6 @@ contains
 
    !> Spring and damping force of one instant.
    pure subroutine get_parts(self, state, parts, elastic_force)
-      !> The spring.
       class(spring_type), intent(in) :: self
       !> State, see `thud_lumped`: [4].
       real(wp), intent(in) :: state(:)
@@ -177,7 +174,6 @@ contains
       pure function excess(x) result(value)
          !> Argument above -1.
          real(wp), intent(in) :: x
-         !> The value.
          real(wp) :: value
          integer :: k
 
@@ -238,7 +234,6 @@ contains
    subroutine solve(ball, drop, options, sampling, history, error)
       !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Stiffness and damping.
       class(hunt_crossley_type), intent(in) :: options

@@ -49,15 +49,12 @@ contains
    !> Error of a state outside the domain of the equation; sources that have such states override
    !> it.
    function get_failure(self, drop, time, state) result(error)
-      !> The source.
       class(lumped_type), intent(in) :: self
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Time since first touch, s.
       real(wp), intent(in) :: time
       !> Last valid state: [4].
       real(wp), intent(in) :: state(:)
-      !> The error.
       type(error_type) :: error
 
       error = numerical_error('&drop: height = '//to_text(drop%height)//' m leads out of the model of a source of ' &
@@ -69,7 +66,6 @@ contains
    subroutine solve_lumped(source, drop, sampling, part_name, history, error)
       !> The source in its compression phase.
       class(lumped_type), intent(inout) :: source
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
@@ -115,7 +111,6 @@ contains
    subroutine advance(source, drop, end_time, time, state, history, released, error)
       !> The source; it changes its phase at the turning point.
       class(lumped_type), intent(inout) :: source
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Time at the end of the step, s.
       real(wp), intent(in) :: end_time
@@ -172,7 +167,6 @@ contains
       real(wp), intent(in) :: state(:)
       !> Number of the sample.
       integer, intent(in) :: i
-      !> The history.
       type(force_history_type), intent(inout) :: history
 
       history%deflection(i) = state(at_deflection)
@@ -217,7 +211,6 @@ contains
    pure function coarse_error(finding) result(error)
       !> What tells it.
       character(len=*), intent(in) :: finding
-      !> The error.
       type(error_type) :: error
 
       error = numerical_error('&sampling: substeps is too low for this source: '//finding &

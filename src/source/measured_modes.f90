@@ -71,11 +71,9 @@ contains
 
    !> Refuses lists that do not fit each other or the ball.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(measured_modes_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
@@ -102,9 +100,7 @@ contains
    subroutine solve(ball, drop, options, sampling, history, error)
       !> The ball, whose mass the effective masses add up to.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
-      !> The modes.
       class(measured_modes_type), intent(in) :: options
       !> Sampling rate and length of the record.
       type(sampling_type), intent(in) :: sampling
@@ -163,11 +159,9 @@ contains
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)
       !> Natural frequency, Hz.
       real(wp), intent(in) :: frequency
-      !> Damping ratio.
       real(wp), intent(in) :: damping_ratio
       !> Effective mass, kg.
       real(wp), intent(in) :: mass
-      !> The mode.
       type(mode_type) :: mode
 
       mode%mass = mass

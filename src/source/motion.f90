@@ -45,7 +45,6 @@ contains
 
    !> Adds a snapshot where there is room for one.
    pure subroutine take_snapshot(motion, time, position, velocity, contact_pressure, cavity_pressure)
-      !> The snapshots.
       type(motion_type), intent(inout) :: motion
       !> Time since the record began, s.
       real(wp), intent(in) :: time

@@ -68,7 +68,6 @@ contains
 
    !> Complains about a contact of hardly any samples.
    subroutine check_contact_samples(sampling, contact_time, error)
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Contact time, s.
       real(wp), intent(in) :: contact_time
@@ -82,7 +81,6 @@ contains
 
    !> Number of samples of the record.
    pure function get_sample_count(sampling) result(n_sample)
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Samples from first touch on, the first one included.
       integer :: n_sample

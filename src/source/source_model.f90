@@ -41,9 +41,7 @@ module thud_source_model
       subroutine solve(ball, drop, options, sampling, history, error)
          import :: ball_type, drop_type, error_type, force_history_type, sampling_type, source_model_type
          implicit none (type, external)
-         !> The ball.
          type(ball_type), intent(in) :: ball
-         !> The drop.
          type(drop_type), intent(in) :: drop
          !> The options, checked.
          class(source_model_type), intent(in) :: options
@@ -60,11 +58,9 @@ contains
 
    !> Refuses options that do not fit each other, the ball or the sampling; by default all fit.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(source_model_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Names group, key, value and what is allowed.
       type(error_type), allocatable, intent(out) :: error
@@ -73,9 +69,7 @@ contains
 
    !> Size of the snapshots of the deformed ball; by default there are none.
    function get_snapshot_shape(options, sampling) result(extents)
-      !> The options.
       class(source_model_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer :: extents(3)
@@ -85,7 +79,6 @@ contains
 
    !> About the time that one drop takes on one core, s.
    function get_cost(options) result(cost)
-      !> The options.
       class(source_model_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
@@ -95,9 +88,7 @@ contains
 
    !> Loss factor of the material against frequency, of models that have a material; others refuse.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The options.
       class(source_model_type), intent(in) :: options
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)

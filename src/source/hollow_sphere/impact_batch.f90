@@ -81,7 +81,6 @@ contains
       type(impact_batch_type), intent(inout) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> Length of the step.
       real(wp), intent(in) :: length
       real(wp), dimension(4) :: state, new
       logical :: valid
@@ -97,7 +96,6 @@ contains
 
    !> The equation of one lane as the single solver has it, in the units of the lanes.
    pure function get_single(shell, i) result(single)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
       !> Number of the lane.
       integer, intent(in) :: i
@@ -117,9 +115,7 @@ contains
 
    !> Whether a value is a number.
    elemental function is_finite(value) result(finite)
-      !> The value.
       real(wp), intent(in) :: value
-      !> It is.
       logical :: finite
 
       finite = abs(value) <= huge(value)
@@ -197,7 +193,6 @@ contains
 
    !> What the end of the phase brings to zero: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity.
       logical, intent(in) :: compressing

@@ -21,7 +21,6 @@ contains
 
    !> Impacts from first touch to release, and their forces.
    subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> Samples of the record.
       integer, intent(in) :: n_sample
@@ -63,7 +62,6 @@ contains
 
    !> Marches until every lane has come to the end of its phase, or to that of the record.
    subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
@@ -119,7 +117,6 @@ contains
    !> A new series for each lane that begins or strayed and, asked at fixed times, where the old one will
    !> not last: nothing that depends on other lanes.
    pure subroutine renew_series(impacts, start, n)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
@@ -157,7 +154,6 @@ contains
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
    pure subroutine settle(impacts, compressing, n, start, last, undisturbed, done)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
@@ -195,7 +191,6 @@ contains
 
    !> Whether all lanes stay inside the phase.
    pure function all_stay(state, compressing) result(all_do)
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
@@ -222,7 +217,6 @@ contains
 
    !> To the turning point and on to the end of its step, with the flux term of restitution.
    subroutine turn(impacts, turns)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> The lane has a turning point: [batch_size].
       logical, intent(in) :: turns(batch_size)

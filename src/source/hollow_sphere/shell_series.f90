@@ -50,7 +50,6 @@ contains
 
    !> Whether the series of a lane lasts for the next `series_steps`, in the inner part of its reach.
    elemental function will_last(place, reach, deflection, velocity) result(lasts)
-      !> Place of the series.
       real(wp), intent(in) :: place
       !> Its reach.
       real(wp), intent(in) :: reach
@@ -68,11 +67,9 @@ contains
    pure subroutine place_series(shell, state, wanted, series)
       !> The equations.
       type(shell_batch_type), intent(in) :: shell
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> The lane is expanded anew: [batch_size].
       logical, intent(in) :: wanted(batch_size)
-      !> The series.
       type(series_batch_type), intent(inout) :: series
       real(wp), dimension(batch_size) :: place, inverse, power
       real(wp) :: term(batch_size, 0:degree)
@@ -126,7 +123,6 @@ contains
    elemental function get_ratio(deflection) result(ratio)
       !> y.
       real(wp), intent(in) :: deflection
-      !> x.
       real(wp) :: ratio
 
       ratio = (1 - deflection)*(1 - deflection)*(1 + 2*deflection)
@@ -136,7 +132,6 @@ contains
    elemental function get_reach(deflection) result(reach)
       !> y.
       real(wp), intent(in) :: deflection
-      !> The distance.
       real(wp) :: reach
 
       reach = near*min(1 - deflection, 0.5_wp + deflection)
@@ -146,7 +141,6 @@ contains
    elemental function get_pull(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(pull)
       !> y, its distance from the place of the series, and the terms of the series.
       real(wp), intent(in) :: y, d, c0, c1, c2, c3, c4, c5, c6, c7
-      !> y c.
       real(wp) :: pull
 
       pull = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
@@ -174,7 +168,6 @@ contains
       type(shell_batch_type), intent(in) :: shell
       !> The series, in whose reach the states are.
       type(series_batch_type), intent(in) :: series
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> Force on the floor: [batch_size].
       real(wp), intent(out) :: force(batch_size)
@@ -207,9 +200,7 @@ contains
    pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force, missed)
       !> The equations.
       type(shell_batch_type), intent(in) :: shell
-      !> The series.
       type(series_batch_type), intent(in) :: series
-      !> State at the beginning.
       type(state_batch_type), intent(in) :: state
       !> Length, in whole steps: [batch_size].
       real(wp), intent(in) :: length(batch_size)

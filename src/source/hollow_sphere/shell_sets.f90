@@ -78,7 +78,6 @@ contains
 
    !> The numbers of a set: ball and drop hold nothing else, in the order of their keys.
    pure function get_numbers(set) result(values)
-      !> The set.
       type(set_type), intent(in) :: set
       !> The numbers: [n_key].
       real(wp) :: values((storage_size(set%ball) + storage_size(set%drop))/storage_size(1.0_wp))
@@ -132,7 +131,6 @@ contains
 
    !> What is wrong with the input of a set.
    pure function get_input_status(set, keys, ranges) result(status)
-      !> The set.
       type(set_type), intent(in) :: set
       !> Names of its numbers: [n_key].
       character(len=*), intent(in) :: keys(:)
@@ -162,7 +160,6 @@ contains
    !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
    !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like sets.
    pure function get_rough_contact_time(set) result(time)
-      !> The set.
       type(set_type), intent(in) :: set
       !> The time, s.
       real(wp) :: time
@@ -181,7 +178,6 @@ contains
    subroutine solve_block(sets, sampling, force, last_sample, outcomes)
       !> The sets, their input checked: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> Sampling of all.
       type(sampling_type), intent(in) :: sampling
       !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
       real(wp), intent(inout), contiguous :: force(:, :)
@@ -220,11 +216,9 @@ contains
 
    !> Equation and beginning of one lane; see `thud_shell_batch` for the units.
    pure subroutine set_lane(impacts, i, set, step)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> The set.
       type(set_type), intent(in) :: set
       !> The step, s.
       real(wp), intent(in) :: step
@@ -244,13 +238,10 @@ contains
 
    !> What became of one lane, asked in the order of `solve_lumped`.
    function get_lane_status(impacts, i, set, sampling) result(status)
-      !> The impacts.
       type(impact_batch_type), intent(in) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> Its set.
       type(set_type), intent(in) :: set
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> A code of `thud_set_status`.
       integer :: status
@@ -275,9 +266,7 @@ contains
 
    !> Whether the single solver finds the steps fine enough; its sums take in the stages of each step.
    function get_single_status(set, sampling) result(status)
-      !> The set.
       type(set_type), intent(in) :: set
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> `set_is_fine` or `set_coarse`.
       integer :: status
@@ -292,11 +281,9 @@ contains
    !> Why a lane has left the domain of the equation: the single solver's own question, asked of the
    !> last state inside.
    function get_reason(impacts, i, set) result(status)
-      !> The impacts.
       type(impact_batch_type), intent(in) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> Its set.
       type(set_type), intent(in) :: set
       !> `set_closes` or `set_coarse`.
       integer :: status

@@ -61,7 +61,6 @@ contains
 
    !> About the time that one drop takes on one core, s.
    function get_cost(options) result(cost)
-      !> The options.
       class(modal_ball_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
@@ -71,9 +70,7 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Modes, rings and damping.
       class(modal_ball_type), intent(in) :: options
@@ -103,15 +100,12 @@ contains
 
    !> Modes, their steps and the response of the rings.
    subroutine prepare(ball, options, interval, step, contact, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Modes, rings and damping.
       class(modal_ball_options_type), intent(in) :: options
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      !> The modes.
       type(mode_step_type), intent(out) :: step
-      !> The rings.
       type(ring_contact_type), intent(out) :: contact
       !> The modes cannot be computed, or the rings cannot be told apart.
       type(error_type), allocatable, intent(out) :: error
@@ -136,7 +130,6 @@ contains
 
    !> Modes of all harmonics, and the static response of the rings to what these leave out.
    subroutine add_modes(ball, options, interval, step, response, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Modes and rings.
       class(modal_ball_options_type), intent(in) :: options
@@ -190,7 +183,6 @@ contains
 
    !> Angles of the rings from the lowest point to the equator.
    pure function get_ring_angles(n_ring) result(angle)
-      !> Number of rings.
       integer, intent(in) :: n_ring
       !> Angles, rad: [n_ring].
       real(wp) :: angle(n_ring)
@@ -201,17 +193,13 @@ contains
 
    !> Marches from first touch until the ball has left for good.
    subroutine march(ball, sampling, interval, step, contact, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      !> The modes.
       type(mode_step_type), intent(in) :: step
-      !> The rings.
       type(ring_contact_type), intent(inout) :: contact
-      !> The history.
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
@@ -263,7 +251,6 @@ contains
 
    !> One step of the modes, and the impulses of the floor at its beginning.
    subroutine take_step(step, interval, mass, height, state, contact, impulse, error)
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -314,7 +301,6 @@ contains
    subroutine finish(mass, step, state, history, error)
       !> Mass of the ball, kg.
       real(wp), intent(in) :: mass
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball after the contact.
       type(state_type), intent(in) :: state
@@ -343,15 +329,12 @@ contains
 
    !> Writes motion and energies of one instant into the history.
    pure subroutine record_motion(ball, step, state, i, history)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball.
       type(state_type), intent(in) :: state
       !> Number of the sample.
       integer, intent(in) :: i
-      !> The history.
       type(force_history_type), intent(inout) :: history
       integer :: k, place
 

@@ -50,7 +50,6 @@ contains
 
    !> Energy of the modes, J.
    pure function get_energy(step, q, v) result(energy)
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Amplitudes, m sqrt(kg): [n_mode].
       real(wp), intent(in) :: q(:)

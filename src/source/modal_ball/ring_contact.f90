@@ -90,7 +90,6 @@ contains
 
    !> Impulses that close the gaps of the touching rings.
    subroutine close_gaps(contact, gap, failed)
-      !> The contact.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_ring].
       real(wp), intent(in) :: gap(:)
