@@ -1,8 +1,7 @@
 !> The flat API for Python: plain arguments, explicit shapes, a status. f2py wraps these procedures and nothing
 !> else; they pass on and decide nothing.
 !>
-!> Results are bundles that say themselves what they hold: a procedure leaves one and gives its handle and its
-!> sizes; `collect` hands it over and frees it. `status` is 0, or the code of the error whose sentence is the text
+!> Results are self-describing bundles: a procedure leaves one and gives its handle and its sizes; `collect` hands it over and frees it. `status` is 0, or the code of the error whose sentence is the text
 !> `message` of the bundle. Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_bundle, only: bundle_type, leave, take
@@ -28,10 +27,8 @@ contains
       !f2py threadsafe
       !> Handle of the bundle; it can be used once.
       integer(int64), intent(in) :: handle
-      !> Size of its header and its texts.
-      integer, intent(in) :: n_byte
-      !> Number of its numbers, at least 1.
-      integer, intent(in) :: n_value
+      !> Size of its header and its texts; number of its numbers, at least 1.
+      integer, intent(in) :: n_byte, n_value
       !> Header, a zero, and texts: [n_byte].
       integer(int8), intent(out) :: bytes(n_byte)
       !> The numbers, in the order of the header: [n_value].
@@ -217,10 +214,8 @@ contains
    !> Runs a namelist file as the executable does, and keeps what it has computed.
    subroutine run(path, output, progress, status, handle, n_byte, n_value)
       ! Not threadsafe: functions of its texts keep their lengths in static memory.
-      !> Path of the file.
-      character(len=*), intent(in) :: path
-      !> Output directory, empty for the default.
-      character(len=*), intent(in) :: output
+      !> Path of the file; output directory, empty for the default.
+      character(len=*), intent(in) :: path, output
       !> 1 to show progress on a terminal.
       integer, intent(in) :: progress
       !> Status, handle and sizes as in `leave`.

@@ -47,10 +47,8 @@ contains
    subroutine drop_many(text, names, n_column, n_drop, values, threads, judged, n_outcome, n_band, n_force, n_sample, &
       n_kept, drop_status, outcome, level, conforms, margin, verdict, force, status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> Text of a namelist file.
-      character(len=*), intent(in) :: text
-      !> Names of the keys, with commas between.
-      character(len=*), intent(in) :: names
+      !> Text of a namelist file; names of the keys, with commas between.
+      character(len=*), intent(in) :: text, names
       !> Numbers of keys, drops and threads.
       integer, intent(in) :: n_column, n_drop, threads
       !> Values of the keys, of a choice its number from 1: [n_column, n_drop].

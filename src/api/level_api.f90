@@ -86,10 +86,8 @@ contains
       real(wp), intent(in) :: force(n_sample)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Name of the band set.
-      character(len=*), intent(in) :: set
-      !> `exact` or `fft`.
-      character(len=*), intent(in) :: method
+      !> Name of the band set; `exact` or `fft`.
+      character(len=*), intent(in) :: set, method
       !> Number of bands, from `count_bands`.
       integer, intent(in) :: n_band
       !> Levels, dB: [n_band].
@@ -147,10 +145,8 @@ contains
       real(wp), intent(in) :: levels(n_octave)
       !> Contact time, s, coefficient of restitution, mass, kg, and drop height, m.
       real(wp), intent(in) :: contact_time, restitution, mass, drop_height
-      !> Number of peaks of the force.
-      integer, intent(in) :: n_peak
-      !> Number of criteria, from `count_names`.
-      integer, intent(in) :: n_criterion
+      !> Number of peaks of the force; number of criteria, from `count_names`.
+      integer, intent(in) :: n_peak, n_criterion
       !> Names and units of the criteria: [n_criterion].
       character(len=24), intent(out) :: names(n_criterion)
       character(len=8), intent(out) :: units(n_criterion)

@@ -1,5 +1,4 @@
-!> Results by name: texts, numbers and arrays of any count, for callers that learn from the bundle itself what
-!> it holds.
+!> Results by name: texts, numbers and arrays of any count, self-describing for callers.
 module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
@@ -12,7 +11,7 @@ module thud_bundle
 
    !> Numbers of one item.
    type :: item_type
-      !> They, in Fortran's order: [n].
+      !> The numbers, in Fortran's order: [n].
       real(wp), allocatable :: values(:)
    end type item_type
 
@@ -84,10 +83,8 @@ contains
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
       type(bundle_type), intent(inout) :: self
-      !> Name of the item.
-      character(len=*), intent(in) :: name
-      !> What it is.
-      character(len=*), intent(in) :: form
+      !> Name of the item; what it is.
+      character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
       self%header = self%header//trim(name)//tab//form//line_feed
@@ -155,7 +152,7 @@ contains
       integer(int64), intent(out) :: handle
       !> Size of its header and its texts.
       integer, intent(out) :: n_byte
-      !> Number of its numbers, at least 1: f2py knows no empty arrays.
+      !> Number of its numbers, at least 1: f2py has no empty arrays.
       integer, intent(out) :: n_value
 
       status = 0
@@ -172,7 +169,7 @@ contains
       n_value = max(1, bundle%count_values())
    end subroutine leave
 
-   !> The bundle behind a handle; who takes it frees it.
+   !> The bundle of a handle; the caller frees it.
    subroutine take(handle, bundle)
       !> Handle of a bundle that was left and not yet taken.
       integer(int64), intent(in) :: handle

@@ -10,7 +10,7 @@ module thud_field
 
    public :: check_fields, field_type, key_length, list_type, name_length
 
-   !> Most entries of a list.
+   !> Maximum number of entries of a list.
    integer, parameter :: list_length = 64
 
    !> A list of numbers of any length up to `list_length`.
@@ -27,13 +27,13 @@ module thud_field
    !> Length of the name of a key or a group.
    integer, parameter :: key_length = 24
 
-   !> Most allowed texts of one key.
+   !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
 
-   !> What no entry of a list can be.
+   !> Value that no entry of a list can have.
    real(wp), parameter :: unset = -huge(1.0_wp)
 
-   !> Description of one key and a pointer to the variable behind it.
+   !> Description of one key and a pointer to its variable.
    type :: field_type
       !> Namelist group.
       character(len=key_length) :: group = ''
@@ -129,7 +129,7 @@ contains
    !> Sets the variable from the text of a namelist assignment.
    subroutine set_from_text(self, text, error)
       class(field_type), intent(in) :: self
-      !> What stood behind the equals sign.
+      !> Text after the equals sign.
       character(len=*), intent(in) :: text
       !> The text is not a value of the wanted type.
       type(error_type), allocatable, intent(out) :: error
@@ -182,9 +182,9 @@ contains
    end subroutine set_from_text
 
    !> Whether numbers are written in the usual way. A namelist may also hold null values (`1*`) and
-   !> exponents without a letter (`1+3` for 1000): nobody means them.
+   !> exponents without a letter (`1+3` for 1000): those are mistakes.
    pure function is_plain(text, repeats) result(plain)
-      !> What stood behind the equals sign.
+      !> Text after the equals sign.
       character(len=*), intent(in) :: text
       !> `3*0.1` is allowed.
       logical, intent(in) :: repeats
@@ -273,10 +273,8 @@ contains
    !> Error that names group, key, value and allowed range.
    function get_error(self, value, what, interval) result(error)
       class(field_type), intent(in) :: self
-      !> The value as text.
-      character(len=*), intent(in) :: value
-      !> What is wrong with it.
-      character(len=*), intent(in) :: what
+      !> The value as text; what is wrong with it.
+      character(len=*), intent(in) :: value, what
       type(interval_type), intent(in) :: interval
       type(error_type) :: error
       character(len=:), allocatable :: allowed

@@ -13,7 +13,7 @@ module thud_text
    !> Line feed, the line end of every file that thud writes.
    character(len=*), parameter :: newline = new_line('a')
 
-   !> Room for any number.
+   !> Length that fits any number.
    integer, parameter :: number_length = 40
 
    !> Shortest text that reads back as the same value.
@@ -56,7 +56,7 @@ contains
    !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
    pure function fixed(value, decimals) result(text)
       real(wp), intent(in) :: value
-      !> Digits behind the point.
+      !> Number of decimals.
       integer, intent(in) :: decimals
       !> The rounded number, with a leading zero.
       character(len=len_trim(format_fixed(value, decimals))) :: text
@@ -64,7 +64,7 @@ contains
       text = format_fixed(value, decimals)
    end function fixed
 
-   !> Integer with blanks behind it.
+   !> Integer, padded with blanks.
    pure function format_integer(value) result(buffer)
       integer, intent(in) :: value
       !> Its digits.
@@ -73,10 +73,10 @@ contains
       write (buffer, '(i0)') value
    end function format_integer
 
-   !> Number with a fixed count of decimals and blanks behind it.
+   !> Number with a fixed count of decimals, padded with blanks.
    pure function format_fixed(value, decimals) result(buffer)
       real(wp), intent(in) :: value
-      !> Digits behind the point.
+      !> Number of decimals.
       integer, intent(in) :: decimals
       !> The rounded number.
       character(len=number_length) :: buffer
@@ -88,7 +88,7 @@ contains
       if (decimals == 0) buffer(len_trim(buffer):) = ''
    end function format_fixed
 
-   !> Shortest decimal text of a number with blanks behind it.
+   !> Shortest decimal text of a number, padded with blanks.
    pure function format_real(value) result(buffer)
       real(wp), intent(in) :: value
       character(len=number_length) :: buffer
@@ -105,7 +105,7 @@ contains
             write (form, '(a,i0,a)') '(es40.', digits, 'e3)'
             write (buffer, form) value
             read (buffer, form) read_back
-            ! "not different" says what is meant where == on reals is a mistake.
+            ! == on reals would be refused by compilers.
             if (.not. abs(read_back - value) > 0.0_wp) exit
          end do
          buffer = tidy_exponent(adjustl(buffer))

@@ -65,7 +65,7 @@ contains
       number = findloc(model_names == case%model, .true., dim=1)
    end function get_model_number
 
-   !> Every key of the input, in the order of the written file; keys of two owners stand there twice.
+   !> Every key of the input, in the order of the written file; keys of two owners occur twice.
    function get_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case

@@ -1,4 +1,4 @@
-!> What a case comes to: free modes, the force history of its model, levels and verdict. No file is known here.
+!> Computes a case: free modes, the force history of its model, levels and verdict. It knows no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, get_model_number
@@ -27,7 +27,7 @@ module thud_compute
       type(criterion_type) :: criteria(criterion_count, force_count)
    end type verdict_type
 
-   !> What a case gives.
+   !> Results of a case.
    type :: results_type
       !> The force, where an impact is asked for.
       type(force_history_type) :: history
@@ -39,7 +39,7 @@ module thud_compute
 
 contains
 
-   !> Computes what a case asks for, but for levels and verdict.
+   !> Computes what a case asks for, without levels and verdict.
    subroutine compute_case(case, results, error)
       !> The case, checked.
       type(case_type), intent(in) :: case

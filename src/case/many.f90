@@ -73,7 +73,7 @@ module thud_many
       real(wp), allocatable :: force(:, :, :)
    end type many_type
 
-   !> What an earlier call has prepared for the next one; threads take it in turns.
+   !> What an earlier call has prepared for the next one; one thread at a time owns it.
    type(many_type), allocatable :: kept
 
 contains
@@ -136,7 +136,7 @@ contains
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
    end subroutine new_many
 
-   !> Takes what an earlier call has left, or begins anew.
+   !> Takes what an earlier call has left, or starts afresh.
    subroutine take_many(many)
       !> The results of an earlier call, or none.
       type(many_type), allocatable, intent(out) :: many

@@ -36,9 +36,9 @@ module thud_ensemble
 
    !> Arrays of one thread.
    type :: workspace_type
-      !> Room for the forces: [2 block_size n_row + line_length].
+      !> Forces, with space for their alignment: [2 block_size n_row + line_length].
       real(wp), allocatable :: force(:)
-      !> Room for folded forces: [2 block_size n_row].
+      !> Folded forces: [2 block_size n_row].
       real(wp), allocatable :: folded(:)
       !> Number of the last sample that is not zero.
       integer :: last_sample = 0
@@ -54,11 +54,11 @@ contains
    pure function new_projections(sample_rate, bands, n_sample) result(projections)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> The bands besides the octaves: [n_more].
+      !> The bands other than the octaves: [n_more].
       type(band_type), intent(in) :: bands(:)
       !> Samples of the longest record.
       integer, intent(in) :: n_sample
-      !> Room for them.
+      !> All windows, still empty.
       type(projections_type) :: projections
 
       projections%sample_rate = sample_rate
@@ -103,7 +103,7 @@ contains
       logical, intent(out) :: met(:, :)
       !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
-      !> The sampling cannot be used, its records have no room in memory, or the source is not known.
+      !> The sampling cannot be used, its records do not fit into memory, or the source is not known.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
@@ -159,7 +159,7 @@ contains
 
    end subroutine solve_ensemble
 
-   !> Arrays of a thread. Memory that no contact comes to is never touched.
+   !> Arrays of a thread. Memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)
       !> The arrays, or an error where there is no memory for them.
       type(workspace_type), intent(out) :: workspace
@@ -176,7 +176,7 @@ contains
       if (status == 0) allocate (workspace%folded(force_count*block_size*n_row), stat=status, errmsg=message)
       if (status /= 0) workspace%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
-         //' sets no room in memory; allowed: shorter records, or fewer threads')
+         //' sets no space in memory; allowed: shorter records, or fewer threads')
       nothing = 0.0_wp
       workspace%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_workspace
@@ -234,7 +234,7 @@ contains
       end do
    end subroutine solve_workspace
 
-   !> The forces of the block in a room: [force_count block_size, n_row].
+   !> The forces of the block in a workspace: [force_count block_size, n_row].
    function get_force(workspace) result(force)
       !> Arrays of the thread.
       type(workspace_type), intent(in), target :: workspace

@@ -43,7 +43,7 @@ module thud_elastic_body
       real(wp) :: gas_energy = 0.0_wp
       !> Overpressure of the gas, Pa.
       real(wp) :: gas_pressure = 0.0_wp
-      !> Smallest local ratio of volumes J.
+      !> Minimum local ratio of volumes J.
       real(wp) :: min_jacobian = 1.0_wp
       !> `no_failure`, or why there are no forces.
       integer :: failure = no_failure

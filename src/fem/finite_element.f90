@@ -28,7 +28,7 @@ module thud_finite_element
    !> Part of it at which a running computation is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
-   !> Most steps of elements in a run; they take about half an hour.
+   !> Maximum number of steps of elements in a run; they take about half an hour.
    real(wp), parameter :: max_work = 2.0e10_wp
 
    !> Time between two looks at the step, s: the ball deforms little meanwhile.
@@ -91,7 +91,7 @@ contains
       type(drop_type), intent(in) :: drop
       !> Mesh, material, contact.
       class(finite_element_type), intent(in) :: options
-      !> Sampling rate, length of the record, least number of steps in a sampling interval.
+      !> Sampling rate, length of the record, minimum number of steps in a sampling interval.
       type(sampling_type), intent(in) :: sampling
       !> Force and motion, with the energies in the channels, and snapshots of the deformed ball.
       type(force_history_type), intent(out) :: history
@@ -211,10 +211,8 @@ contains
 
    !> Adds the impulse of the floor in one step to the record, as part of the means around two samples.
    pure subroutine add_impulse(impulse, interval, i, share, history)
-      !> The impulse, N s.
-      real(wp), intent(in) :: impulse
-      !> Sampling interval, s.
-      real(wp), intent(in) :: interval
+      !> The impulse, N s; sampling interval, s.
+      real(wp), intent(in) :: impulse, interval
       !> Number of the sample before it.
       integer, intent(in) :: i
       !> Part of the step that lies nearer to the next sample.
@@ -256,10 +254,8 @@ contains
       !> The ball.
       type(impact_run_type), intent(in) :: run
       type(contacts_type), intent(inout) :: contacts
-      !> Time since the record began, s.
-      real(wp), intent(in) :: time
-      !> Length of the step, s.
-      real(wp), intent(in) :: step
+      !> Time since the record began, s; length of the step, s.
+      real(wp), intent(in) :: time, step
       !> Gets contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
       real(wp) :: speed
@@ -279,14 +275,12 @@ contains
       end if
    end subroutine follow_contact
 
-   !> Complains about a ball that cannot be computed any further.
+   !> Refuses a ball that cannot be computed any further.
    subroutine check_run(run, time, first_energy, history, error)
       type(impact_run_type), intent(in) :: run
-      !> Time since the record began, s.
-      real(wp), intent(in) :: time
-      !> Energy of the first sample, J.
-      real(wp), intent(in) :: first_energy
-      !> Gets the largest residual of the energy, relative to the energy of motion at first touch.
+      !> Time since the record began, s; energy of the first sample, J.
+      real(wp), intent(in) :: time, first_energy
+      !> Gets the maximum residual of the energy, relative to the energy of motion at first touch.
       type(force_history_type), intent(inout) :: history
       !> What happened, when and why.
       type(error_type), allocatable, intent(out) :: error

@@ -16,13 +16,13 @@ module thud_finite_element_options
 
    public :: finite_element_options_type, get_frame_count, get_stride
 
-   !> Most memory for snapshots, bytes.
+   !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
 
-   !> Least sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
+   !> Minimum sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
    real(wp), parameter :: min_rate = 16000.0_wp
 
-   !> Least number of elements through the wall that bend as the wall does.
+   !> Minimum number of elements through the wall that bend as the wall does.
    integer, parameter :: min_radial = 2
 
    !> Options of the model.
@@ -51,7 +51,7 @@ module thud_finite_element_options
 
 contains
 
-   !> Keys and allowed ranges; some stand in groups of their own.
+   !> Keys and allowed ranges; some belong to groups of their own.
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(finite_element_options_type), intent(in), target :: options
@@ -113,7 +113,7 @@ contains
       extents = [options%mesh%polar_elements + 1, options%mesh%radial_elements + 1, get_frame_count(options, sampling)]
    end function get_snapshot_shape
 
-   !> Most snapshots of a run.
+   !> Maximum number of snapshots of a run.
    pure function get_frame_count(options, sampling) result(n_frame)
       class(finite_element_options_type), intent(in) :: options
       !> Sampling of the record.

@@ -24,7 +24,7 @@ module thud_impact_record
    !> Part of the wall that the surface may sink into the floor.
    real(wp), parameter :: max_sink = 0.01_wp
 
-   !> Columns of the channels that are told apart here.
+   !> Columns of the channels.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
 
 contains

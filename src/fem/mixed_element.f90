@@ -29,10 +29,8 @@ contains
       real(wp), intent(in) :: r(n_node)
       !> Heights of the nodes, m: [9].
       real(wp), intent(in) :: z(n_node)
-      !> Shear modulus, Pa.
-      real(wp), intent(in) :: shear_modulus
-      !> Density, kg/m3.
-      real(wp), intent(in) :: density
+      !> Shear modulus, Pa; density, kg/m3.
+      real(wp), intent(in) :: shear_modulus, density
       !> Stiffness against distortion at constant volume, N/m, lower triangle: [18, 18].
       real(wp), intent(out) :: distortion(2*n_node, 2*n_node)
       !> Mean dilatations by displacements; bulk_modulus*transpose(dilatation)*dilatation is the

@@ -2,7 +2,7 @@
 !>
 !> Below Poisson's ratio 1/2 the pressure is condensed in each element. At 1/2 every solution has to
 !> keep the mean dilatations at zero: an augmented Lagrangian does that with one factorisation
-!> of a positive definite matrix; each turn makes the dilatations some 1e-4 of what they were.
+!> of a positive definite matrix; each iteration reduces the dilatations by about 1e-4.
 module thud_mode_matrices
    use thud_ball, only: ball_type, get_density
    use thud_error, only: error_type, numerical_error
@@ -23,8 +23,8 @@ module thud_mode_matrices
    !> frequencies are off by less than 1e-8.
    real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
 
-   !> Most turns of the augmented Lagrangian; two are needed.
-   integer, parameter :: max_turns = 30
+   !> Maximum number of iterations of the augmented Lagrangian; two are needed.
+   integer, parameter :: max_iterations = 30
 
    !> Matrices over the free displacements.
    type :: mode_matrices_type
@@ -115,10 +115,8 @@ contains
    !> Adds up the matrices of all elements.
    pure subroutine assemble(mesh, shear_modulus, density, matrices)
       type(mesh_type), intent(in) :: mesh
-      !> Shear modulus, Pa.
-      real(wp), intent(in) :: shear_modulus
-      !> Density, kg/m3.
-      real(wp), intent(in) :: density
+      !> Shear modulus, Pa; density, kg/m3.
+      real(wp), intent(in) :: shear_modulus, density
       !> Gets stiffness - shift*mass, mass and dilatations.
       type(mode_matrices_type), intent(inout) :: matrices
       real(wp) :: volume
@@ -176,14 +174,14 @@ contains
       logical, intent(out) :: failed
       real(wp) :: pressure(n_dilatation, size(matrices%place, 2)), change(n_dilatation, size(matrices%place, 2))
       real(wp) :: padded(matrices%n + 1)
-      integer :: turn, element, info
+      integer :: iteration, element, info
 
       failed = .false.
       x = force
       call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, x, matrices%n, info)
       if (.not. matrices%incompressible) return
       pressure = 0.0_wp
-      do turn = 1, max_turns
+      do iteration = 1, max_iterations
          padded(:matrices%n) = x
          padded(matrices%n + 1) = 0.0_wp
          do element = 1, size(matrices%place, 2)

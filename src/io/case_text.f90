@@ -190,7 +190,7 @@ contains
    end subroutine get_case_text
 
    !> Every key with its default, allowed range and meaning, as a commented namelist file. Groups
-   !> that the default model does not use stand behind `!`.
+   !> that the default model does not use follow a `!`.
    subroutine describe_keys(text)
       !> The description; a valid input file.
       character(len=:), allocatable, intent(out) :: text

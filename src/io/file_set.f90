@@ -80,7 +80,7 @@ contains
       end do
    end subroutine exchange
 
-   !> Moves the files of the workspace into the directory, so that those of two inputs never stand together.
+   !> Moves the files of the workspace into the directory, so that those of two inputs are never mixed.
    subroutine move_files(workspace, place, names, listed, same, error)
       character(len=*), intent(in) :: workspace
       character(len=*), intent(in) :: place
@@ -96,7 +96,7 @@ contains
       integer :: i
       logical :: done
 
-      ! Who is killed from here on leaves files that are listed, and nothing that says whose they are.
+      ! A writer killed from here on leaves files that are listed, but no marker.
       call add_names(place, names, error)
       if (allocated(error)) return
       order = [character(len=name_length) :: names(size(names)), listed, names]
@@ -115,10 +115,8 @@ contains
 
    !> Empties a workspace. Files that its manifest does not list are the user's, left by a writer that was killed.
    subroutine clear_workspace(workspace, place)
-      !> The workspace, under its lock.
-      character(len=*), intent(in) :: workspace
-      !> The directory.
-      character(len=*), intent(in) :: place
+      !> The workspace, under its lock; the directory.
+      character(len=*), intent(in) :: workspace, place
       character(len=name_length), allocatable :: found(:), listed(:)
       logical :: done
       integer :: i

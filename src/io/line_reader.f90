@@ -76,7 +76,7 @@ contains
          length = min(length + n, line_length + 1)
          reader%taken = reader%taken + n + min(stop, 1)
          if (stop > 0) exit
-         ! A comment may be longer, but nobody writes endless ones.
+         ! Only comments may be longer.
          if (length > line_length .and. line(1:1) /= '#') exit
       end do
       if (length < 0) return

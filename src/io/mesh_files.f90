@@ -123,10 +123,8 @@ contains
 
    !> Nodes of the elements, around each of them as VTK has them.
    pure function get_cells(n_polar, n_radial, order) result(cell)
-      !> Elements from pole to pole.
-      integer, intent(in) :: n_polar
-      !> Elements through the wall.
-      integer, intent(in) :: n_radial
+      !> Elements from pole to pole; elements through the wall.
+      integer, intent(in) :: n_polar, n_radial
       integer, intent(in) :: order
       !> Numbers of the nodes: [4 or 9, n_element].
       integer :: cell((order + 1)**2, n_polar*n_radial)

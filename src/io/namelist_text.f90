@@ -25,14 +25,14 @@ module thud_namelist_text
       character(len=:), allocatable :: name
       !> Line of the `&`.
       integer :: line = 0
-      !> What stands in it, in order: [n_assignment].
+      !> Its assignments, in order: [n_assignment].
       type(assignment_type), allocatable :: assignments(:)
    end type group_type
 
    !> Letters, digits and the underscore make a name.
    character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
 
-   !> What may stand between the parts.
+   !> Separators of the parts.
    character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
 
 contains
@@ -146,14 +146,10 @@ contains
 
    !> Splits the inside of a group at its equals signs.
    subroutine split_group(clean, structure, start, finish, group, error)
-      !> Text without comments.
-      character(len=*), intent(in) :: clean
-      !> The same without quoted text.
-      character(len=*), intent(in) :: structure
-      !> First place behind the group's name.
-      integer, intent(in) :: start
-      !> Last place before the group's end.
-      integer, intent(in) :: finish
+      !> Text without comments; the same without quoted text.
+      character(len=*), intent(in) :: clean, structure
+      !> First place after the group's name; last place before the group's end.
+      integer, intent(in) :: start, finish
       !> The group, to which the assignments are added.
       type(group_type), intent(inout) :: group
       !> Something is not `key = value`.
@@ -187,18 +183,14 @@ contains
       end do
    end subroutine split_group
 
-   !> The next key and its equals sign; all behind the end where there is none.
+   !> The next key and its equals sign; all past the end where there is none.
    pure subroutine find_key(structure, from, first, last, equals)
       !> Text without comments and quoted text, up to the group's end.
       character(len=*), intent(in) :: structure
       !> Place to search from.
       integer, intent(in) :: from
-      !> First character of the key.
-      integer, intent(out) :: first
-      !> Last character of the key.
-      integer, intent(out) :: last
-      !> Place of the equals sign.
-      integer, intent(out) :: equals
+      !> First character of the key; last character of the key; place of the equals sign.
+      integer, intent(out) :: first, last, equals
 
       first = len(structure) + 1
       last = first

@@ -42,7 +42,7 @@ contains
          write (row, csv_form) real(i - 1, wp)/history%sample_rate
          values = [history%deflection(i), history%velocity(i), history%part(i, :), history%elastic_force(i), &
             history%floor_force(i)]
-         ! Formatting takes most of a run's time, and most rows stand after the release.
+         ! Formatting takes most of a run's time, and most rows are after the release.
          if (i == 1 .or. any(abs(values) > 0.0_wp) .or. .not. at_rest) write (rest, csv_form) values
          at_rest = .not. any(abs(values) > 0.0_wp)
          row(25:) = ','//rest
@@ -52,7 +52,7 @@ contains
       end do
    end function get_force_csv
 
-   !> What else the model has to tell against time, 17 digits.
+   !> Channels of the model against time, 17 digits.
    function get_channels_csv(history) result(text)
       !> The history, with channels.
       type(force_history_type), intent(in) :: history
@@ -178,10 +178,8 @@ contains
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)
       character(len=*), intent(in) :: key
-      !> Its value as text.
-      character(len=*), intent(in) :: value
-      !> Unit or remark, may be empty.
-      character(len=*), intent(in) :: note
+      !> Its value as text; unit or remark, may be empty.
+      character(len=*), intent(in) :: value, note
       !> The line with its end.
       character(len=:), allocatable :: text
 

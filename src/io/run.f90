@@ -22,10 +22,10 @@ module thud_run
    !> Files of an impact.
    character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
 
-   !> File of models that have more to tell.
+   !> File of models with channels.
    character(len=*), parameter :: channel_file = 'channels.csv'
 
-   !> The full input, which tells whose results a directory holds.
+   !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
 
    !> What a run leaves for its caller.

@@ -94,7 +94,7 @@ contains
 
    !> Text as a JSON value.
    pure function text_value(text) result(value)
-      !> The text; blanks behind it are dropped.
+      !> The text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
       !> It in quotes.
       character(len=:), allocatable :: value

@@ -1,5 +1,5 @@
 !> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
-!> commas or blanks stand between the values, decimal commas beside tabs and semicolons; empty lines and what
+!> commas or blanks separate the values, decimal commas are allowed with tabs and semicolons; empty lines and what
 !> follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
@@ -15,10 +15,10 @@ module thud_set_table
 
    public :: open_set_table, read_sets, set_table_type
 
-   !> Longest path of a file.
+   !> Maximum length of a path.
    integer, parameter :: path_length = 4096
 
-   !> Most columns.
+   !> Maximum number of columns.
    integer, parameter :: max_columns = 256
 
    !> Length of a name or value.
@@ -82,7 +82,7 @@ contains
    !> The next drops.
    subroutine read_sets(table, values, n_set, error)
       type(set_table_type), intent(inout) :: table
-      !> Their values: [n_column, n_room].
+      !> Their values: [n_column, n_max].
       real(wp), intent(out) :: values(:, :)
       !> Number of drops that were read; fewer than fit at the end of the table.
       integer, intent(out) :: n_set
@@ -139,7 +139,7 @@ contains
       if (.not. there) call close_lines(table%reader)
    end subroutine next_line
 
-   !> Cells of a line: the first of tab, semicolon and comma that it holds stands between them, else blanks do.
+   !> Cells of a line: the first of tab, semicolon and comma that it holds separates them, else blanks.
    pure subroutine split_line(line, cells)
       character(len=*), intent(in) :: line
       !> The cells, without blanks and quotes around them: [n_cell].
@@ -180,7 +180,7 @@ contains
    subroutine read_value(table, column, word, value, error)
       type(set_table_type), intent(in) :: table
       integer, intent(in) :: column
-      !> The value as it stands in the table.
+      !> The value as written in the table.
       character(len=*), intent(in) :: word
       !> The value; of a choice its number, of a flag 0 or 1.
       real(wp), intent(out) :: value

@@ -24,13 +24,13 @@ module thud_sets_run
    !> Files of the results.
    character(len=*), parameter :: result_file = 'sets.csv', input_file = 'sets.nml'
 
-   !> What many sets came to.
+   !> Summary of many sets.
    type :: tally_type
       !> Sets, those that were computed, and those that conform by the force of the case.
       integer :: sets = 0, computed = 0, conforming = 0
       !> Why the first of those failed that did.
       character(len=1024) :: failure = ''
-      !> Smallest and largest contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
+      !> Minimum and maximum contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
 
@@ -90,7 +90,6 @@ contains
       type(set_table_type), intent(inout) :: table
       integer, intent(in) :: threads
       type(result_directory_type), intent(inout) :: results
-      !> What the sets came to.
       type(tally_type), intent(out) :: tally
       !> What went wrong before; or a value is none, the sampling cannot be used, the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
@@ -163,7 +162,6 @@ contains
    !> What the screen shows.
    subroutine describe(case, tally, text)
       type(case_type), intent(in) :: case
-      !> What the sets came to.
       type(tally_type), intent(in) :: tally
       !> The table.
       character(len=:), allocatable, intent(out) :: text

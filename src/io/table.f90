@@ -41,7 +41,7 @@ contains
             //scalar_row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp) &
             //scalar_row('peak elastic force', history%peak_force, 1, 'N') &
             //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
-            //scalar_row('largest deflection', history%max_deflection*1000, 3, 'mm') &
+            //scalar_row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
             //scalar_row('impulse', history%impulse, 3, 'N s') &
             //facts(history)//newline &
             //'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
@@ -71,7 +71,7 @@ contains
       character(len=*), intent(in) :: name
       !> Its value in the shown unit.
       real(wp), intent(in) :: value
-      !> Digits behind the point.
+      !> Number of decimals.
       integer, intent(in) :: decimals
       !> The shown unit.
       character(len=*), intent(in) :: unit
@@ -125,7 +125,7 @@ contains
       text = trim(adjustl(buffer))
    end function short_scientific
 
-   !> A limit with up to three decimals and no idle zeros.
+   !> A limit with up to three decimals and no trailing zeros.
    pure function short(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text
@@ -135,7 +135,7 @@ contains
       if (text(len(text):) == '.') text = text(:len(text) - 1)
    end function short
 
-   !> Text with blanks behind it.
+   !> Left-justified text.
    pure function padded(text, width) result(cell)
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.
@@ -145,7 +145,7 @@ contains
       cell = trim(text)//repeat(' ', max(width - len_trim(text), 0))
    end function padded
 
-   !> Text with blanks before it.
+   !> Right-justified text.
    pure function right(text, width) result(cell)
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.

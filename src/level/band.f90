@@ -96,7 +96,7 @@ contains
          //join_quoted(band_set_names))
    end subroutine find_bands
 
-   !> Bands of the levels of a case: the octaves, which verdicts use, and what is asked for besides.
+   !> Bands of the levels of a case: the octaves, which verdicts use, then the other bands asked for.
    pure subroutine get_level_bands(choice, bands, first)
       !> One of `band_choices`.
       character(len=*), intent(in) :: choice

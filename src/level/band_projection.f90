@@ -25,13 +25,13 @@ module thud_band_projection
    !> Energy of the sequences that are left out, all bands together, over that of white noise in them.
    real(wp), parameter :: dropped = 1.0e-22_wp
 
-   !> Error of a quadrature over a band, relative to the largest value of its integrand.
+   !> Error of a quadrature over a band, relative to the maximum of its integrand.
    real(wp), parameter :: quadrature_error = 1.0e-17_wp
 
    !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
    integer, parameter :: margin = 32
 
-   !> Window lengths per doubling: a window is at most 1/11 longer than the record needs.
+   !> Window lengths per doubling: a window is at most 1/11 longer than needed.
    integer, parameter :: windows_per_octave = 8
 
    !> Shortest window, samples.
@@ -134,7 +134,7 @@ contains
          support, work, size(work), whole_work, size(whole_work), status)
       failed = status /= 0 .or. found /= rank
       if (failed) return
-      ! The largest value belongs to the first, symmetric sequence; then they take turns.
+      ! The maximum belongs to the first, symmetric sequence; then they alternate.
       vectors = vectors(:, rank:1:-1)
       projection%even = (vectors(:n/2, 1::2) + vectors(n:n/2 + 1:-1, 1::2))/2
       projection%odd = (vectors(:n/2, 2::2) - vectors(n:n/2 + 1:-1, 2::2))/2
@@ -172,7 +172,7 @@ contains
    !> sum of such functions. The remainder with N nodes is at most a**(2N) 2**(2N + 1) (N!)**4
    !> / ((2N + 1) ((2N)!)**3).
    elemental function get_node_count(a) result(count)
-      !> Largest angle a.
+      !> Maximum angle a.
       real(wp), intent(in) :: a
       integer :: count
       real(wp) :: logarithm

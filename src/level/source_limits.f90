@@ -97,16 +97,12 @@ contains
       type(source_limits_type), intent(in) :: limits
       !> Force exposure levels of the octaves 31.5 to 500 Hz, dB: [octave_count].
       real(wp), intent(in) :: levels(:)
-      !> Contact time, s.
-      real(wp), intent(in) :: contact_time
-      !> Coefficient of restitution.
-      real(wp), intent(in) :: restitution
+      !> Contact time, s; coefficient of restitution.
+      real(wp), intent(in) :: contact_time, restitution
       !> Peaks of the force.
       integer, intent(in) :: peak_count
-      !> Mass of the source, kg.
-      real(wp), intent(in) :: mass
-      !> Height of drop, m.
-      real(wp), intent(in) :: drop_height
+      !> Mass of the source, kg; height of drop, m.
+      real(wp), intent(in) :: mass, drop_height
       !> The criteria: [criterion_count].
       type(criterion_type) :: criteria(criterion_count)
       type(band_type) :: octaves(octave_count)

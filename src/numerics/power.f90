@@ -97,7 +97,7 @@ contains
    elemental function power_error(base, exponent) result(bound)
       real(wp), intent(in) :: base
       real(wp), intent(in) :: exponent
-      !> Largest relative error.
+      !> Maximum relative error.
       real(wp) :: bound
 
       bound = (5.2_wp*abs(exponent*log(base))/ln2 + 3)*epsilon(1.0_wp)/2

@@ -14,8 +14,8 @@ module thud_transform
    !> Lengths whose plans are kept; more only while more threads than that transform.
    integer, parameter :: kept_count = 16
 
-   !> Longest transform whose plans are kept: those of longer ones hold much memory.
-   integer, parameter :: longest_kept = 2**18
+   !> Maximum length of a transform whose plans are kept: longer ones take much memory.
+   integer, parameter :: max_kept_length = 2**18
 
    !> Plans for one length. They fit all arrays that the compiler allocates: FFTW wants 16 bytes aligned.
    type :: plans_type
@@ -65,10 +65,8 @@ contains
    subroutine get_low_pass(record, sample_rate, edge, low)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      !> The frequency, Hz.
-      real(wp), intent(in) :: edge
+      !> Samples per second, Hz; the frequency, Hz.
+      real(wp), intent(in) :: sample_rate, edge
       !> Samples of the part: [n].
       real(wp), intent(out) :: low(:)
       real(wp), allocatable :: signal(:)
@@ -77,7 +75,7 @@ contains
       integer :: length
 
       if (size(record) == 0) return
-      ! Zeros on both sides, so that what swings before the record does not come back behind it.
+      ! Zeros on both sides, so that oscillations before the record do not wrap around its end.
       length = 2*size(record)
       call transform_padded(record, length, signal, spectrum, plans)
       spectrum(int(min(length*(edge/sample_rate), length/2.0_wp)) + 2:) = (0.0_wp, 0.0_wp)
@@ -102,7 +100,7 @@ contains
       power = real(spectrum)**2 + aimag(spectrum)**2
    end subroutine get_power_spectrum
 
-   !> Transform of a record with zeros behind it.
+   !> Transform of a zero-padded record.
    subroutine transform_padded(record, length, signal, spectrum, plans)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
@@ -173,7 +171,7 @@ contains
       !$omp critical (thud_fftw_planner)
       at = findloc(kept%length, plans%length, dim=1)
       kept(at)%users = kept(at)%users - 1
-      if (kept(at)%users == 0 .and. plans%length > longest_kept) call destroy(kept(at))
+      if (kept(at)%users == 0 .and. plans%length > max_kept_length) call destroy(kept(at))
       !$omp end critical (thud_fftw_planner)
    end subroutine give_back
 

@@ -134,10 +134,8 @@ contains
    !> With x = 3/2 alpha v0 the balance of energy over both phases is
    !> x - ln(1 + x) + e x + ln(1 - e x) = 0, for any exponent.
    pure function get_damping(restitution, impact_velocity) result(damping)
-      !> Coefficient of restitution e, above 0.
-      real(wp), intent(in) :: restitution
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
+      !> Coefficient of restitution e, above 0; velocity at first touch, m/s.
+      real(wp), intent(in) :: restitution, impact_velocity
       !> alpha, s/m.
       real(wp) :: damping
       real(wp) :: left, right, middle
@@ -192,14 +190,8 @@ contains
    !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation holds no k: one
    !> contact in these units gives the ratio of contact time to D/v0.
    pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
-      !> Wanted contact time, s.
-      real(wp), intent(in) :: contact_time
-      !> Exponent n of the deflection.
-      real(wp), intent(in) :: exponent
-      !> Damping alpha, s/m.
-      real(wp), intent(in) :: damping
-      !> Mass, kg.
-      real(wp), intent(in) :: mass
+      !> Wanted contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
+      real(wp), intent(in) :: contact_time, exponent, damping, mass
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       !> k, N/m^exponent; 0 where the damping is too high for a rebound.

@@ -209,7 +209,7 @@ contains
 
    !> Error of steps that are too long for the source.
    pure function coarse_error(finding) result(error)
-      !> What tells it.
+      !> What shows it.
       character(len=*), intent(in) :: finding
       type(error_type) :: error
 

@@ -175,20 +175,12 @@ contains
    pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force, power, stored)
       !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
-      !> Deflection of the centre of mass, m.
-      real(wp), intent(out) :: deflection
-      !> Its velocity, m/s.
-      real(wp), intent(out) :: velocity
-      !> Force on the floor, N.
-      real(wp), intent(out) :: force
-      !> Power of the dashpots, W.
-      real(wp), intent(out), optional :: power
-      !> Kinetic and elastic energy, J.
-      real(wp), intent(out), optional :: stored
+      !> Velocity at first touch, m/s; time since first touch, s.
+      real(wp), intent(in) :: impact_velocity, time
+      !> Deflection of the centre of mass, m; its velocity, m/s; force on the floor, N.
+      real(wp), intent(out) :: deflection, velocity, force
+      !> Power of the dashpots, W; kinetic and elastic energy, J.
+      real(wp), intent(out), optional :: power, stored
       real(wp), dimension(size(modes)) :: d, v, decay, sine
 
       associate (m => modes%mass, w => modes%omega, zeta => modes%zeta, wd => modes%omega_damped)
@@ -210,10 +202,8 @@ contains
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> A time at which the force is positive, s.
-      real(wp), intent(in) :: before
-      !> The next sample, at which it is not, s.
-      real(wp), intent(in) :: after
+      !> A time at which the force is positive, s; the next sample, at which it is not, s.
+      real(wp), intent(in) :: before, after
       !> Time of release, s.
       real(wp) :: time
       real(wp) :: left, right, deflection, velocity, force

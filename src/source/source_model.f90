@@ -1,7 +1,7 @@
-!> What every source model is: options that stand in namelist groups, and the force of one drop.
+!> The abstract source model: options from namelist groups, and the force of one drop.
 !>
 !> A model is a module `thud_<name>` with a type `<name>_type` that extends this one; the list of names in
-!> src/CMakeLists.txt makes it known. Its options stand in the group of its name unless it says otherwise.
+!> src/CMakeLists.txt makes it known. Its options belong to the group of its name unless stated otherwise.
 module thud_source_model
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type

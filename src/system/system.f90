@@ -143,7 +143,7 @@ module thud_system
 
 contains
 
-   !> What the system says of an error.
+   !> The system's sentence of an error.
    function get_system_message(status) result(text)
       integer, intent(in) :: status
       !> Its sentence.
@@ -154,7 +154,7 @@ contains
       text = buffer(:index(buffer, c_null_char) - 1)
    end function get_system_message
 
-   !> Whether somebody sees what is written.
+   !> Whether a descriptor is a terminal.
    function is_terminal(descriptor) result(yes)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -173,7 +173,7 @@ contains
       descriptor = int(c_open(path//c_null_char))
    end function open_descriptor
 
-   !> Reads what there is, at most as much as the buffer holds.
+   !> Reads the available bytes, up to the length of the buffer.
    subroutine read_bytes(descriptor, buffer, count)
       integer, intent(in) :: descriptor
       !> The bytes.
@@ -350,7 +350,7 @@ contains
    !> Free space on the disk of a directory, or of the next one above that is there.
    function get_free_bytes(path) result(bytes)
       character(len=*), intent(in) :: path
-      !> Bytes that this user may write; huge where the system does not say.
+      !> Bytes that this user may write; huge where unknown.
       real(wp) :: bytes
 
       bytes = real(c_get_free_bytes(path//c_null_char), wp)

@@ -79,10 +79,8 @@ contains
    !> The equation of motion of a ball.
    pure function new_shell(ball, compression_weight, restitution_weight) result(shell)
       type(ball_type), intent(in) :: ball
-      !> Factor s of the flux term in compression.
-      real(wp), intent(in) :: compression_weight
-      !> Factor s of the flux term in restitution.
-      real(wp), intent(in) :: restitution_weight
+      !> Factor s of the flux term in compression; factor s of the flux term in restitution.
+      real(wp), intent(in) :: compression_weight, restitution_weight
       type(shell_type) :: shell
 
       shell%radius = ball%outer_radius

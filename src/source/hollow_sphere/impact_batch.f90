@@ -12,7 +12,7 @@ module thud_impact_batch
 
    public :: add_end, advance, finish_step, get_single, get_watched, impact_batch_type, is_finite, locate
 
-   !> Impacts, in the units of `thud_shell_batch` unless said otherwise. Fastest where it begins with a
+   !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest where it begins with a
    !> line of the cache, see `thud_cache_line`.
    type :: impact_batch_type
       !> Series of the equations.
@@ -23,11 +23,11 @@ module thud_impact_batch
       type(state_batch_type) :: states(2)
       !> Ones, the length of whole steps: [batch_size].
       real(wp) :: whole_step(batch_size)
-      !> Largest deflection: [batch_size].
+      !> Maximum deflection: [batch_size].
       real(wp) :: max_deflection(batch_size)
-      !> Largest elastic force, at samples and turning point, N: [batch_size].
+      !> Maximum elastic force, at samples and turning point, N: [batch_size].
       real(wp) :: peak_force(batch_size)
-      !> Largest force on the floor, likewise, N: [batch_size].
+      !> Maximum force on the floor, likewise, N: [batch_size].
       real(wp) :: peak_floor_force(batch_size)
       !> Steps from first touch to release: [batch_size].
       real(wp) :: contact(batch_size)

@@ -51,12 +51,8 @@ contains
    !> Whether the series of a lane lasts for the next `series_steps`, in the inner part of its reach.
    elemental function will_last(place, reach, deflection, velocity) result(lasts)
       real(wp), intent(in) :: place
-      !> Its reach.
-      real(wp), intent(in) :: reach
-      !> y.
-      real(wp), intent(in) :: deflection
-      !> z.
-      real(wp), intent(in) :: velocity
+      !> Its reach; y; z.
+      real(wp), intent(in) :: reach, deflection, velocity
       !> It does.
       logical :: lasts
 
@@ -68,7 +64,7 @@ contains
       !> The equations.
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state
-      !> The lane is expanded anew: [batch_size].
+      !> The lane is expanded again: [batch_size].
       logical, intent(in) :: wanted(batch_size)
       type(series_batch_type), intent(inout) :: series
       real(wp), dimension(batch_size) :: place, inverse, power

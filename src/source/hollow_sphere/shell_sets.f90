@@ -42,17 +42,17 @@ module thud_shell_sets
       integer :: flux = 1
    end type set_type
 
-   !> What one drop came to; NaN but for the status where it could not be computed.
+   !> Outcome of one drop; NaN but for the status where it could not be computed.
    type :: set_outcome_type
       !> A code of `thud_set_status`.
       integer :: status = set_is_fine
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
-      !> Largest elastic force, N.
+      !> Maximum elastic force, N.
       real(wp) :: peak_force = not_a_number
-      !> Largest force on the floor, N.
+      !> Maximum force on the floor, N.
       real(wp) :: peak_floor_force = not_a_number
-      !> Largest deflection, m.
+      !> Maximum deflection, m.
       real(wp) :: max_deflection = not_a_number
       !> Velocity at release over velocity at first touch.
       real(wp) :: restitution = not_a_number
@@ -98,9 +98,9 @@ contains
       integer, allocatable, intent(out) :: first(:)
       !> Classes of contact times per doubling.
       integer, parameter :: classes = 64
-      !> Most classes that are told apart, for each choice of the flux term.
-      integer, parameter :: most = 64*classes
-      integer :: next(0:size(compression_weights)*most)
+      !> Maximum number of classes, for each choice of the flux term.
+      integer, parameter :: max_class = 64*classes
+      integer :: next(0:size(compression_weights)*max_class)
       integer :: class(size(sets))
       integer :: i, j
       type(set_type), target :: any_set
@@ -114,14 +114,14 @@ contains
          status(i) = get_input_status(sets(i), fields%key, ranges)
          if (status(i) /= set_is_fine) cycle
          class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
-         class(i) = min(max(class(i), 0), most - 1) + (sets(i)%flux - 1)*most
+         class(i) = min(max(class(i), 0), max_class - 1) + (sets(i)%flux - 1)*max_class
          next(class(i) + 1) = next(class(i) + 1) + 1
       end do
       do i = 1, ubound(next, 1)
          next(i) = next(i) + next(i - 1)
       end do
       allocate (order(next(ubound(next, 1))))
-      first = [((j, j=next((i - 1)*most) + 1, next(i*most), block_size), i=1, size(compression_weights)), size(order) + 1]
+      first = [((j, j=next((i - 1)*max_class) + 1, next(i*max_class), block_size), i=1, size(compression_weights)), size(order) + 1]
       do i = 1, size(sets)
          if (status(i) /= set_is_fine) cycle
          next(class(i)) = next(class(i)) + 1
@@ -186,11 +186,11 @@ contains
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
       type(impact_batch_type), pointer :: impacts
-      real(wp), target :: room(storage_size(impacts)/storage_size(1.0_wp) + line_length)
+      real(wp), target :: buffer(storage_size(impacts)/storage_size(1.0_wp) + line_length)
       real(wp) :: step
       integer :: i
 
-      call c_f_pointer(c_loc(room(get_aligned_start(room))), impacts)
+      call c_f_pointer(c_loc(buffer(get_aligned_start(buffer))), impacts)
 
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       impacts%shell%weight = compression_weights(sets(1)%flux)

@@ -27,14 +27,14 @@ module thud_modal_ball
 
    public :: modal_ball_type
 
-   !> Angle that a mode may turn through in a step; faster ones answer statically.
+   !> Maximum phase angle of a mode in a step; faster ones answer statically.
    real(wp), parameter :: max_phase = pi/2
 
    !> Part of the energy at first touch that the steps may lose in contact.
    real(wp), parameter :: max_energy_residual = 0.02_wp
 
-   !> Families whose energy is told apart in the output, from n = 0 on.
-   integer, parameter :: n_told = 6
+   !> Families whose energies are separate channels, from n = 0 on.
+   integer, parameter :: n_family = 6
 
    !> The model.
    type, extends(modal_ball_options_type) :: modal_ball_type
@@ -89,9 +89,9 @@ contains
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%impact_velocity = get_impact_velocity(drop)
-      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_told - 1), &
+      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), &
          'energy_rest_J']
-      allocate (history%channel(n_sample, n_told + 2), source=0.0_wp)
+      allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       call prepare(ball, options, interval, step, contact, error)
       if (allocated(error)) return
@@ -107,7 +107,7 @@ contains
       real(wp), intent(in) :: interval
       type(mode_step_type), intent(out) :: step
       type(ring_contact_type), intent(out) :: contact
-      !> The modes cannot be computed, or the rings cannot be told apart.
+      !> The modes cannot be computed, or the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: response(options%rings, options%rings)
       real(wp), allocatable :: zeta(:)
@@ -125,7 +125,7 @@ contains
       end do
       call new_ring_contact(response, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
-         //' cannot be told apart; allowed: fewer rings, more static_harmonics, or more substeps')
+         //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
    !> Modes of all harmonics, and the static response of the rings to what these leave out.
@@ -252,10 +252,8 @@ contains
    !> One step of the modes, and the impulses of the floor at its beginning.
    subroutine take_step(step, interval, mass, height, state, contact, impulse, error)
       type(mode_step_type), intent(in) :: step
-      !> Length of the step, s.
-      real(wp), intent(in) :: interval
-      !> Mass of the ball, kg.
-      real(wp), intent(in) :: mass
+      !> Length of the step, s; mass of the ball, kg.
+      real(wp), intent(in) :: interval, mass
       !> Heights of the rings of the undeformed ball below its centre, m: [n_ring].
       real(wp), intent(in) :: height(:)
       !> Motion of the ball.
@@ -342,7 +340,7 @@ contains
       history%velocity(i) = -state%speed
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(state%q)
-         place = 2 + min(step%harmonic(k), n_told)
+         place = 2 + min(step%harmonic(k), n_family)
          history%channel(i, place) = history%channel(i, place) + (state%v(k)**2 + (step%omega(k)*state%q(k))**2)/2
       end do
    end subroutine record_motion

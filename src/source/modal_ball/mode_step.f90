@@ -31,7 +31,7 @@ contains
       real(wp), intent(in) :: interval
       real(wp), dimension(size(step%omega)) :: zeta, decay, root, c, s
 
-      ! Critical damping has no closed form of either kind; a millionth beside it nobody can tell.
+      ! Critical damping has no closed form of either kind; a millionth off makes no difference.
       zeta = merge(1 + 1.0e-6_wp, damping_ratio, abs(damping_ratio - 1) < 1.0e-6_wp)
       decay = zeta*step%omega
       root = step%omega*sqrt(abs(1 - zeta**2))
