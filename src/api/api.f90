@@ -1,13 +1,14 @@
 !> The flat API for Python: plain arguments, explicit shapes, a status. f2py wraps these procedures and nothing
 !> else; they pass on and decide nothing.
 !>
-!> Results are self-describing bundles: a procedure leaves one and gives its handle and its sizes; `collect` hands it over and frees it. `status` is 0, or the code of the error whose sentence is the text
-!> `message` of the bundle. Procedures marked `threadsafe` let other Python threads run meanwhile.
+!> Results are self-describing bundles: a procedure leaves one and returns its handle and its sizes; `collect` hands
+!> it over and frees it. `status` is 0, or the code of the error whose sentence is the text `message` of the bundle.
+!> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_bundle, only: bundle_type, leave, take
-   use thud_case, only: case_type
+   use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, get_loss_factors, results_type
+   use thud_compute, only: compute_case, results_type
    use thud_constants, only: compiler, version
    use thud_error, only: error_type
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
@@ -118,7 +119,8 @@ contains
       type(bundle_type), intent(inout) :: bundle
       type(force_history_type), intent(in) :: history
       real(wp) :: scalars(size(scalar_fields))
-      integer :: i, n(1)
+      integer :: n(1)
+      integer :: i
 
       n = size(history%deflection)
       scalars = get_scalars(history)
@@ -206,7 +208,11 @@ contains
 
       allocate (bundle)
       call read_case(text, 'python', case, error)
-      if (.not. allocated(error)) call get_loss_factors(case, frequency, loss_factor, error)
+      if (.not. allocated(error)) then
+         associate (model => case%models(get_model_number(case))%model)
+            call model%get_loss_factors(case%ball, frequency, loss_factor, error)
+         end associate
+      end if
       if (.not. allocated(error)) call bundle%add_array('loss_factors', [n], loss_factor)
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine loss_factors

@@ -75,7 +75,8 @@ contains
             return
          end if
          if (outcome%remark /= '') call write_line(standard_error, 'thud: '//outcome%remark, exit_code)
-         if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: '//outcome%directory, exit_code)
+         if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: ' &
+            //outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming
       end if
    end subroutine execute

@@ -119,10 +119,7 @@ contains
       integer :: n
       integer :: i
 
-      n = 0
-      do i = 1, self%n_item
-         n = n + size(self%items(i)%values)
-      end do
+      n = sum([(size(self%items(i)%values), i=1, self%n_item)])
    end function count_values
 
    !> All numbers in the order of the header.

@@ -8,7 +8,7 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, join_quoted, lower_case, newline, quoted, split, to_text
+   public :: fixed, join_quoted, lower_case, newline, quoted, replaced, split, to_text
 
    !> Line feed, the line end of every file that thud writes.
    character(len=*), parameter :: newline = new_line('a')
@@ -155,6 +155,21 @@ contains
          if (text(i:i) >= 'A' .and. text(i:i) <= 'Z') lower(i:i) = achar(iachar(text(i:i)) + 32)
       end do
    end function lower_case
+
+   !> A text with all characters of a set replaced by another one.
+   pure function replaced(text, set, new) result(changed)
+      !> The text; characters to be replaced.
+      character(len=*), intent(in) :: text, set
+      !> The character in their place.
+      character(len=1), intent(in) :: new
+      character(len=len(text)) :: changed
+      integer :: i
+
+      changed = text
+      do i = 1, len(text)
+         if (scan(text(i:i), set) > 0) changed(i:i) = new
+      end do
+   end function replaced
 
    !> Text as a namelist character constant: quotes inside are doubled.
    pure function quoted(text) result(constant)

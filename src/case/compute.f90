@@ -12,7 +12,7 @@ module thud_compute
    implicit none (type, external)
    private
 
-   public :: compute_case, get_judged_force, get_loss_factors, is_conforming, judge_case, results_type
+   public :: compute_case, get_judged_force, is_conforming, judge_case, results_type
    public :: verdict_type
 
    !> Levels and criteria of an impact.
@@ -53,21 +53,6 @@ contains
          call model%solve(case%ball, case%drop, case%sampling, results%history, error)
       end associate
    end subroutine compute_case
-
-   !> Loss factor of the material of a case against frequency.
-   subroutine get_loss_factors(case, frequency, loss_factor, error)
-      type(case_type), intent(in) :: case
-      !> Frequencies, Hz: [n].
-      real(wp), intent(in) :: frequency(:)
-      !> Loss factors: [n].
-      real(wp), intent(out) :: loss_factor(:)
-      !> The model has no material, or it cannot be made.
-      type(error_type), allocatable, intent(out) :: error
-
-      associate (model => case%models(get_model_number(case))%model)
-         call model%get_loss_factors(case%ball, frequency, loss_factor, error)
-      end associate
-   end subroutine get_loss_factors
 
    !> Levels and criteria of the force history of a case.
    subroutine judge_case(case, history, verdict, error)

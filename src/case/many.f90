@@ -14,9 +14,8 @@ module thud_many
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: get_sample_count
-   use thud_set_status, only: set_is_fine
    use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
-   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type
+   use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_text, only: join_quoted, quoted
    implicit none (type, external)
    private
@@ -24,7 +23,8 @@ module thud_many
    public :: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
 
    !> Groups in whose keys drops may not differ: names, and what a run writes.
-   character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: 'case', 'model', 'modes', 'output']
+   character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: &
+      'case', 'model', 'modes', 'output']
 
    !> About the time that one drop takes in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-5_wp
@@ -90,6 +90,7 @@ contains
       type(field_type), allocatable :: fields(:)
       type(list_type), pointer :: list
       logical, allocatable :: possible(:)
+      character(len=128) :: message
       integer :: i, j, bracket, status
 
       allocate (fields, source=get_active_fields(case))
@@ -100,8 +101,8 @@ contains
          bracket = index(names(i)//'(', '(')
          columns(i)%place = findloc(possible .and. fields%key == names(i)(:bracket - 1), .true., dim=1)
          status = 0
-         if (bracket < len_trim(names(i))) read (names(i)(bracket + 1:len_trim(names(i)) - 1), *, iostat=status) &
-            columns(i)%entry
+         if (bracket < len_trim(names(i))) read (names(i)(bracket + 1:len_trim(names(i)) - 1), *, iostat=status, &
+            iomsg=message) columns(i)%entry
          if (columns(i)%place > 0) then
             list => fields(columns(i)%place)%list_value
             if (associated(list)) then
@@ -127,11 +128,12 @@ contains
       !> What is kept from an earlier call serves again where it fits.
       type(many_type), intent(inout) :: many
       type(projections_type) :: wanted
+      type(column_type) :: no_columns(0)
 
       call get_level_bands(case%bands, many%bands, many%first_band)
       many%judged = judged
       many%cost = case%models(get_model_number(case))%model%get_cost()
-      if (suits_batch(case, [column_type ::])) many%cost = batch_cost
+      if (suits_batch(case, no_columns)) many%cost = batch_cost
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
    end subroutine new_many
@@ -274,25 +276,26 @@ contains
       if (.not. many%judged) return
       many%level(:, :, drop) = results%verdict%level
       many%conforms(:, drop) = all(conforms(results%verdict%criteria), dim=1)
-      call judge(case, results%verdict%criteria(:octave_count, get_judged_force(case)), drop, many)
+      call judge(case, drop, many)
    end subroutine solve_one
 
    !> Verdict by the judged force.
-   subroutine judge(case, octaves, drop, many)
+   subroutine judge(case, drop, many)
       !> The case of the drop.
       type(case_type), intent(in) :: case
-      !> Criteria of the octaves: [octave_count].
-      type(criterion_type), intent(in) :: octaves(:)
       !> Number of the drop, whose levels are known.
       integer, intent(in) :: drop
       !> Gets margin and verdict.
       type(many_type), intent(inout) :: many
+      type(source_limits_type) :: limits
+      type(error_type), allocatable :: error
       integer :: force
 
       force = get_judged_force(case)
+      call get_source_limits(case%source, limits, error)
       many%verdict(drop) = many%conforms(force, drop)
       associate (level => many%level(:octave_count, force, drop))
-         many%margin(drop) = minval(min(level - octaves%lower, octaves%upper - level))
+         many%margin(drop) = minval(min(level - limits%lower_level, limits%upper_level - level))
       end associate
    end subroutine judge
 
@@ -330,26 +333,20 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(set_type), allocatable :: sets(:)
       type(set_outcome_type), allocatable :: outcomes(:)
-      type(source_limits_type) :: limits
-      type(criterion_type) :: criteria(criterion_count)
-      real(wp) :: nothing(octave_count)
       integer :: i
 
       allocate (sets(size(values, 2)), outcomes(size(values, 2)))
       call fill_sets(case, columns, values, sets)
       call solve_ensemble(sets, case%sampling, trim(case%source), threads, many%judged, many%projections, outcomes, &
          many%level, many%conforms, many%force, error)
-      if (.not. allocated(error)) call get_source_limits(case%source, limits, error)
       if (allocated(error)) return
-      nothing = 0.0_wp
-      criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
       do i = 1, size(sets)
          associate (found => outcomes(i))
-            many%status(i) = merge(0, 1, found%status == set_is_fine)
+            many%status(i) = merge(0, 1, found%computed)
             many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_floor_force, found%max_deflection, &
                found%restitution, found%impulse]
          end associate
-         if (many%judged .and. many%status(i) == 0) call judge(case, criteria(:octave_count), i, many)
+         if (many%judged .and. many%status(i) == 0) call judge(case, i, many)
       end do
    end subroutine solve_batch
 

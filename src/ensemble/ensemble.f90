@@ -4,18 +4,17 @@
 !> Every number of a set comes from its own lane of matrices and vectors of fixed shape: it does not
 !> depend on the number of threads, on the other sets or on the place among them.
 module thud_ensemble
-   use thud_cache_line, only: get_aligned_start, line_length
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
       new_band_projection
+   use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: reference_force, reference_time
-   use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_error, only: error_type, input_error, numerical_error
    use thud_force_history, only: force_count
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
-   use thud_set_status, only: set_is_fine
+   use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    use thud_text, only: to_text
@@ -114,7 +113,7 @@ contains
       call check_sampling(sampling, error)
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
       if (allocated(error)) return
-      call get_blocks(sets, outcomes%status, order, first)
+      call get_blocks(sets, outcomes%computed, order, first)
       !$omp parallel num_threads(threads)
       call run_blocks()
       !$omp end parallel
@@ -153,7 +152,7 @@ contains
             outcomes(members(i)) = found(i)
             levels(:, :, members(i)) = found_levels(:, :, i)
             met(:, members(i)) = found_met(:, i)
-            if (size(forces) > 0 .and. found(i)%status == set_is_fine) call copy_forces(workspace, i, forces(:, :, members(i)))
+            if (size(forces) > 0 .and. found(i)%computed) call copy_forces(workspace, i, forces(:, :, members(i)))
          end do
       end subroutine run_block
 
@@ -169,7 +168,6 @@ contains
       !> Samples of the longest window.
       integer, intent(in) :: n_row
       character(len=128) :: message
-      real(wp) :: nothing(octave_count)
       integer :: status
 
       allocate (workspace%force(force_count*block_size*n_row + line_length), stat=status, errmsg=message)
@@ -177,8 +175,7 @@ contains
       if (status /= 0) workspace%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
          //' sets no space in memory; allowed: shorter records, or fewer threads')
-      nothing = 0.0_wp
-      workspace%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
+      workspace%criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_workspace
 
    !> Outcomes, levels and verdicts of one block.
@@ -211,7 +208,7 @@ contains
       if (.not. judged) return
       class = 0
       do i = 1, size(sets)
-         if (outcomes(i)%status /= set_is_fine) cycle
+         if (.not. outcomes(i)%computed) cycle
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
       force(:, last_sample + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
@@ -220,15 +217,16 @@ contains
          if (.not. any(class == window)) cycle
          call require_window(projections, window, workspace%error)
          if (allocated(workspace%error)) return
-         call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, square_sum)
+         call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, &
+            square_sum)
          do i = 1, size(sets)
             if (class(i) /= window) cycle
             do j = 1, force_count
                row = i + (j - 1)*block_size
                levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
                   /(reference_force**2*reference_time))
-               met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), row, &
-                  sampling)
+               met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), &
+                  row, sampling)
             end do
          end do
       end do

@@ -114,7 +114,8 @@ contains
       end if
       do iteration = 1, 20
          if (n_step > max_steps) exit
-         call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, run%direction, growth)
+         call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, &
+            run%direction, growth)
          ! The next step reports why there are no forces.
          if (growth >= huge(growth)) exit
          ratio = growth/(safety*max_growth)

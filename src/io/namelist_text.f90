@@ -3,7 +3,7 @@
 !> which key holds a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
-   use thud_text, only: lower_case, newline, to_text
+   use thud_text, only: lower_case, newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -206,15 +206,12 @@ contains
       !> Text between an equals sign and the next key.
       character(len=*), intent(in) :: text
       character(len=:), allocatable, intent(out) :: value
-      integer :: first, last, i
+      integer :: first, last
 
       first = verify(text, blanks)
       last = verify(text, blanks//',', back=.true.)
       value = ''
-      if (first > 0 .and. last >= first) value = text(first:last)
-      do i = 1, len(value)
-         if (scan(value(i:i), blanks) > 0) value(i:i) = ' '
-      end do
+      if (first > 0 .and. last >= first) value = replaced(text(first:last), blanks, ' ')
    end subroutine get_value
 
    !> Number of the line that a place is in.

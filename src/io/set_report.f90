@@ -5,7 +5,7 @@ module thud_set_report
    use thud_kinds, only: wp
    use thud_many, only: many_type
    use thud_set_table, only: set_table_type
-   use thud_text, only: newline, to_text
+   use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -27,7 +27,7 @@ contains
       end do
       do i = 1, outcome_count
          text = text//','//trim(scalar_fields(i)%name)
-         if (scalar_fields(i)%unit /= '') text = text//'_'//underscored(trim(scalar_fields(i)%unit))
+         if (scalar_fields(i)%unit /= '') text = text//'_'//replaced(trim(scalar_fields(i)%unit), ' ', '_')
       end do
       do j = 1, force_count
          do i = many%first_band, size(many%bands)
@@ -90,19 +90,6 @@ contains
       end do
       text = text(:end_of_text)
    end subroutine get_set_rows
-
-   !> A unit as part of a name.
-   pure function underscored(unit) result(name)
-      character(len=*), intent(in) :: unit
-      !> It without blanks.
-      character(len=len(unit)) :: name
-      integer :: i
-
-      name = unit
-      do i = 1, len(unit)
-         if (unit(i:i) == ' ') name(i:i) = '_'
-      end do
-   end function underscored
 
    !> A sentence as a cell.
    pure function in_quotes(sentence) result(cell)

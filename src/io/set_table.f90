@@ -8,15 +8,12 @@ module thud_set_table
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_many, only: column_type, find_columns
-   use thud_system, only: directory_exists
-   use thud_text, only: join_quoted, lower_case, quoted, to_text
+   use thud_system, only: directory_exists, path_length
+   use thud_text, only: join_quoted, lower_case, quoted, replaced, to_text
    implicit none (type, external)
    private
 
    public :: open_set_table, read_sets, set_table_type
-
-   !> Maximum length of a path.
-   integer, parameter :: path_length = 4096
 
    !> Maximum number of columns.
    integer, parameter :: max_columns = 256
@@ -147,7 +144,7 @@ contains
       character(len=1), parameter :: tab = achar(9)
       character(len=len(line)) :: rest
       character(len=1) :: separator
-      integer :: i, n, at, length, last, place
+      integer :: i, n, at, length, last
 
       separator = ' '
       if (index(line, ',') > 0) separator = ','
@@ -171,8 +168,7 @@ contains
       do i = 1, n
          length = len_trim(cells(i))
          if (length > 1 .and. scan(cells(i)(1:1), '''"') == 1) cells(i) = cells(i)(2:length - 1)
-         place = index(cells(i), ',')
-         if (place > 0) cells(i)(place:place) = '.'
+         cells(i) = replaced(cells(i), ',', '.')
       end do
    end subroutine split_line
 
@@ -200,8 +196,15 @@ contains
             status = merge(0, 1, value > 0.0_wp)
          case ('flag')
             wanted = 'allowed; allowed: true, false'
-            status = merge(0, 1, any(lower_case(word) == [character(len=7) :: 'true', 'false', '.true.', '.false.', '1', '0']))
-            if (any(lower_case(word) == [character(len=7) :: 'true', '.true.', '1'])) value = 1.0_wp
+            select case (lower_case(word))
+            case ('true', '.true.', '1')
+               value = 1.0_wp
+               status = 0
+            case ('false', '.false.', '0')
+               status = 0
+            case default
+               continue
+            end select
          case default
             wanted = 'a number; allowed: a number in SI units'
             if (is_number(word)) read (word, *, iostat=status, iomsg=message) value

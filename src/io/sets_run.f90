@@ -57,7 +57,8 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case with a source model')
+      if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case ' &
+         //'with a source model')
       if (allocated(error)) return
       call open_set_table(table_path, case, table, error)
       if (allocated(error)) return

@@ -8,7 +8,7 @@ module thud_table
    use thud_kinds, only: wp
    use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
-   use thud_text, only: fixed, newline, to_text
+   use thud_text, only: fixed, newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -98,22 +98,10 @@ contains
 
       rows = ''
       do i = 1, size(history%fact_name)
-         rows = rows//'  '//padded(spaced(history%fact_name(i)), 20)//right(short_scientific(history%fact(i)), 10)//' ' &
-            //trim(history%fact_unit(i))//newline
+         rows = rows//'  '//padded(replaced(history%fact_name(i), '_', ' '), 20) &
+            //right(short_scientific(history%fact(i)), 10)//' '//trim(history%fact_unit(i))//newline
       end do
    end function facts
-
-   !> A name with blanks for its underscores.
-   pure function spaced(name) result(text)
-      character(len=*), intent(in) :: name
-      character(len=len(name)) :: text
-      integer :: i
-
-      text = name
-      do i = 1, len(name)
-         if (name(i:i) == '_') text(i:i) = ' '
-      end do
-   end function spaced
 
    !> A number with four digits.
    function short_scientific(value) result(text)

@@ -5,7 +5,7 @@ module thud_source_limits
    use thud_constants, only: recorded_band
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_text, only: join_quoted, quoted
+   use thud_text, only: join_quoted, quoted, replaced
    use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
@@ -79,7 +79,6 @@ contains
       type(source_limits_type), intent(out) :: limits
       !> The source is not known.
       type(error_type), allocatable, intent(out) :: error
-
       integer :: at
 
       at = findloc(source_names == source, .true., dim=1)
@@ -126,11 +125,8 @@ contains
    pure function get_level_name(band) result(name)
       type(band_type), intent(in) :: band
       character(len=24) :: name
-      integer :: at
 
-      name = trim(band%set)//'_'//get_band_name(band)
-      at = index(name, '.')
-      if (at > 0) name(at:at) = '_'
+      name = replaced(trim(band%set)//'_'//get_band_name(band), '.', '_')
    end function get_level_name
 
    !> Criterion of a value within a range.

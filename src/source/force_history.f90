@@ -88,7 +88,7 @@ module thud_force_history
    integer, parameter :: outcome_count = 6
 
    !> The numbers that describe an impact, in the order of `get_scalars`.
-   type(scalar_field_type), parameter :: scalar_fields(12) = [ &
+   type(scalar_field_type), parameter :: scalar_fields(*) = [ &
       scalar_field_type('contact_time', 's', 'contact time'), &
       scalar_field_type('peak_force', 'N', 'maximum elastic force'), &
       scalar_field_type('peak_floor_force', 'N', 'maximum force on the floor'), &

@@ -17,7 +17,7 @@ module thud_hollow_sphere
    private
 
    public :: compression_weights, flux_choices, get_gas_energy, get_gas_force
-   public :: get_shell_stiffness, hollow_sphere_type, is_wild, new_shell, restitution_weights, shell_type
+   public :: get_shell_stiffness, hollow_sphere_type, new_shell, restitution_weights, shell_type
    public :: solve_hollow_sphere
 
    !> Options of the model.
