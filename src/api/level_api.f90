@@ -43,7 +43,6 @@ contains
    !> Number of bands of a set.
    subroutine count_bands(set, n_band, status, message)
       !f2py threadsafe
-      !> Name of the set.
       character(len=*), intent(in) :: set
       integer, intent(out) :: n_band
       !> Code of the error, or 0, and its sentence.
@@ -60,7 +59,6 @@ contains
    !> Bands of a set.
    subroutine get_bands(set, n_band, nominal, centre, lower, upper)
       !f2py threadsafe
-      !> Name of the set.
       character(len=*), intent(in) :: set
       !> Number of bands, from `count_bands`.
       integer, intent(in) :: n_band

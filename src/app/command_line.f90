@@ -99,7 +99,6 @@ contains
 
    !> Makes a request of the arguments.
    subroutine parse_arguments(request, error)
-      !> What is asked for.
       type(request_type), intent(out) :: request
       !> An argument is unknown, missing or given twice.
       type(error_type), allocatable, intent(out) :: error
@@ -189,7 +188,6 @@ contains
    function get_argument(i) result(argument)
       !> Number of the argument.
       integer, intent(in) :: i
-      !> Its text.
       character(len=:), allocatable :: argument
       integer :: length
 

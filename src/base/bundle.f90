@@ -43,8 +43,7 @@ contains
    !> Adds a text.
    subroutine add_text(self, name, text)
       class(bundle_type), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      character(len=*), intent(in) :: text
+      character(len=*), intent(in) :: name, text
 
       call add_line(self, name, 't'//to_text(len(text)))
       if (.not. allocated(self%text)) self%text = ''
@@ -67,7 +66,6 @@ contains
       character(len=*), intent(in) :: name
       !> Its extents: [rank].
       integer, intent(in) :: extents(:)
-      !> Its elements.
       real(wp), intent(in) :: values(*)
       character(len=:), allocatable :: form
       integer :: i
@@ -95,7 +93,6 @@ contains
       type(bundle_type), intent(inout) :: self
       !> Number of elements.
       integer, intent(in) :: n
-      !> The elements.
       real(wp), intent(in) :: values(n)
       type(item_type), allocatable :: more(:)
       integer :: i
@@ -145,7 +142,6 @@ contains
       type(error_type), allocatable, intent(in) :: error
       !> Code of the error, or 0.
       integer, intent(out) :: status
-      !> Handle of the bundle.
       integer(int64), intent(out) :: handle
       !> Size of its header and its texts.
       integer, intent(out) :: n_byte

@@ -188,7 +188,6 @@ contains
       character(len=*), intent(in) :: text
       !> `3*0.1` is allowed.
       logical, intent(in) :: repeats
-      !> The text is plain.
       logical :: plain
       integer :: i
 
@@ -336,7 +335,6 @@ contains
    !> Whether the field is a list without entries, which a namelist cannot hold.
    pure function is_empty(self) result(empty)
       class(field_type), intent(in) :: self
-      !> It is one.
       logical :: empty
 
       empty = .false.

@@ -13,18 +13,12 @@ module thud_interval
 
    !> An interval of real numbers.
    type :: interval_type
-      !> Lower end.
-      real(wp) :: lower = -huge(1.0_wp)
-      !> Upper end.
-      real(wp) :: upper = huge(1.0_wp)
-      !> The lower end does not belong to it.
-      logical :: lower_open = .false.
-      !> The upper end does not belong to it.
-      logical :: upper_open = .false.
-      !> The lower end in terms of other keys; blank where it is a number.
-      character(len=expression_length) :: lower_expression = ''
-      !> The upper end in terms of other keys; blank where it is a number.
-      character(len=expression_length) :: upper_expression = ''
+      !> Its ends.
+      real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
+      !> The end does not belong to it.
+      logical :: lower_open = .false., upper_open = .false.
+      !> The ends in terms of other keys; blank where they are numbers.
+      character(len=expression_length) :: lower_expression = '', upper_expression = ''
    contains
       procedure :: contains => contains_value
       procedure :: resolve
@@ -50,7 +44,6 @@ contains
 
    !> One end of an interval.
    pure subroutine read_end(text, number, expression)
-      !> The end as written.
       character(len=*), intent(in) :: text
       !> Its value where it is a number.
       real(wp), intent(inout) :: number
@@ -69,7 +62,6 @@ contains
    pure function is_number(text) result(yes)
       !> The text, without blanks before it.
       character(len=*), intent(in) :: text
-      !> It does.
       logical :: yes
 
       yes = scan(text(1:1), '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
@@ -136,7 +128,6 @@ contains
    subroutine get_range_text(interval, name, text)
       type(interval_type), intent(in) :: interval
       character(len=*), intent(in) :: name
-      !> The range.
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: lower, upper
 

@@ -12,12 +12,10 @@ contains
 
    !> Describes a real key.
    function real_field(key, variable, unit, meaning, range) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
       real(wp), intent(in), target :: variable
       !> SI unit, empty for a pure number; what the value is; allowed range.
       character(len=*), intent(in) :: unit, meaning, range
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, unit=unit, meaning=meaning, range=range)
@@ -26,12 +24,10 @@ contains
 
    !> Describes an integer key.
    function integer_field(key, variable, meaning, range) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
       integer, intent(in), target :: variable
       !> What the value is; allowed range.
       character(len=*), intent(in) :: meaning, range
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, meaning=meaning, range=range)
@@ -40,12 +36,9 @@ contains
 
    !> Describes a key that is true or false.
    function logical_field(key, variable, meaning) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
       logical, intent(in), target :: variable
-      !> What the value is.
       character(len=*), intent(in) :: meaning
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, meaning=meaning)
@@ -54,14 +47,12 @@ contains
 
    !> Describes a key with a list of numbers, each of which lies in one range.
    function list_field(key, variable, unit, meaning, range, whole) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
       type(list_type), intent(in), target :: variable
       !> SI unit, empty for pure numbers; what the values are; allowed range of each.
       character(len=*), intent(in) :: unit, meaning, range
       !> They are whole numbers (default: not).
       logical, intent(in), optional :: whole
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, unit=unit, meaning=meaning, range=range)
@@ -71,12 +62,9 @@ contains
 
    !> Describes a key with free text.
    function text_field(key, variable, meaning) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
       character(len=name_length), intent(in), target :: variable
-      !> What the value is.
       character(len=*), intent(in) :: meaning
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, meaning=meaning)
@@ -85,14 +73,11 @@ contains
 
    !> Describes a key that takes one of several words.
    function choice_field(key, variable, meaning, choices) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
       character(len=name_length), intent(in), target :: variable
-      !> What the value is.
       character(len=*), intent(in) :: meaning
       !> The allowed words: [n_choice].
       character(len=*), intent(in) :: choices(:)
-      !> The description.
       type(field_type) :: field
 
       field = text_field(key, variable, meaning)
@@ -102,7 +87,6 @@ contains
 
    !> Puts keys into a namelist group, unless they have one already.
    function in_group(group, fields) result(placed)
-      !> Name of the group.
       character(len=*), intent(in) :: group
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)

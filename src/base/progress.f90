@@ -16,7 +16,6 @@ module thud_progress
          real(wp), intent(in) :: done
          !> Upper bound of the whole; 0 where unknown.
          real(wp), intent(in) :: whole
-         !> What is counted.
          character(len=*), intent(in) :: unit
       end subroutine handler
    end interface
@@ -41,7 +40,6 @@ contains
       real(wp), intent(in) :: done
       !> Upper bound of the whole; 0 where unknown.
       real(wp), intent(in) :: whole
-      !> What is counted.
       character(len=*), intent(in) :: unit
 
       procedure(handler), pointer :: current

@@ -28,7 +28,6 @@ contains
    !> Integer without blanks.
    pure function integer_to_text(value) result(text)
       integer, intent(in) :: value
-      !> Its digits.
       character(len=len_trim(format_integer(value))) :: text
 
       text = format_integer(value)
@@ -36,7 +35,6 @@ contains
 
    !> Logical as a namelist holds it.
    pure function logical_to_text(value) result(text)
-      !> The truth value.
       logical, intent(in) :: value
       !> `.true.` or `.false.`.
       character(len=merge(6, 7, value)) :: text
@@ -56,7 +54,6 @@ contains
    !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
    pure function fixed(value, decimals) result(text)
       real(wp), intent(in) :: value
-      !> Number of decimals.
       integer, intent(in) :: decimals
       !> The rounded number, with a leading zero.
       character(len=len_trim(format_fixed(value, decimals))) :: text
@@ -67,7 +64,6 @@ contains
    !> Integer, padded with blanks.
    pure function format_integer(value) result(buffer)
       integer, intent(in) :: value
-      !> Its digits.
       character(len=number_length) :: buffer
 
       write (buffer, '(i0)') value
@@ -76,9 +72,7 @@ contains
    !> Number with a fixed count of decimals, padded with blanks.
    pure function format_fixed(value, decimals) result(buffer)
       real(wp), intent(in) :: value
-      !> Number of decimals.
       integer, intent(in) :: decimals
-      !> The rounded number.
       character(len=number_length) :: buffer
       character(len=12) :: form
 
@@ -145,7 +139,6 @@ contains
 
    !> ASCII letters in lower case; everything else unchanged.
    pure function lower_case(text) result(lower)
-      !> Any text.
       character(len=*), intent(in) :: text
       character(len=len(text)) :: lower
       integer :: i
@@ -193,7 +186,6 @@ contains
 
    !> Length of a text as a namelist character constant.
    pure function quoted_length(text) result(length)
-      !> Any text.
       character(len=*), intent(in) :: text
       !> Characters with quotes around and quotes inside doubled.
       integer :: length

@@ -27,15 +27,12 @@ module thud_case
       logical :: has_modes = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
-      !> The ball.
       type(ball_type) :: ball
-      !> The drop.
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
       character(len=name_length) :: model = model_names(1)
       !> Every model with its options; those of the chosen one count: [n_model].
       type(model_slot_type), allocatable :: models(:)
-      !> Sampling of the record.
       type(sampling_type) :: sampling
       !> Method of the levels.
       character(len=name_length) :: level_method = 'exact'
@@ -138,9 +135,7 @@ contains
 
    !> Refuses a name that cannot name a directory.
    subroutine check_name(name, error)
-      !> Name of the case.
       character(len=*), intent(in) :: name
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       logical :: usable
       integer :: i

@@ -171,7 +171,6 @@ contains
       integer, intent(in) :: threads
       !> Forces are wanted too.
       logical, intent(in) :: forces
-      !> The results.
       type(many_type), intent(inout) :: many
       !> Forces are wanted of records of different length, or there is no space in memory.
       type(error_type), allocatable, intent(out) :: error
@@ -245,7 +244,6 @@ contains
       !> Values of this one: [n_column].
       real(wp), intent(in) :: values(:)
       integer, intent(in) :: drop
-      !> Gets its results.
       type(many_type), intent(inout) :: many
       type(results_type) :: results
       type(error_type), allocatable :: error
@@ -327,7 +325,6 @@ contains
       !> Their values: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
       integer, intent(in) :: threads
-      !> Gets the results.
       type(many_type), intent(inout) :: many
       !> There is no space in memory.
       type(error_type), allocatable, intent(out) :: error

@@ -72,7 +72,6 @@ contains
       type(projections_type), intent(in) :: one
       !> The other, which may be empty.
       type(projections_type), intent(in) :: other
-      !> They do.
       logical :: alike
 
       alike = .false.
@@ -138,7 +137,6 @@ contains
 
       !> One block, from its sets to its verdicts.
       subroutine run_block(workspace, members)
-         !> Arrays of the thread.
          type(workspace_type), intent(inout) :: workspace
          !> Numbers of the sets: [n_member].
          integer, intent(in) :: members(:)
@@ -180,7 +178,6 @@ contains
 
    !> Outcomes, levels and verdicts of one block.
    subroutine solve_workspace(workspace, sets, sampling, judged, projections, outcomes, levels, met)
-      !> Arrays of the thread.
       type(workspace_type), intent(inout), target :: workspace
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
@@ -234,7 +231,6 @@ contains
 
    !> The forces of the block in a workspace: [force_count block_size, n_row].
    function get_force(workspace) result(force)
-      !> Arrays of the thread.
       type(workspace_type), intent(in), target :: workspace
       !> Elastic forces, then floor forces, N.
       real(wp), pointer, contiguous :: force(:, :)
@@ -275,7 +271,6 @@ contains
       !> Row of the force of this set.
       integer, intent(in) :: row
       type(sampling_type), intent(in) :: sampling
-      !> They are met.
       logical :: met
       real(wp) :: record(get_sample_count(sampling))
 
@@ -291,7 +286,6 @@ contains
 
    !> Copies the forces of one set.
    subroutine copy_forces(workspace, i, forces)
-      !> Arrays of the thread.
       type(workspace_type), intent(in), target :: workspace
       !> Number of the set in the block.
       integer, intent(in) :: i

@@ -23,9 +23,7 @@ module thud_elastic_body
       type(mesh_type) :: mesh
       !> Its rings of elements: [n_radial].
       type(element_row_type), allocatable :: row(:)
-      !> Material.
       type(material_type) :: material
-      !> Gas.
       type(cavity_type) :: cavity
       !> Masses of the nodes, kg.
       real(wp), allocatable :: mass(:, :)

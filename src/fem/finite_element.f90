@@ -128,7 +128,6 @@ contains
       type(contacts_type), intent(inout) :: contacts
       !> Bounces, flight, step.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Gets its samples, its snapshots, and contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
@@ -182,13 +181,11 @@ contains
 
    !> Chooses the number of steps in the next sampling intervals. Refuses a run that takes too long.
    subroutine look_at_step(run, time, options, sampling, n_sample, n_step, error)
-      !> The ball.
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
       real(wp), intent(in) :: time
       !> Safety of the step.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Samples of the record.
       integer, intent(in) :: n_sample
@@ -229,7 +226,6 @@ contains
 
    !> Whether a node may reach the floor in the next step.
    pure function will_touch(run, step) result(touches)
-      !> The ball.
       type(impact_run_type), intent(in) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: step
@@ -251,7 +247,6 @@ contains
 
    !> Follows the contacts: when they begin and end, and what they leave of the velocity.
    subroutine follow_contact(run, contacts, time, step, history)
-      !> The ball.
       type(impact_run_type), intent(in) :: run
       type(contacts_type), intent(inout) :: contacts
       !> Time since the record began, s; length of the step, s.

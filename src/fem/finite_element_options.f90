@@ -37,11 +37,8 @@ module thud_finite_element_options
       real(wp) :: step_safety = 0.85_wp
       !> Time between snapshots of the deformed ball, s; 0 for none.
       real(wp) :: snapshot_interval = 1.0e-3_wp
-      !> Mesh.
       type(mesh_options_type) :: mesh
-      !> Material.
       type(material_options_type) :: material
-      !> Contact.
       type(contact_options_type) :: contact
    contains
       procedure, pass(options) :: get_fields
@@ -77,9 +74,7 @@ contains
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: bytes
 
@@ -105,7 +100,6 @@ contains
    !> Size of the snapshots.
    function get_snapshot_shape(options, sampling) result(extents)
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer :: extents(3)
@@ -116,7 +110,6 @@ contains
    !> Maximum number of snapshots of a run.
    pure function get_frame_count(options, sampling) result(n_frame)
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       integer :: n_frame
 
@@ -128,7 +121,6 @@ contains
    pure function get_stride(options, sampling) result(stride)
       !> The options, with snapshots.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> The number, at least 1.
       integer :: stride

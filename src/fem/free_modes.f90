@@ -33,7 +33,6 @@ module thud_free_modes
    type :: modes_options_type
       !> Number of elastic modes; 0 where none are asked for.
       integer :: count = 6
-      !> Numbers of elements.
       type(mesh_options_type) :: mesh
    end type modes_options_type
 
@@ -84,7 +83,6 @@ contains
    !> The lowest elastic modes of a ball.
    subroutine get_free_modes(ball, mesh_options, count, modes, error)
       type(ball_type), intent(in) :: ball
-      !> Numbers of elements.
       type(mesh_options_type), intent(in) :: mesh_options
       integer, intent(in) :: count
       type(free_modes_type), intent(out) :: modes
@@ -112,7 +110,6 @@ contains
 
    !> Lowest eigenpairs, by the shift-invert Lanczos method.
    subroutine find_eigenpairs(matrices, count, eigenvalue, vector, error)
-      !> Matrices of the ball.
       type(mode_matrices_type), intent(in) :: matrices
       !> Number of pairs.
       integer, intent(in) :: count
@@ -174,7 +171,6 @@ contains
    !> Shape, harmonic and participation of one mode.
    subroutine describe(ball, matrices, vector, mesh, shape, harmonic, participation)
       type(ball_type), intent(in) :: ball
-      !> Matrices of the ball.
       type(mode_matrices_type), intent(in) :: matrices
       !> Displacements at unit modal mass: [n].
       real(wp), intent(in) :: vector(:)

@@ -97,7 +97,6 @@ contains
    subroutine finish_record(ball, run, sampling, speed, history, error)
       type(ball_type), intent(in) :: ball
       type(impact_run_type), intent(in) :: run
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Velocity downwards at the start, m/s.
       real(wp), intent(in) :: speed

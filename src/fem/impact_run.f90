@@ -24,9 +24,7 @@ module thud_impact_run
 
    !> What is known between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: impact_run_type
-      !> The ball.
       type(elastic_body_type) :: body
-      !> Its contact.
       type(floor_contact_type) :: contact
       !> Gravity, m/s2.
       real(wp) :: gravity = 0.0_wp

@@ -50,10 +50,8 @@ module thud_material
       real(wp) :: bulk_modulus = 0.0_wp
       !> Viscosity of Kelvin and Voigt, Pa s.
       real(wp) :: viscosity = 0.0_wp
-      !> Shear moduli of the Maxwell branches, Pa: [n_branch].
-      real(wp), allocatable :: branch_modulus(:)
-      !> Their relaxation times, s: [n_branch].
-      real(wp), allocatable :: branch_time(:)
+      !> Shear moduli, Pa, and relaxation times, s, of the Maxwell branches: [n_branch].
+      real(wp), allocatable :: branch_modulus(:), branch_time(:)
    end type material_type
 
 contains
@@ -89,7 +87,6 @@ contains
       !> The options, each inside its own range.
       type(material_options_type), intent(in) :: options
       type(ball_type), intent(in) :: ball
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       integer :: n_share, n_time
 

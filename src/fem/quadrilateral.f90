@@ -29,7 +29,7 @@ contains
    pure subroutine get_shape(order, x, y, value, gradient)
       !> Order of the element, 1 or 2.
       integer, intent(in) :: order
-      !> First coordinate, -1 to 1; second coordinate, -1 to 1.
+      !> Coordinates, -1 to 1.
       real(wp), intent(in) :: x, y
       !> Values: [(order + 1)**2].
       real(wp), intent(out) :: value(:)

@@ -80,7 +80,6 @@ contains
       type(field_type), intent(in) :: fields(:)
       !> Groups that have to be there: [n].
       character(len=*), intent(in) :: required_groups(:)
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       integer :: i, j
 

@@ -46,8 +46,7 @@ contains
 
    !> Exchanges workspace and directory; nothing has changed where that is impossible.
    subroutine exchange(workspace, place, found, replaced, names, done)
-      character(len=*), intent(in) :: workspace
-      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: workspace, place
       !> Names in it: [n_found].
       character(len=*), intent(in) :: found(:)
       !> Names of files that are not carried over: [n_replaced].
@@ -82,8 +81,7 @@ contains
 
    !> Moves the files of the workspace into the directory, so that those of two inputs are never mixed.
    subroutine move_files(workspace, place, names, listed, same, error)
-      character(len=*), intent(in) :: workspace
-      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: workspace, place
       !> Names of the files, the last of which says whose they are: [n_file].
       character(len=*), intent(in) :: names(:)
       !> Names of the files before: [n_listed].

@@ -19,7 +19,6 @@ module thud_line_reader
    !> An open text.
    type :: line_reader_type
       private
-      !> Its descriptor.
       integer :: descriptor = -1
       !> What was read last.
       character(len=buffer_length) :: buffer = ''
@@ -33,7 +32,6 @@ contains
 
    !> Opens a text.
    subroutine open_lines(path, reader, done)
-      !> Path of the file.
       character(len=*), intent(in) :: path
       type(line_reader_type), intent(out) :: reader
       !> It can be read.
@@ -53,7 +51,6 @@ contains
 
    !> The next line, without its end.
    subroutine read_line(reader, line, length)
-      !> The text.
       type(line_reader_type), intent(inout) :: reader
       !> The line, as far as it fits.
       character(len=line_length), intent(out) :: line

@@ -148,7 +148,7 @@ contains
    subroutine split_group(clean, structure, start, finish, group, error)
       !> Text without comments; the same without quoted text.
       character(len=*), intent(in) :: clean, structure
-      !> First place after the group's name; last place before the group's end.
+      !> First place after the name of the group; last place before its end.
       integer, intent(in) :: start, finish
       !> The group, to which the assignments are added.
       type(group_type), intent(inout) :: group
@@ -216,7 +216,6 @@ contains
 
    !> Number of the line that a place is in.
    pure function line_of(text, place) result(line)
-      !> The whole text.
       character(len=*), intent(in) :: text
       !> Place of a character.
       integer, intent(in) :: place

@@ -44,7 +44,6 @@ contains
       real(wp), intent(in) :: done
       !> Upper bound of the whole; 0 where unknown.
       real(wp), intent(in) :: whole
-      !> What is counted.
       character(len=*), intent(in) :: unit
       integer(int64) :: now
       integer :: status

@@ -82,7 +82,6 @@ contains
    !> Levels, limits and verdict per band.
    function get_levels_csv(case, verdict) result(text)
       type(case_type), intent(in) :: case
-      !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
       !> Text of `levels.csv`.
       character(len=:), allocatable :: text
@@ -118,7 +117,6 @@ contains
    function get_summary(case, history, verdict) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
       !> Text of `summary.nml`.
       character(len=:), allocatable :: text
@@ -165,7 +163,6 @@ contains
    !> Where a value lies: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)
       type(criterion_type), intent(in) :: criterion
-      !> The verdict.
       character(len=:), allocatable :: word
 
       if (conforms(criterion)) then
@@ -192,7 +189,6 @@ contains
    pure function joined(values) result(text)
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
-      !> The list.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -206,7 +202,6 @@ contains
    pure function joined_logicals(values) result(text)
       !> The truth values: [n].
       logical, intent(in) :: values(:)
-      !> The list.
       character(len=:), allocatable :: text
       integer :: i
 

@@ -97,7 +97,6 @@ contains
    !> Refuses snapshots that would fill the disk.
    subroutine check_space(case, directory, error)
       type(case_type), intent(in) :: case
-      !> Directory for the results.
       character(len=*), intent(in) :: directory
       !> Names the bytes that are wanted and those that are free.
       type(error_type), allocatable, intent(out) :: error

@@ -85,7 +85,6 @@ contains
       real(wp), intent(in) :: number
       !> The expression, blank where the end is a number.
       character(len=*), intent(in) :: expression
-      !> A JSON value.
       character(len=:), allocatable :: value
 
       value = to_text(number)
@@ -96,7 +95,6 @@ contains
    pure function text_value(text) result(value)
       !> The text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
-      !> It in quotes.
       character(len=:), allocatable :: value
       integer :: i
 

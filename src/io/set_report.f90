@@ -47,9 +47,8 @@ contains
       integer, intent(in) :: before
       !> The drops: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
-      !> The first of them to be written; the last of them to be written.
+      !> The first and the last of them to be written.
       integer, intent(in) :: first, last
-      !> Their results.
       type(many_type), intent(in) :: many
       character(len=:), allocatable, intent(out) :: text
       !> Width of a number with its comma, and of all that is none.

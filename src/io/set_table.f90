@@ -23,7 +23,6 @@ module thud_set_table
 
    !> An open table.
    type :: set_table_type
-      !> Path of the file.
       character(len=path_length) :: path = ''
       !> Its lines.
       type(line_reader_type) :: reader
@@ -39,7 +38,6 @@ contains
 
    !> Opens a table and reads its first line.
    subroutine open_set_table(path, case, table, error)
-      !> Path of the file.
       character(len=*), intent(in) :: path
       !> The case, which has the keys.
       type(case_type), intent(in), target :: case

@@ -139,7 +139,6 @@ contains
    !> Adds sets to a tally.
    pure subroutine add(tally, many, force)
       type(tally_type), intent(inout) :: tally
-      !> The results.
       type(many_type), intent(in) :: many
       !> Number of the force that the verdict is on.
       integer, intent(in) :: force
@@ -164,7 +163,6 @@ contains
    subroutine describe(case, tally, text)
       type(case_type), intent(in) :: case
       type(tally_type), intent(in) :: tally
-      !> The table.
       character(len=:), allocatable, intent(out) :: text
       type(band_type) :: octaves(octave_count)
       integer :: i

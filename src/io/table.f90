@@ -20,7 +20,6 @@ contains
    function get_table(case, history, verdict) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
-      !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
       character(len=:), allocatable :: text
       integer :: i
@@ -52,7 +51,6 @@ contains
    !> The free modes on the screen.
    function get_modes_table(modes) result(text)
       type(free_modes_type), intent(in) :: modes
-      !> The table.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -67,11 +65,9 @@ contains
 
    !> One scalar of the table, with its limits where there are any.
    function scalar_row(name, value, decimals, unit, criterion, scale) result(row)
-      !> Name of the quantity.
       character(len=*), intent(in) :: name
       !> Its value in the shown unit.
       real(wp), intent(in) :: value
-      !> Number of decimals.
       integer, intent(in) :: decimals
       !> The shown unit.
       character(len=*), intent(in) :: unit
@@ -92,7 +88,6 @@ contains
    !> Numbers that the model chose or found, as rows.
    function facts(history) result(rows)
       type(force_history_type), intent(in) :: history
-      !> One row each.
       character(len=:), allocatable :: rows
       integer :: i
 

@@ -29,7 +29,6 @@ contains
       character(len=*), intent(in) :: scalar_name(:)
       !> The scalars: [n_point, n_scalar].
       real(wp), intent(in) :: scalar(:, :)
-      !> Content of the file.
       character(len=:), allocatable, intent(out) :: text
       integer :: i, n_cell
 
@@ -55,13 +54,11 @@ contains
 
    !> Adds an array.
    subroutine add_array(name, type, n_component, bytes, text)
-      character(len=*), intent(in) :: name
-      character(len=*), intent(in) :: type
+      character(len=*), intent(in) :: name, type
       !> Numbers of each point or cell.
       integer, intent(in) :: n_component
       !> The numbers: [n_byte].
       integer(c_int8_t), intent(in) :: bytes(:)
-      !> Content of the file.
       character(len=:), allocatable, intent(inout) :: text
 
       ! The length of the data stands before them.
@@ -122,7 +119,6 @@ contains
       character(len=*), intent(in) :: name(:)
       !> Their times, s: [n].
       real(wp), intent(in) :: time(:)
-      !> Content of the file.
       character(len=:), allocatable, intent(out) :: text
       integer :: i
 

@@ -11,14 +11,11 @@ module thud_band
 
    !> Adjacent bands of one width.
    type :: band_set_type
-      !> Name of the set.
       character(len=24) :: name
       !> Width in tenths of a decade: 3 for octaves, 1 for third octaves.
       integer :: width
-      !> Mid frequency of the lowest band: its distance from 1 kHz in tenths of a decade.
-      integer :: first
-      !> Mid frequency of the highest band, likewise.
-      integer :: last
+      !> Mid frequencies of the lowest and highest band: distances from 1 kHz in tenths of a decade.
+      integer :: first, last
    end type band_set_type
 
    !> All sets; verdicts use the first, the octaves from 31.5 to 500 Hz.
@@ -43,10 +40,8 @@ module thud_band
       real(wp) :: nominal = 0.0_wp
       !> Exact mid frequency, Hz.
       real(wp) :: centre = 0.0_wp
-      !> Lower band edge, Hz.
-      real(wp) :: lower = 0.0_wp
-      !> Upper band edge, Hz.
-      real(wp) :: upper = 0.0_wp
+      !> Band edges, Hz.
+      real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type band_type
 
    !> Rounded mid frequencies in a decade, the series R10 of ISO 3.

@@ -79,7 +79,6 @@ contains
       real(wp), intent(in) :: sample_rate
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: min_rate
 
@@ -136,10 +135,8 @@ contains
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Lower edges, Hz: [n_band].
-      real(wp), intent(in) :: lower(:)
-      !> Upper edges, Hz: [n_band].
-      real(wp), intent(in) :: upper(:)
+      !> Edges, Hz: [n_band].
+      real(wp), intent(in) :: lower(:), upper(:)
       !> Distance of the bins, Hz; 0 for the integral.
       real(wp), intent(in) :: spacing
       !> Energy of each band, N^2 s: [n_band].
@@ -172,7 +169,7 @@ contains
    pure function get_wave_sum(x, m, h) result(total)
       !> Samples: [n].
       real(wp), intent(in), contiguous :: x(:)
-      !> Angle per sample of the cosine; angle per sample of the sine.
+      !> Angles per sample of cosine and sine.
       real(wp), intent(in) :: m, h
       real(wp) :: total
       integer, parameter :: block = 32
@@ -202,7 +199,6 @@ contains
       real(wp), intent(in) :: per_sample
       !> Number of samples, up to `max_samples`.
       integer, intent(in) :: count
-      !> The angle.
       real(wp) :: angle
       real(wp), parameter :: scale = 2.0_wp**24
       real(wp) :: turns, high

@@ -25,10 +25,8 @@ module thud_source_limits
    type :: source_limits_type
       !> Name of the source.
       character(len=24) :: name
-      !> Minimum force exposure levels of the octaves 31.5 to 500 Hz, dB.
-      real(wp) :: lower_level(octave_count)
-      !> Maximum force exposure levels of the octaves 31.5 to 500 Hz, dB.
-      real(wp) :: upper_level(octave_count)
+      !> Minimum and maximum force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      real(wp) :: lower_level(octave_count), upper_level(octave_count)
       !> Contact time, s.
       real(wp) :: contact_time(2) = [18.0e-3_wp, 22.0e-3_wp]
       !> Coefficient of restitution.
@@ -58,16 +56,13 @@ module thud_source_limits
 
    !> One quantity, the range that it must lie in, and whether it does.
    type :: criterion_type
-      !> Name of the quantity.
       character(len=24) :: name = ''
       !> SI unit or dB; empty for pure numbers.
       character(len=8) :: unit = ''
       !> Value of the source under test.
       real(wp) :: value = 0.0_wp
-      !> Minimum conforming value.
-      real(wp) :: lower = 0.0_wp
-      !> Maximum conforming value.
-      real(wp) :: upper = 0.0_wp
+      !> Minimum and maximum conforming value.
+      real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type criterion_type
 
 contains
@@ -92,13 +87,11 @@ contains
    !> All criteria for a source, in a fixed order.
    pure function get_criteria(limits, levels, contact_time, restitution, peak_count, mass, drop_height) &
       result(criteria)
-      !> Limits of the standards.
       type(source_limits_type), intent(in) :: limits
       !> Force exposure levels of the octaves 31.5 to 500 Hz, dB: [octave_count].
       real(wp), intent(in) :: levels(:)
       !> Contact time, s; coefficient of restitution.
       real(wp), intent(in) :: contact_time, restitution
-      !> Peaks of the force.
       integer, intent(in) :: peak_count
       !> Mass of the source, kg; height of drop, m.
       real(wp), intent(in) :: mass, drop_height
@@ -131,9 +124,7 @@ contains
 
    !> Criterion of a value within a range.
    pure function between(name, unit, value, range) result(criterion)
-      !> Name of the quantity.
-      character(len=*), intent(in) :: name
-      character(len=*), intent(in) :: unit
+      character(len=*), intent(in) :: name, unit
       !> Value of the source under test.
       real(wp), intent(in) :: value
       !> Minimum and maximum conforming value: [2].

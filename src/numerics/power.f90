@@ -95,8 +95,7 @@ contains
 
    !> Bound of the relative error of `raise`, see above.
    elemental function power_error(base, exponent) result(bound)
-      real(wp), intent(in) :: base
-      real(wp), intent(in) :: exponent
+      real(wp), intent(in) :: base, exponent
       !> Maximum relative error.
       real(wp) :: bound
 

@@ -35,7 +35,6 @@ contains
    !> One step; also for part of a step, which makes it its own dense output: the result as a
    !> function of `step` follows the solution with a local error of order step**5.
    pure subroutine rk4_step(ode, time, state, step, new_state, valid)
-      !> The system.
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
       real(wp), intent(in) :: time
@@ -67,7 +66,6 @@ contains
    !> step. Root of the dense output by the Illinois form of regula falsi, safeguarded by
    !> bisection.
    pure function locate_zero(ode, time, state, step, component) result(length)
-      !> The system.
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
       real(wp), intent(in) :: time
@@ -126,7 +124,6 @@ contains
 
    !> Longest step that stays in the domain of the equations, to rounding, by bisection.
    pure function longest_valid(ode, time, state, step) result(length)
-      !> The system.
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
       real(wp), intent(in) :: time

@@ -25,16 +25,12 @@ module thud_transform
       integer :: users = 0
       !> Number of the last use, ascending.
       integer(c_int64_t) :: last_use = 0
-      !> From a record to its transform.
-      type(c_ptr) :: forward = c_null_ptr
-      !> From a transform to the record, times the length.
-      type(c_ptr) :: back = c_null_ptr
+      !> From a record to its transform, and back to the record times the length.
+      type(c_ptr) :: forward = c_null_ptr, back = c_null_ptr
    end type plans_type
 
-   !> The plans that are kept; only to be touched in the critical section `thud_fftw_planner`.
+   !> The plans that are kept, and the number of the latest use; only for the critical section `thud_fftw_planner`.
    type(plans_type), allocatable :: kept(:)
-
-   !> Number of the latest use.
    integer(c_int64_t) :: use_count = 0
 
 contains

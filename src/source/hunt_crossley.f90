@@ -77,7 +77,6 @@ contains
       !> The options, each inside its own range.
       class(hunt_crossley_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
 
       if (options%stiffness > 0.0_wp .eqv. options%contact_time > 0.0_wp) then
@@ -227,7 +226,6 @@ contains
       !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
-      !> Stiffness and damping.
       class(hunt_crossley_type), intent(in) :: options
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling

@@ -25,7 +25,6 @@ module thud_measured_modes
    type, extends(source_model_type) :: measured_modes_type
       !> Natural frequencies, Hz.
       type(list_type) :: frequency
-      !> Damping ratios.
       type(list_type) :: damping_ratio
       !> Effective masses, kg.
       type(list_type) :: effective_mass
@@ -75,7 +74,6 @@ contains
       !> The options, each inside its own range.
       class(measured_modes_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: total
 

@@ -47,7 +47,6 @@ module thud_source_model
          class(source_model_type), intent(in) :: options
          !> Sampling rate, length of the record, substeps.
          type(sampling_type), intent(in) :: sampling
-         !> Force and motion.
          type(force_history_type), intent(out) :: history
          !> The drop leads out of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error

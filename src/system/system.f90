@@ -146,7 +146,6 @@ contains
    !> The system's sentence of an error.
    function get_system_message(status) result(text)
       integer, intent(in) :: status
-      !> Its sentence.
       character(len=:), allocatable :: text
       character(len=128) :: buffer
 

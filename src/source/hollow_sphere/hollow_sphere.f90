@@ -33,10 +33,8 @@ module thud_hollow_sphere
    character(len=24), parameter :: flux_choices(4) = [character(len=24) :: &
       'momentum_balance', 'retarding', 'conservative', 'none']
 
-   !> Factor s of the flux term in compression, for each choice.
+   !> Factors s of the flux term in compression and in restitution, for each choice.
    real(wp), parameter :: compression_weights(4) = [0.0_wp, -1.0_wp, 0.5_wp, 0.0_wp]
-
-   !> Factor s of the flux term in restitution, for each choice.
    real(wp), parameter :: restitution_weights(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
    !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
@@ -53,10 +51,8 @@ module thud_hollow_sphere
       real(wp) :: ambient_pressure = 0.0_wp
       !> Ratio of specific heats of the gas.
       real(wp) :: heat_capacity_ratio = 0.0_wp
-      !> Factor s of the flux term before the turning point.
-      real(wp) :: compression_weight = 0.0_wp
-      !> Factor s of the flux term after it.
-      real(wp) :: restitution_weight = 0.0_wp
+      !> Factors s of the flux term before and after the turning point.
+      real(wp) :: compression_weight = 0.0_wp, restitution_weight = 0.0_wp
    contains
       procedure :: get_derivative
       procedure :: get_parts
@@ -79,7 +75,7 @@ contains
    !> The equation of motion of a ball.
    pure function new_shell(ball, compression_weight, restitution_weight) result(shell)
       type(ball_type), intent(in) :: ball
-      !> Factor s of the flux term in compression; factor s of the flux term in restitution.
+      !> Factors s of the flux term in compression and in restitution.
       real(wp), intent(in) :: compression_weight, restitution_weight
       type(shell_type) :: shell
 

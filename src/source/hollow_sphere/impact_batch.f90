@@ -31,7 +31,6 @@ module thud_impact_batch
       real(wp) :: peak_floor_force(batch_size)
       !> Steps from first touch to release: [batch_size].
       real(wp) :: contact(batch_size)
-      !> The equations.
       type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight

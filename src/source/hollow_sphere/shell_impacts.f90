@@ -188,7 +188,6 @@ contains
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> They do.
       logical :: all_do
       real(wp) :: lost
       integer :: i

@@ -53,7 +53,6 @@ contains
       real(wp), intent(in) :: place
       !> Its reach; y; z.
       real(wp), intent(in) :: reach, deflection, velocity
-      !> It does.
       logical :: lasts
 
       lasts = max(abs(deflection - place), abs(deflection + series_steps*velocity - place)) <= inner*reach
@@ -61,7 +60,6 @@ contains
 
    !> Expands lanes about the middle of the way that lies before them; the present deflection is in reach.
    pure subroutine place_series(shell, state, wanted, series)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
       type(state_batch_type), intent(in) :: state
       !> The lane is expanded again: [batch_size].
@@ -160,7 +158,6 @@ contains
 
    !> Force on the floor and power lost, and their rates of change.
    pure subroutine get_flows(shell, series, state, force, force_rate, power, power_rate)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
       !> The series, in whose reach the states are.
       type(series_batch_type), intent(in) :: series
@@ -194,7 +191,6 @@ contains
 
    !> One classical step, or part of one, as `rk4_step`; the forces at its beginning, and their sums.
    pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force, missed)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
       type(series_batch_type), intent(in) :: series
       type(state_batch_type), intent(in) :: state

@@ -31,9 +31,7 @@ module thud_shell_sets
 
    !> One drop.
    type :: set_type
-      !> The ball.
       type(ball_type) :: ball
-      !> The drop.
       type(drop_type) :: drop
       !> Number of the choice of the flux term, as in `flux_choices`.
       integer :: flux = 1
@@ -134,7 +132,6 @@ contains
       character(len=*), intent(in) :: keys(:)
       !> Their ranges, whose ends may depend on the set: [n_key].
       type(interval_type), intent(in) :: ranges(:)
-      !> They do.
       logical :: inside
       type(interval_type) :: range
       real(wp) :: values(size(keys))
@@ -239,7 +236,6 @@ contains
       integer, intent(in) :: i
       type(set_type), intent(in) :: set
       type(sampling_type), intent(in) :: sampling
-      !> It has.
       logical :: computed
       type(force_history_type) :: history
       type(error_type), allocatable :: error

@@ -194,7 +194,6 @@ contains
    !> Marches from first touch until the ball has left for good.
    subroutine march(ball, sampling, interval, step, contact, history, error)
       type(ball_type), intent(in) :: ball
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Length of a step, s.
       real(wp), intent(in) :: interval

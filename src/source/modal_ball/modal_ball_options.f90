@@ -70,7 +70,6 @@ contains
       !> The options, each inside its own range.
       class(modal_ball_options_type), intent(in) :: options
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
 
       if (2*options%rings < options%harmonics) error = input_error('&modal_ball: harmonics = ' &
