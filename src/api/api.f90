@@ -59,7 +59,7 @@ contains
 
    !> The full input of a namelist file.
    subroutine effective_case(path, status, handle, n_byte, n_value)
-      ! Not threadsafe: functions of its texts keep their lengths in static memory.
+      ! Not threadsafe: functions with deferred-length texts keep the length in static memory.
       character(len=*), intent(in) :: path
       !> Status, handle and sizes as in `leave`.
       integer, intent(out) :: status, n_byte, n_value
@@ -219,7 +219,7 @@ contains
 
    !> Runs a namelist file as the executable does, and keeps what it has computed.
    subroutine run(path, output, progress, status, handle, n_byte, n_value)
-      ! Not threadsafe: functions of its texts keep their lengths in static memory.
+      ! Not threadsafe: functions with deferred-length texts keep the length in static memory.
       !> Path of the file; output directory, empty for the default.
       character(len=*), intent(in) :: path, output
       !> 1 to show progress on a terminal.

@@ -206,7 +206,7 @@ contains
       integer, intent(out) :: status
       logical :: given(size(entries))
 
-      ! Asked so that a NaN counts as given; the check of the range refuses it later.
+      ! Written so that a NaN counts as given; the check of the range refuses it later.
       given = .not. entries <= unset
       status = merge(0, 1, all(given(:count(given))) .and. count(given) <= list_length)
       if (status /= 0) return

@@ -44,7 +44,7 @@ contains
 
       procedure(handler), pointer :: current
 
-      ! Of many drops that are computed at once none reports.
+      ! Drops that are computed in parallel do not report.
       !$ if (omp_in_parallel()) return
       ! Another thread may change it meanwhile.
       current => show

@@ -68,7 +68,7 @@ contains
       call judge_force(case, history, history%elastic_force, verdict%bands, verdict%level(:, 1), verdict%criteria(:, 1), &
          error)
       if (allocated(error)) return
-      ! Of most models both are the same.
+      ! Most models have the same force twice.
       if (any(abs(history%floor_force - history%elastic_force) > 0.0_wp)) then
          call judge_force(case, history, history%floor_force, verdict%bands, verdict%level(:, 2), verdict%criteria(:, 2), &
             error)

@@ -26,7 +26,7 @@ module thud_many
    character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: &
       'case', 'model', 'modes', 'output']
 
-   !> About the time that one drop takes in a batch, s.
+   !> Approximate time of one drop in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-5_wp
 
    !> A key in whose values drops differ.
@@ -49,7 +49,7 @@ module thud_many
       type(band_type), allocatable :: bands(:)
       !> Number of the first band that the case asks for.
       integer :: first_band = 1
-      !> About the time that one drop takes on one core, s.
+      !> Approximate time of one drop on one core, s.
       real(wp) :: cost = 0.0_wp
       !> Levels and verdicts are wanted.
       logical :: judged = .true.
@@ -149,7 +149,7 @@ contains
       if (.not. allocated(many)) allocate (many)
    end subroutine take_many
 
-   !> Leaves what the next call can use.
+   !> Keeps what the next call can use.
    subroutine leave_many(many)
       !> The results, which are given up.
       type(many_type), allocatable, intent(inout) :: many
@@ -189,7 +189,7 @@ contains
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, many, error)
          if (allocated(error)) return
-         ! The single solver has the sentences.
+         ! The single solver gives the reasons.
          left = pack(left, many%status /= 0)
       end if
       !$omp parallel num_threads(threads) if (size(left) > 1)
@@ -366,7 +366,7 @@ contains
       set%drop = case%drop
       allocate (fields, source=get_active_fields(case))
       allocate (set_fields, source=get_set_fields(set))
-      ! What is not a number of ball or drop is the choice of the flux term.
+      ! The only other key is the choice of the flux term.
       place = [(findloc(set_fields%key == fields(columns(j)%place)%key, .true., dim=1), j=1, size(columns))]
       select type (model => case%models(get_model_number(case))%model)
       type is (hollow_sphere_type)

@@ -25,13 +25,13 @@ module thud_finite_element
 
    public :: finite_element_type
 
-   !> Part of it at which a running computation is stopped as unstable.
+   !> Residual of the energy at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
    !> Maximum number of steps of elements in a run; they take about half an hour.
    real(wp), parameter :: max_work = 2.0e10_wp
 
-   !> Time between two looks at the step, s: the ball deforms little meanwhile.
+   !> Time between two checks of the step, s: the ball deforms little in it.
    real(wp), parameter :: look_interval = 0.25e-3_wp
 
    !> The contacts of a run.
@@ -56,13 +56,13 @@ module thud_finite_element
 
 contains
 
-   !> About the time that one drop takes on one core, s.
+   !> Approximate time of one drop on one core, s.
    function get_cost(options) result(cost)
       class(finite_element_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
 
-      ! Elements, and steps that are as short as the elements are small.
+      ! The number of elements, and of steps, which grows as they shrink.
       cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
    end function get_cost
 
@@ -149,7 +149,7 @@ contains
          if (allocated(error)) return
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
-            ! The next contact is not asked for.
+            ! No further contact is wanted.
             if (contacts%n_over >= options%bounces .and. will_touch(run, interval/n_step)) exit samples
             call kick(run, interval/n_step)
             if (i + k == 1) first_energy = get_energy(run)
@@ -236,7 +236,7 @@ contains
       end associate
    end function will_touch
 
-   !> Beginning of a sentence on what happened when.
+   !> Beginning of a sentence with the time of an event.
    function place(time) result(text)
       !> Time since the record began, s.
       real(wp), intent(in) :: time

@@ -208,7 +208,7 @@ contains
       !> Cosine of the angle at these points: [n].
       real(wp), intent(in) :: cosine(:)
       integer :: harmonic
-      ! Higher orders look like lower ones on so few points.
+      ! Higher orders would alias on so few points.
       real(wp), dimension(0:min(max_harmonic, (size(normal) - 1)/2)) :: value, first, second, coefficient
       integer :: i
 

@@ -15,10 +15,10 @@ module thud_impact_record
 
    public :: continue_flight, finish_record, new_impact_record, record_sample
 
-   !> Part of the energy at first touch by which the balance may miss.
+   !> Maximum error of the balance of energy, over the energy at first touch.
    real(wp), parameter :: max_energy_residual = 0.005_wp
 
-   !> Part of the change of momentum by which the impulse of the record may miss.
+   !> Maximum error of the impulse of the record, over the change of momentum.
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
    !> Part of the wall that the surface may sink into the floor.
@@ -79,7 +79,7 @@ contains
       mass = sum(run%mass(:, :, 2))
       do i = last + 1, size(history%deflection)
          associate (first => -history%deflection(last), upwards => -history%velocity(last))
-            ! Where the flight meets the height of first touch, it ends.
+            ! The flight ends at the height of first touch.
             time = (upwards + sqrt(upwards**2 + 2*run%gravity*max(first, 0.0_wp)))/run%gravity
             time = min(time, (i - last)/history%sample_rate)
             speed = upwards - run%gravity*time
@@ -109,7 +109,7 @@ contains
 
       history%part(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
-      ! Nodes that meet the floor one by one make spikes as high as the steps are short.
+      ! Nodes that touch one by one make spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
       history%peak_floor_force = history%peak_force

@@ -16,8 +16,8 @@ module thud_impact_run
    public :: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, max_steps
    public :: new_impact_run
 
-   !> Steps of the power iteration at the start, and in each later look at the step.
-   integer, parameter :: first_turns = 80, next_turns = 3
+   !> Steps of the power iteration at the start, and at each later check of the step.
+   integer, parameter :: first_iterations = 80, next_iterations = 3
 
    !> Maximum number of steps in a sampling interval.
    integer, parameter :: max_steps = 100000
@@ -99,9 +99,9 @@ contains
       real(wp) :: growth, ratio, wave, width
       integer :: n_iteration, iteration
 
-      n_iteration = next_turns
+      n_iteration = next_iterations
       if (n_step == 0) then
-         n_iteration = first_turns
+         n_iteration = first_iterations
          associate (material => run%body%material, mesh => run%body%mesh)
             wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
             associate (inner => mesh%r(mesh%n_polar/2, 0), next => mesh%r(mesh%n_polar/2, 1))
@@ -117,7 +117,7 @@ contains
          ! The next step reports why there are no forces.
          if (growth >= huge(growth)) exit
          ratio = growth/(safety*max_growth)
-         ! Growth rises with the first to the second power of the step: take the worse.
+         ! Growth rises with the first to the second power of the step: take the higher.
          if (ratio <= 1.0_wp) then
             n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit

@@ -63,7 +63,7 @@ contains
             divergence(2::2) = gradient(:, 2)
             strain(4*k - 3:4*k, :) = get_distortion(sqrt(2*shear_modulus*volume), gradient, hoop, divergence)
             shape(k, :) = sqrt(density*volume)*value
-            ! Coordinates of the size of the element keep the functions of the pressure apart.
+            ! Coordinates scaled by the element keep the functions of the pressure well conditioned.
             basis = [1.0_wp, (radius - r(5))/(maxval(r) - minval(r)), &
                (dot_product(value, z) - z(5))/(maxval(z) - minval(z))]
             pressure = pressure + volume*spread(basis, 1, 3)*spread(basis, 2, 3)

@@ -70,7 +70,7 @@ contains
       do i = 1, n_frequency
          omega = 2*pi*lowest*(highest/lowest)**((i - 1)/real(n_frequency - 1, wp))
          turn = omega*time
-         ! Each line over the storage modulus that a constant loss factor has, so that all count alike.
+         ! Each line over the storage modulus that a constant loss factor has, so that all weigh the same.
          matrix(i, :) = (turn - loss_factor*turn**2)/(1 + turn**2)
          right(i) = loss_factor
          matrix(i, :) = matrix(i, :)*omega**(-2/pi*atan(loss_factor))

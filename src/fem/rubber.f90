@@ -21,7 +21,7 @@ module thud_rubber
    !> give all digits.
    real(wp), parameter :: start_from = 0.4_wp, start_to = 2.5_wp
 
-   !> Steps over the relaxation time beyond which a branch has no memory left.
+   !> Steps over the relaxation time beyond which a branch has lost its memory.
    real(wp), parameter :: max_steps_over_time = 100.0_wp
 
 contains
@@ -300,7 +300,7 @@ contains
 
       determinant = (tensor(:, 1)*tensor(:, 2) - tensor(:, 4)**2)*tensor(:, 3)
       call get_inverse_cube_root(n, determinant, root)
-      ! Adjugate over determinant, with the norm of the tensor taken out.
+      ! Adjugate over determinant, with the norm of the tensor removed.
       !$omp simd private(scale)
       do j = 1, n
          scale = 1/(root(j)*determinant(j))

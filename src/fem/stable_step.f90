@@ -82,7 +82,7 @@ contains
          growth = sum(direction*product)
          direction = product/mass
       end do
-      ! The springs of the floor, by their maximum: some node is always about to touch it.
+      ! The springs of the floor, by their maximum: some node may touch it at any time.
       if (.not. contact%stops) growth = growth + interval**2*maxval(contact%stiffness/body%mass(:, last))
    end subroutine find_growth
 

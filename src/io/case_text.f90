@@ -129,7 +129,7 @@ contains
                error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
                   //' has no value; allowed: '//allowed)
             else
-               ! A key of two owners sets both.
+               ! A key of two owners sets both variables.
                do j = 1, size(fields)
                   if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(given%value, error)
                end do

@@ -17,7 +17,7 @@ contains
 
    !> Puts the set of a workspace in the place of the one before.
    subroutine replace_set(workspace, place, names, same, exchangeable, error)
-      !> The workspace; what it holds afterwards is to be cleared.
+      !> The workspace; its remaining files are to be cleared.
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
       character(len=*), intent(in) :: place
@@ -66,7 +66,7 @@ contains
          call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
          if (.not. done) return
       end do
-      ! Without a manifest the old files would pass for the user's.
+      ! Without a manifest the old files would count as the user's.
       if (.not. any(found == manifest)) call add_names(place, names, error)
       done = .not. allocated(error)
       if (done) call exchange_directories(workspace, place, done)

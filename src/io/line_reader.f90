@@ -20,7 +20,7 @@ module thud_line_reader
    type :: line_reader_type
       private
       integer :: descriptor = -1
-      !> What was read last.
+      !> The bytes read last.
       character(len=buffer_length) :: buffer = ''
       !> Bytes in it, and those that were given out.
       integer :: filled = 0, taken = 0

@@ -67,7 +67,7 @@ contains
          header = header//','//trim(history%channel_name(i))
       end do
       header = header//newline
-      ! One piece: text that grows line by line would be copied for each of them.
+      ! Allocated once: text that grows line by line would be copied for each line.
       allocate (character(len=len(header) + size(history%channel, 1)*len(row)) :: text)
       text(:len(header)) = header
       at = len(header)
@@ -92,7 +92,7 @@ contains
          text = text//','//trim(force_names(j))//'_level_dB'
       end do
       text = text//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force)//newline
-      ! The octaves serve the verdict also where only others are asked for.
+      ! The octaves serve the verdict even where only other bands are asked for.
       do i = verdict%first_band, size(verdict%bands)
          associate (band => verdict%bands(i))
             text = text//trim(band%set)

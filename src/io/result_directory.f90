@@ -2,7 +2,7 @@
 !>
 !> A writer works in a workspace `.<name>.part` beside the directory `<name>`, or in the directory itself where the two
 !> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes writers wait for each
-!> other; what a killed one has left there is removed. The lock on the directory is for the moments of its check and of the
+!> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
    use thud_error, only: error_type, input_error, interrupted
@@ -42,7 +42,7 @@ module thud_result_directory
 
 contains
 
-   !> Refuses a directory that holds anything else than results of the same case.
+   !> Refuses a directory that holds anything but results of the same case.
    subroutine check_owner(path, marker, differs, error)
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.

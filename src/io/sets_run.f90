@@ -110,7 +110,7 @@ contains
          if (allocated(error) .or. n == 0) exit
          call solve_many(case, table%columns, values(:, :n), threads, .false., many, error)
          if (allocated(error)) exit
-         ! To write numbers takes longer than to compute them.
+         ! Writing numbers takes longer than computing them.
          !$omp parallel do num_threads(threads)
          do i = 1, threads
             call get_set_rows(table, tally%sets, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, many, parts(i)%content)

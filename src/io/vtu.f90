@@ -61,7 +61,7 @@ contains
       integer(c_int8_t), intent(in) :: bytes(:)
       character(len=:), allocatable, intent(inout) :: text
 
-      ! The length of the data stands before them.
+      ! The data follow their length.
       text = text//'<DataArray type="'//type//'" Name="'//name//'" NumberOfComponents="'//to_text(n_component) &
          //'" format="binary">'//encode([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes]) &
          //'</DataArray>'//newline

@@ -55,7 +55,7 @@ module thud_band_projection
 
 contains
 
-   !> Number of the shortest window that holds so many samples.
+   !> Number of the shortest window that holds the samples.
    elemental function get_window_class(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
@@ -65,7 +65,7 @@ contains
       window = 1
       if (n_sample <= shortest_window) return
       window = floor(windows_per_octave*log(real(n_sample, wp)/shortest_window)/log(2.0_wp)) + 1
-      ! Lengths are rounded: the next one may be it.
+      ! Lengths are rounded: the next window may be the one.
       if (get_class_window(window) < n_sample) window = window + 1
    end function get_window_class
 
@@ -204,7 +204,7 @@ contains
       end do
    end subroutine get_spectra
 
-   !> Leaves out the last sequences, as far as they hold no energy in the bands.
+   !> Leaves out the last sequences, which hold no energy in the bands.
    subroutine drop_sequences(sequences, spectra)
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), allocatable, intent(inout) :: sequences(:, :)

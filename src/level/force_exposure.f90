@@ -26,7 +26,7 @@ module thud_force_exposure
    !> Maximum number of samples of a record: its transform still fits into memory and its length into an integer.
    integer, parameter :: max_samples = 100000000
 
-   !> Sum of squares below which a record is taken for zero, N^2: its rounding would underflow.
+   !> Sum of squares below which a record counts as zero, N^2: its rounding would underflow.
    real(wp), parameter :: min_energy = 1.0e-280_wp
 
    !> Maximum sampling rate, Hz: one second of it still fits into memory.
@@ -66,7 +66,7 @@ contains
          error = input_error('the level method '//quoted(method)//' is not known; allowed: '//join_quoted(level_methods))
          return
       end select
-      ! Rounding blurs a band by about this part of the whole energy: no less can be resolved.
+      ! Rounding errors of a band are about this part of the whole energy, which limits the resolution.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
    end subroutine get_force_exposure_levels
@@ -120,7 +120,7 @@ contains
       spacing = sample_rate/length
       first = ceiling(bands%lower/spacing)
       last = floor(bands%upper/spacing)
-      ! The transform of the window takes longer than the autocorrelation of a record far shorter.
+      ! For short records the autocorrelation is faster than the transform of the window.
       if (3*size(force) < length) then
          energy = get_energy(force, sample_rate, (first - 0.5_wp)*spacing, (last + 0.5_wp)*spacing, spacing)
       else

@@ -11,13 +11,13 @@ module thud_transform
 
    include 'fftw3.f03'
 
-   !> Lengths whose plans are kept; more only while more threads than that transform.
+   !> Lengths whose plans are kept, more only while more threads use them.
    integer, parameter :: kept_count = 16
 
    !> Maximum length of a transform whose plans are kept: longer ones take much memory.
    integer, parameter :: max_kept_length = 2**18
 
-   !> Plans for one length. They fit all arrays that the compiler allocates: FFTW wants 16 bytes aligned.
+   !> Plans for one length. They fit all arrays that the compiler allocates: FFTW needs alignment to 16 bytes.
    type :: plans_type
       !> Samples, 0 without plans.
       integer :: length = 0
@@ -129,7 +129,7 @@ contains
       call give_back(plans)
    end subroutine transform_back
 
-   !> Plans for arrays, kept or new ones. Planning is the one part of FFTW that threads must not share.
+   !> Plans for arrays, kept or new ones. FFTW's planner is not thread-safe.
    subroutine take_plans(signal, spectrum, plans)
       !> Array of the record: [n].
       real(wp), intent(inout) :: signal(:)

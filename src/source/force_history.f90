@@ -116,7 +116,7 @@ contains
          history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
    end function get_scalars
 
-   !> Finds the contact time between samples: the force goes on to zero in a straight line from the last two
+   !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
    !> samples of the contact.
    pure subroutine continue_to_zero(history)
       !> The history; gets its exact contact time.

@@ -209,7 +209,7 @@ contains
       time = 0.0_wp
       do i = 1, max_steps
          call rk4_step(spring, time, state, step, next, valid)
-         ! Asked so that NaN ends the march too.
+         ! Written so that NaN ends the march too.
          if (.not. next(at_deflection) > 0.0_wp) exit
          state = next
          time = time + step

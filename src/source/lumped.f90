@@ -173,7 +173,7 @@ contains
       history%velocity(i) = state(at_velocity)
       call source%get_parts(state, history%part(i, :), history%elastic_force(i))
       history%peak_floor_force = max(history%peak_floor_force, sum(history%part(i, :)))
-      ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
+      ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       if (i == 1) history%part(i, :) = history%part(i, :)/2
       history%floor_force(i) = sum(history%part(i, :))
    end subroutine record_sample
@@ -200,7 +200,7 @@ contains
       end associate
       history%peak_force = max(history%peak_force, maxval(history%elastic_force))
       history%peak_floor_force = max(history%peak_force, history%peak_floor_force)
-      ! Asked so that NaN fails too.
+      ! Written so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
          error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
             //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(max_residual))

@@ -18,7 +18,7 @@ module thud_measured_modes
 
    public :: measured_modes_type
 
-   !> Part by which the effective masses may miss the mass of the ball: their printed digits.
+   !> Relative error of the sum of effective masses that printed digits explain.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
 
    !> Options of the model: one entry per mode in each list.
@@ -118,7 +118,7 @@ contains
       step = 1/sampling%sample_rate
       history = new_force_history(sampling%sample_rate, n_sample, ['modal_force'])
       history%impact_velocity = v0
-      ! The first zero is not to be missed: sixteen looks at the shortest period.
+      ! Sixteen checks per shortest period find the first zero.
       substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
       released = .false.
       march: do i = 1, n_sample
@@ -136,7 +136,7 @@ contains
             //fixed(1.0e3_wp*time, 1)//' ms of contact; allowed: longer than the contact')
          return
       end if
-      ! Dashpots begin with a jump; a sample of a jump is the mean of its two sides.
+      ! Dashpots start with a jump; a sample of a jump is the mean of its two sides.
       history%part(1, 1) = history%part(1, 1)/2
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)

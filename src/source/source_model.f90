@@ -76,7 +76,7 @@ contains
       extents = 0
    end function get_snapshot_shape
 
-   !> About the time that one drop takes on one core, s.
+   !> Approximate time of one drop on one core, s.
    function get_cost(options) result(cost)
       class(source_model_type), intent(in) :: options
       !> The time, s.

@@ -52,12 +52,12 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
    interface
-      !> Makes errors of full and closed outputs, which would end the process, and a sentence of an interrupt.
+      !> Turns signals of full and closed outputs into errors, and an interrupt into a sentence.
       subroutine prepare_process() bind(c, name='thud_prepare_process')
          implicit none (type, external)
       end subroutine prepare_process
 
-      !> Keeps an interrupt from now on; it ends `write_text`.
+      !> Keeps an interrupt from now on; it then stops `write_text`.
       subroutine keep_interrupts() bind(c, name='thud_keep_interrupts')
          implicit none (type, external)
       end subroutine keep_interrupts

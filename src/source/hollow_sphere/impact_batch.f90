@@ -160,7 +160,7 @@ contains
             right_value = value
             left_value = merge(left_value/2, left_value, right_moved)
          end where
-         ! A value that is rounding only cannot lead any nearer.
+         ! A value of rounding only gives no better estimate.
          where (open .and. abs(value) <= rounding)
             left = length
             right = length

@@ -54,7 +54,7 @@ contains
       impacts%contact = last + length
       last_sample = last_step/substeps + 1
       call get_peaks(force(:, :last_sample), impacts%peak_force, impacts%peak_floor_force)
-      ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
+      ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
 

@@ -30,7 +30,7 @@ module thud_shell_series
    !> Part of the reach that is used as long as the steps are short.
    real(wp), parameter :: inner = 0.6_wp
 
-   !> Steps between the times at which series are looked after. At the default step a ball from 2.7 m stays in
+   !> Steps between two checks of the series. At the default step a ball from 2.7 m stays in
    !> reach of its series for as many.
    integer, parameter :: series_steps = 16
 
@@ -232,7 +232,7 @@ contains
                d4 = y4 - place
                a4 = s*get_push(z4, d4, inverse) - get_pull(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
 
-               ! Added, because a choice between the two would not be vectorised.
+               ! Added, as a branch would not be vectorised.
                outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
                outsides = outsides + outside
                sixth = h*(1/6.0_wp)

@@ -55,7 +55,7 @@ module thud_shell_sets
       real(wp) :: impulse = not_a_number
    end type set_outcome_type
 
-   !> Residual of the balances of impulse and energy from which on the single solver is asked: the sums that
+   !> Residual of the balances of impulse and energy above which the single solver decides: the sums that
    !> are taken here err by up to some twenty times as much as the single solver's.
    real(wp), parameter :: doubtful = 0.1_wp*max_residual
 
@@ -249,7 +249,7 @@ contains
          energy = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
       end associate
       if (max(change, energy) <= doubtful) return
-      ! The sums of the single solver take in the stages of each step.
+      ! The sums of the single solver, which include the stages of each step, decide.
       call solve_hollow_sphere(set%ball, set%drop, hollow_sphere_type(momentum_flux=flux_choices(set%flux)), sampling, &
          history, error)
       computed = .not. allocated(error)

@@ -59,7 +59,7 @@ module thud_modal_ball
 
 contains
 
-   !> About the time that one drop takes on one core, s.
+   !> Approximate time of one drop on one core, s.
    function get_cost(options) result(cost)
       class(modal_ball_type), intent(in) :: options
       !> The time, s.
@@ -289,7 +289,7 @@ contains
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
          end if
-         ! What damping takes lies between the impulse at the beginning and the end of the step.
+         ! The loss by damping lies between the impulse at the beginning and the end of the step.
          state%loss = state%loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
       end associate
    end subroutine take_step

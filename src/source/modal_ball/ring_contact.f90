@@ -79,7 +79,7 @@ contains
          if (round < max_rounds/2) then
             contact%touches = contact%touches .neqv. wrong
          else
-            ! One ring at a time cannot go round in circles (Murty's rule).
+            ! One ring at a time cannot cycle (Murty's rule).
             first_wrong = findloc(wrong, .true., dim=1)
             contact%touches(first_wrong) = .not. contact%touches(first_wrong)
          end if

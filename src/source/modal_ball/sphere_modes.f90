@@ -171,7 +171,7 @@ contains
    end subroutine set_gram
 
    !> Degree of the polynomials that resolve a harmonic: its modes fall off like r^n, which takes
-   !> a degree in proportion to the root of the exponent; the tests hold it against higher ones.
+   !> a degree in proportion to the root of the exponent; the tests compare it with higher ones.
    pure function get_degree(basis, harmonic) result(degree)
       !> The basis, its radii set.
       type(basis_type), intent(in) :: basis
