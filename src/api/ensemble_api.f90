@@ -30,7 +30,7 @@ contains
       type(error_type), allocatable :: error
 
       allocate (bundle)
-      call read_case(text, 'python', case, error)
+      call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) then
          call new_many(case, .true., many)
          call bundle%add_number('outcome', real(outcome_count, wp))
@@ -86,7 +86,7 @@ contains
       integer :: i
 
       allocate (bundle)
-      call read_case(text, 'python', case, error)
+      call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
          call take_many(many)

@@ -91,7 +91,7 @@ contains
       do i = 1, size(fields)
          associate (field => fields(i))
             inside = .true.
-            if (field%range /= '') interval = get_interval(fields, i)
+            interval = get_interval(fields, i)
             if (field%n_choice > 0) then
                inside = any(field%choices(:field%n_choice) == field%text_value)
             else if (associated(field%list_value)) then

@@ -1,6 +1,7 @@
 !> Allowed ranges as intervals: `(0, 10]`, or `(0, outer_radius)` where an end depends on other keys. Such an
 !> end is a product or quotient of numbers and keys of the same group.
 module thud_interval
+   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
    use thud_kinds, only: wp
    use thud_text, only: to_text
    implicit none (type, external)
@@ -89,7 +90,9 @@ contains
       real(wp), intent(in) :: values(:)
       real(wp) :: value
       real(wp) :: operand
-      integer :: start, length, place
+      integer :: start, length, place, status
+      character(len=len(expression)) :: word
+      character(len=128) :: message
       character(len=1) :: operator
 
       value = 1.0_wp
@@ -97,14 +100,14 @@ contains
       start = 1
       do
          length = scan(expression(start:)//'*', '*/') - 1
-         associate (word => expression(start:start + length - 1))
-            place = findloc(keys == word, .true., dim=1)
-            if (place > 0) then
-               operand = values(place)
-            else
-               read (word, *) operand
-            end if
-         end associate
+         word = adjustl(expression(start:start + length - 1))
+         place = findloc(keys == word, .true., dim=1)
+         if (place > 0) then
+            operand = values(place)
+         else
+            read (word, *, iostat=status, iomsg=message) operand
+            if (status /= 0) operand = ieee_value(operand, ieee_quiet_nan)
+         end if
          if (operator == '*') value = value*operand
          if (operator == '/') value = value/operand
          start = start + length + 1

@@ -8,7 +8,7 @@ module thud_many
    use thud_compute, only: compute_case, get_judged_force, judge_case, results_type
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length, list_type
+   use thud_field, only: check_fields, field_type, key_length, list_type
    use thud_force_history, only: force_count, get_scalars, outcome_count
    use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
    use thud_kinds, only: wp
@@ -90,28 +90,28 @@ contains
       type(field_type), allocatable :: fields(:)
       type(list_type), pointer :: list
       logical, allocatable :: possible(:)
-      character(len=128) :: message
-      integer :: i, j, bracket, status
+      character(len=:), allocatable :: key
+      logical :: known
+      integer :: i, j
 
       allocate (fields, source=get_active_fields(case))
       ! Levels of all drops have the same bands.
-      possible = [(.not. any(common_groups == fields(i)%group) .and. fields(i)%key /= 'bands', i=1, size(fields))]
+      possible = [(.not. any(common_groups == fields(i)%group) .and. fields(i)%owner /= 'modes' &
+         .and. fields(i)%key /= 'bands', i=1, size(fields))]
       allocate (columns(size(names)))
       do i = 1, size(names)
-         bracket = index(names(i)//'(', '(')
-         columns(i)%place = findloc(possible .and. fields%key == names(i)(:bracket - 1), .true., dim=1)
-         status = 0
-         if (bracket < len_trim(names(i))) read (names(i)(bracket + 1:len_trim(names(i)) - 1), *, iostat=status, &
-            iomsg=message) columns(i)%entry
-         if (columns(i)%place > 0) then
+         call split_name(names(i), key, columns(i)%entry, known)
+         columns(i)%place = findloc(possible .and. fields%key == key, .true., dim=1)
+         known = known .and. columns(i)%place > 0
+         if (known) then
             list => fields(columns(i)%place)%list_value
             if (associated(list)) then
-               if (columns(i)%entry < 1 .or. columns(i)%entry > list%count) columns(i)%place = 0
-            else if (columns(i)%entry /= 0) then
-               columns(i)%place = 0
+               known = columns(i)%entry >= 1 .and. columns(i)%entry <= list%count
+            else
+               known = key == names(i)
             end if
          end if
-         if (columns(i)%place == 0 .or. status /= 0) then
+         if (.not. known) then
             error = input_error(quoted(names(i))//' is not a known key; allowed: '//join_quoted(pack(fields%key, possible)))
          else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
             error = input_error(quoted(names(i))//' is given twice; allowed: once')
@@ -119,6 +119,28 @@ contains
          if (allocated(error)) return
       end do
    end subroutine find_columns
+
+   !> Key and entry of a name such as `frequency(2)`.
+   pure subroutine split_name(name, key, entry, valid)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(out) :: key
+      !> The entry; 0 where none is named.
+      integer, intent(out) :: entry
+      !> The name is a key, or a key with a number in brackets.
+      logical, intent(out) :: valid
+      integer :: bracket, last
+
+      key = name
+      entry = 0
+      valid = .true.
+      bracket = index(name, '(')
+      if (bracket == 0) return
+      key = name(:bracket - 1)
+      last = len_trim(name)
+      valid = last > bracket + 1 .and. last < bracket + 6 .and. name(last:last) == ')' &
+         .and. verify(name(bracket + 1:last - 1), '0123456789') == 0
+      if (valid) read (name(bracket + 1:last - 1), *) entry
+   end subroutine split_name
 
    !> Prepares for many drops of a case.
    subroutine new_many(case, judged, many)
@@ -162,7 +184,7 @@ contains
 
    !> Computes drops.
    subroutine solve_many(case, columns, values, threads, forces, many, error)
-      !> The case, checked.
+      !> The case; drops may make valid what is not in it.
       type(case_type), intent(in), target :: case
       !> In what the drops differ: [n_column].
       type(column_type), intent(in) :: columns(:)
@@ -172,7 +194,8 @@ contains
       !> Forces are wanted too.
       logical, intent(in) :: forces
       type(many_type), intent(inout) :: many
-      !> Forces are wanted of records of different length, or there is no space in memory.
+      !> A key of all drops has a value out of range, forces are wanted of records of different length, or there is no
+      !> space in memory.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       integer, allocatable :: left(:)
@@ -180,6 +203,10 @@ contains
 
       n_drop = size(values, 2)
       allocate (fields, source=get_active_fields(case))
+      ! What every drop takes over from the case.
+      call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
+         .and. [(all(columns%place /= i), i=1, size(fields))]), error)
+      if (allocated(error)) return
       if (forces .and. any(fields(columns%place)%group == 'sampling')) then
          error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
          return
@@ -378,6 +405,8 @@ contains
                set_fields(place(j))%real_value = values(j, i)
             else
                set%flux = nint(values(j, i))
+               ! A number that is not whole chooses nothing.
+               if (abs(values(j, i) - set%flux) > 0.0_wp) set%flux = 0
             end if
          end do
          sets(i) = set

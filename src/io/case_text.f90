@@ -17,13 +17,15 @@ module thud_case_text
 contains
 
    !> Case from the text of a namelist file, complete and inside all ranges.
-   subroutine read_case(text, default_name, case, error)
+   subroutine read_case(text, default_name, case, error, unchecked)
       character(len=*), intent(in) :: text
       !> Name of the case where the text gives none.
       character(len=*), intent(in) :: default_name
       type(case_type), target, intent(out) :: case
       !> What is wrong, with group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
+      !> Values may lie outside their ranges (default: they may not).
+      logical, intent(in), optional :: unchecked
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
       integer :: i
@@ -46,6 +48,9 @@ contains
       end do
       if (allocated(error)) return
       call check_use(groups, case, error)
+      if (present(unchecked)) then
+         if (unchecked) return
+      end if
       if (.not. allocated(error)) call check_case(case, error)
    end subroutine read_case
 

@@ -165,15 +165,17 @@ contains
    end function count_files
 
    !> Reads a case from a namelist file.
-   subroutine load_case(path, case, error)
+   subroutine load_case(path, case, error, unchecked)
       character(len=*), intent(in) :: path
       type(case_type), intent(out) :: case
       !> Names file, group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
+      !> Values may lie outside their ranges (default: they may not).
+      logical, intent(in), optional :: unchecked
       character(len=:), allocatable :: text
 
       call read_text_file(path, text, error)
-      if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error)
+      if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine load_case
 

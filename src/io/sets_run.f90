@@ -55,8 +55,10 @@ contains
       type(result_directory_type) :: results
       logical :: differs
 
-      call load_case(path, case, error)
+      call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
+      ! Free modes are the same for all.
+      case%has_modes = .false.
       if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case ' &
          //'with a source model')
       if (allocated(error)) return

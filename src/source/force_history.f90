@@ -117,14 +117,15 @@ contains
    end function get_scalars
 
    !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
-   !> samples of the contact.
+   !> samples of the first contact.
    pure subroutine continue_to_zero(history)
-      !> The history; gets its exact contact time.
+      !> The history, with its contact time; gets the exact one.
       type(force_history_type), intent(inout) :: history
       real(wp) :: part
       integer :: last
 
-      last = findloc(abs(history%floor_force) > 0.0_wp, .true., dim=1, back=.true.)
+      last = min(size(history%floor_force), ceiling((history%touch_time + history%contact_time)*history%sample_rate) + 2)
+      last = findloc(abs(history%floor_force(:last)) > 0.0_wp, .true., dim=1, back=.true.)
       if (last < 2) return
       associate (before => history%floor_force(last - 1), end => history%floor_force(last))
          part = 1.0_wp

@@ -232,7 +232,7 @@ def stream(count: int, path: Path, chunk: int = 50_000) -> None:
                 found.contact_time,
                 found.peak_force,
                 found.restitution,
-                *found.elastic_levels.T,
+                *found.elastic_octaves.T,
             ]
             np.column_stack(rows).tofile(file)
     seconds = time.perf_counter() - start
@@ -256,12 +256,13 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
 
     def run(
         threads: int = 1,
-        bands: str | None = "octave",
         clock: Callable[[], float] = time.process_time,
+        *,
+        levels: bool = True,
     ) -> float:
-        return best(lambda: thud.solve_many(drops, threads=threads, bands=bands), 7, clock)
+        return best(lambda: thud.solve_many(drops, threads=threads, levels=levels), 7, clock)
 
-    bare, whole = run(bands=None), run()
+    bare, whole = run(levels=False), run()
     marching, complete = SETS / bare, SETS / whole
     name = "ensemble, trajectories"
     report(name, marching, "heyoka, batch mode", heyoka_rate(), "required: above 1")
@@ -274,7 +275,7 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
     report(name, levels, "SciPy ZoomFFT, 64 lines per band", zoom_rate(), "required: 5 times")
     one, two = (SETS / run(threads, clock=time.perf_counter) for threads in (1, 2))
     report("ensemble, two threads", two, "one thread", one, "required: 1.9 times, on idle cores")
-    steps = float(np.sum(thud.solve_many(drops, bands=None).contact_time)) * RATE
+    steps = float(np.sum(thud.solve_many(drops, levels=False).contact_time)) * RATE
     flops, limit = FLOPS_PER_STEP * steps / bare, dgemm_rate()
     print(f"trajectories: {FLOPS_PER_STEP:.0f} flops per step, {flops / 1e9:.1f} Gflop/s, "
           f"{100 * flops / limit:.0f} % of DGEMM's {limit / 1e9:.1f} Gflop/s")  # fmt: skip

@@ -159,7 +159,7 @@ BAD_CASES = {
     "zero height": ("&ball / &drop height = 0 / &model /", "&drop: height = 0.0 is not allowed"),
     "thick wall": (
         "&ball wall_thickness = 0.1 / &drop / &model /",
-        "&ball: wall_thickness = 0.1 is not allowed; allowed: 0 < wall_thickness < 0.089 m",
+        "wall_thickness = 0.1 is not allowed; allowed: 0 < wall_thickness < outer_radius = 0.089 m",
     ),
     "poisson": (
         "&ball poisson_ratio = 0.6 / &drop / &model /",

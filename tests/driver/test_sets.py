@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import thud
+from thud.keys import put
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -63,14 +64,14 @@ def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> N
         "contact_time_s": expected.contact_time,
         "peak_force_N": expected.peak_force,
         "impulse_N_s": expected.impulse,
-        "elastic_octave_31.5_Hz_dB": expected.elastic_levels[:, 0],
-        "floor_octave_500_Hz_dB": expected.floor_levels[:, 4],
+        "elastic_octave_31.5_Hz_dB": expected.elastic_octaves[:, 0],
+        "floor_octave_500_Hz_dB": expected.floor_octaves[:, 4],
     }.items():
         np.testing.assert_allclose([float(row[name]) for row in rows], values, rtol=1e-15)
     for name, index in {"elastic_third_31.5_Hz_dB": 1, "elastic_third_630_Hz_dB": -1}.items():
         found = [float(row[name]) for row in rows]
-        np.testing.assert_allclose(found, thirds.elastic_levels[:, index], rtol=1e-15)
-    assert {row["status"] for row in rows} == {"computed"}
+        np.testing.assert_allclose(found, thirds.levels["elastic", "third"][:, index], rtol=1e-15)
+    assert {(row["status"], row["reason"]) for row in rows} == {("0", "")}
 
 
 def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
@@ -78,12 +79,12 @@ def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
     result = run(case, "--sets", "table.csv", "--check")
     assert result.returncode == 3
     assert "3 sets, 1 computed" in result.stdout
-    sentence = "2 of 3 sets have no results, such as: the drop closes the shell"
-    assert result.stderr == f"thud: {case}: {sentence}\n"
+    sentence = "2 of 3 sets have no results, such as: &drop: height = 500.0 m closes the shell"
+    assert result.stderr.startswith(f"thud: {case}: {sentence}")
     rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
-    assert [row["status"] for row in rows] == [
-        "computed", "the drop closes the shell", "mass lies outside its range",
-    ]  # fmt: skip
+    assert [row["status"] for row in rows] == ["0", "2", "1"]
+    assert "500.0 m closes the shell" in rows[1]["reason"]
+    assert rows[2]["reason"].startswith("&ball: mass = -2.5 is not allowed; allowed: 0 < mass")
     assert float(rows[0]["restitution"]) == pytest.approx(0.889, abs=1e-3)
     assert rows[1]["contact_time_s"] == rows[2]["floor_conforms"] == ""
     assert "nan" not in (tmp_path / "outputs/ball_sets/sets.csv").read_text().lower()
@@ -118,10 +119,10 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("hieght\n1\n", "line 1: 'hieght' is not a known key; allowed: 'outer_radius'"),
         ("height,\n1,2\n", "line 1: '' is not a known key"),
         ("height,mass,height\n1,2,1\n", "line 1: 'height' is given twice"),
-        ("height,mass\n1,2\n1\n", "line 3: the number of values is another than that of the keys"),
-        ("height,mass\n1,2,3\n", "line 2: the number of values is another than that of the keys"),
+        ("height,mass\n1,2\n1\n", "line 3: it has 1 values and the first line 2 keys"),
+        ("height,mass\n1,2,3\n", "line 2: it has 3 values and the first line 2 keys"),
         ("height\n1\none\n", "line 3: height = 'one' is not a number"),
-        ("height\n1 2\n", "line 2: height = '1 2' is not a number"),
+        ("height\n1 2\n", "line 2: it has 2 values and the first line 1 keys"),
         ("height\n2*1\n", "line 2: height = '2*1' is not a number"),
         ("height\n1+3\n", "line 2: height = '1+3' is not a number"),
         ("height,mass\n1,\n", "line 2: mass = '' is not a number"),
@@ -167,21 +168,57 @@ def test_bad_arguments_are_refused(
 
 
 @pytest.mark.parametrize(
-    ("more", "sentence"),
+    "text",
     [
-        ("&levels method = 'fft' /", "&levels: method = 'fft' is not for sets; allowed: 'exact'"),
-        ("&model name = 'modal_ball' /", "&model: name = 'modal_ball' has no sets"),
+        "height;wall_thickness;momentum_flux\n1,0;0,032;none\n1,2;0,03;retarding\n",
+        "height\twall_thickness\tmomentum_flux\n1,0\t0,032\tnone\n1,2\t0,03\tretarding\n",
+        "height wall_thickness  momentum_flux\n 1.0  0.032 none # first\n1.2 0.03 'retarding'\n",
+        '"height", "wall_thickness", momentum_flux\n1.0, 0.032, NONE\n1.2, 3e-2, retarding\n',
     ],
 )
-def test_cases_without_sets_are_refused(
-    run: Run, case: Path, tmp_path: Path, more: str, sentence: str
-) -> None:
-    (tmp_path / "table.csv").write_text("height\n1\n")
-    case.write_text(CASE.replace("&model name = 'hollow_sphere' /", "") + more
-                    + ("" if "&model" in more else "&model name = 'hollow_sphere' /"))  # fmt: skip
-    result = run(case, "--sets", "table.csv")
-    assert result.returncode == 1
-    assert sentence in result.stderr
+def test_tables_are_read_as_records_are(run: Run, case: Path, tmp_path: Path, text: str) -> None:
+    (tmp_path / "table.csv").write_text(text)
+    assert run(case, "--sets", "table.csv", "-q").returncode == 0
+    rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
+    found = [(float(r["height"]), float(r["wall_thickness"]), r["momentum_flux"]) for r in rows]
+    assert found == [(1.0, 0.032, "none"), (1.2, 0.03, "retarding")]
+
+
+MODELS = {
+    "modal_ball": ("loss_factor", [0.1, 0.15, 0.2], ""),
+    "finite_element": (
+        "bulk_ratio",
+        [50.0, 100.0, 200.0],
+        "&mesh radial_elements = 2, polar_elements = 16 /",
+    ),
+    "hunt_crossley": ("contact_time", [0.018, 0.02, 0.022], ""),
+    "measured_modes": (
+        "frequency(2)",
+        [80.0, 89.0, 95.0],
+        "&measured_modes frequency = 24, 89, damping_ratio = 2*0.05, effective_mass = 2.35, 0.1 /",
+    ),
+}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) -> None:
+    """Rows are those of single drops, of each model, with any number of threads."""
+    key, values, more = MODELS[model]
+    text = CASE.replace("hollow_sphere", model) + more
+    case.write_text(text)
+    (tmp_path / "table.csv").write_text(f"{key}\n" + "\n".join(map(str, values)))
+    for threads in ("1", "2"):
+        result = run(case, "--sets", "table.csv", "--threads", threads, "-o", threads, "-q")
+        assert (result.returncode, result.stderr) == (0, "")
+    assert (tmp_path / "1/sets.csv").read_bytes() == (tmp_path / "2/sets.csv").read_bytes()
+    rows = rows_of(tmp_path / "1/sets.csv")
+    base = thud.Case.from_text(text)
+    for row, value in zip(rows, values, strict=True):
+        impact = thud.solve_case(put(base, {key: value}))
+        assert float(row["contact_time_s"]) == impact.contact_time
+        assert float(row["peak_force_N"]) == impact.peak_force
+        level = float(row["floor_octave_125_Hz_dB"])
+        assert level == pytest.approx(impact.levels(force="floor")[2], abs=1e-9)
 
 
 def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ contains
       type(field_type), allocatable :: fields(:)
       type(interval_type), allocatable :: ranges(:)
 
-      fields = get_set_fields(any_set)
+      allocate (fields, source=get_set_fields(any_set))
       ranges = [(new_interval(fields(i)%range), i=1, size(fields))]
       next = 0
       do i = 1, size(sets)
