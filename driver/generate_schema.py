@@ -28,6 +28,7 @@ from thud.key import Key
 __all__ = [
 {names}]
 '''
+INDENT = " " * 8
 PAGE = """# Keys of an input file
 
 Made by `./bootstrap schema` from the library's own declarations. SI units. `thud --keys` prints the
@@ -68,35 +69,24 @@ def python_default(key: Entry) -> str:
 
 def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> str:
     """Return the dataclass of some keys."""
-    lines = [
-        "",
-        "",
-        "@dataclass(frozen=True)",
-        f"class {class_name(group)}:",
-        f'    """{title}',
-        "",
-    ]
-    lines += ["    Attributes", "    ----------"]
+    attributes: list[str] = []
+    members = [f'    name: ClassVar[str] = "{model}"'] if model else []
     for key in keys:
-        words = [key["meaning"][0].upper() + key["meaning"][1:]]
-        words[0] += f", {key['unit']}" if key["unit"] else ""
-        words += [allowed(key)] if allowed(key) else []
-        words += [f"group ``&{key['group']}``"] if key["group"] != group else []
-        type_name = python_type(key).replace("Sequence[", "sequence of ").rstrip("]")
-        lines.append(f"    {key['name']} : {type_name}")
-        indent = " " * 8
-        lines += textwrap.wrap(
-            "; ".join(words) + ".", 99, initial_indent=indent, subsequent_indent=indent
-        )
-    lines += ['    """', ""]
-    if model:
-        lines += [f'    name: ClassVar[str] = "{model}"']
-    for key in keys:
+        unit = f", {key['unit']}" if key["unit"] else ""
+        words = [key["meaning"][0].upper() + key["meaning"][1:] + unit, allowed(key)]
         default = python_default(key)
         if key["group"] != group:
+            words.append(f"group ``&{key['group']}``")
             default = f'field(default={default}, metadata={{"group": "{key["group"]}"}})'
-        lines.append(f"    {key['name']}: {python_type(key)} = {default}")
-    return "\n".join(lines) + "\n"
+        type_name = python_type(key)
+        text = INDENT + "; ".join(filter(None, words)) + "."
+        plain_type = type_name.replace("Sequence[", "sequence of ").rstrip("]")
+        attributes.append(f"    {key['name']} : {plain_type}")
+        attributes += textwrap.wrap(text, 99, subsequent_indent=INDENT)
+        members.append(f"    {key['name']}: {type_name} = {default}")
+    head = f'\n\n@dataclass(frozen=True)\nclass {class_name(group)}:\n    """{title}\n'
+    attributes = ["    Attributes", "    ----------", *attributes, '    """\n']
+    return "\n".join([head, *attributes, *members, ""])
 
 
 def python_module(schema: Entry) -> str:
@@ -105,7 +95,7 @@ def python_module(schema: Entry) -> str:
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
     classes = sorted(map(class_name, [*groups, "modes", *models]))
-    parts = [HEAD.replace("{names}", "".join(f'    "{name}",\n' for name in classes))]
+    parts = [HEAD.format(names="".join(f'    "{name}",\n' for name in classes))]
     for group in groups:
         members = [key for key in shared if key["group"] == group]
         parts.append(python_class(f"Group ``&{group}``.", members, group))
@@ -166,9 +156,8 @@ def page(schema: Entry) -> str:
             group = key["group"]
             owners = sorted({k["owner"] for k in schema["keys"] if k["group"] == group} - {""})
             users = [("free modes" if owner == "modes" else f"`{owner}`") for owner in owners]
-            text += f"\n## `&{group}`\n\n" + (
-                f"Used by {' and '.join(users)}.\n\n" if users else ""
-            )
+            used = f"Used by {' and '.join(users)}.\n\n" if users else ""
+            text += f"\n## `&{group}`\n\n{used}"
             text += "| key | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"
         default = python_default(key) if key["default"] not in ([], "") else ""
         cells = [f"`{key['name']}`", default, key["unit"], allowed(key), key["meaning"]]

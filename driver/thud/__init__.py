@@ -18,9 +18,8 @@ from thud.case import Case, read_case, write_case
 from thud.ensemble import Ensemble, solve_many
 from thud.errors import FitWarning, InputError, NumericalError, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import Impact, solve, solve_case
+from thud.impact import Impact, Motion, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
-from thud.motion import Motion
 from thud.recording import Recording
 from thud.results import read_results
 from thud.studies import kinds
@@ -56,8 +55,7 @@ __all__ = [  # noqa: PLE0604 - the first are strings too
 ]
 
 
-# What needs matplotlib, plotly, SciPy or xarray is imported when it is first asked for: that takes
-# time.
+# What needs matplotlib, plotly, SciPy or xarray is imported at first use: these are slow to import.
 _LATE = {
     "plot": None,
     "comparison": None,
@@ -66,8 +64,8 @@ _LATE = {
 }
 
 
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or what stands in it
-    """Import modules that take their time when they are first asked for."""
+def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or an object of it
+    """Import slow modules at first use."""
     if name in kinds.PUBLIC:
         return getattr(kinds.load(kinds.PUBLIC[name]), name)
     if name in _LATE:

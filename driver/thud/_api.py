@@ -5,6 +5,7 @@ Bundles of the library become dictionaries, its status codes exceptions.
 
 from __future__ import annotations
 
+import math
 import re
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -15,9 +16,6 @@ from thud.errors import InputError, NumericalError
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     # By name: text, number, array, or more of them.
     Bundle = dict[str, Any]
 
@@ -25,53 +23,22 @@ api = _core.thud_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
 
-
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
 def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
-    """Call a procedure of the library and return what it gives by name.
+    """Call a procedure whose results are a status, a handle and sizes; return its bundle.
 
-    Parameters
-    ----------
-    routine
-        Procedure of `api` whose results are a status, a handle and sizes.
-    *arguments
-        Its arguments.
-
-    Returns
-    -------
-    dict
-        Texts, numbers and arrays; those with a dot in their name stand in dictionaries of what is
-        before the dot.
-
-    Raises
-    ------
-    InputError, NumericalError
-        With the sentence of the library.
+    It holds texts, numbers and arrays by name; those named ``group.name`` are in a dictionary for
+    each group. Raise InputError or NumericalError with the message of the library.
     """
     return collect(*routine(*arguments))
 
 
 def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
-    """Call a procedure that gives its results directly, and return them.
+    """Call a procedure whose last two results are a status and a message; return the others.
 
-    Parameters
-    ----------
-    routine
-        Procedure whose last two results are a status and a message.
-    *arguments
-        Its arguments.
-
-    Returns
-    -------
-    tuple
-        The other results.
-
-    Raises
-    ------
-    InputError, NumericalError
-        With the sentence of the library.
+    Raise InputError or NumericalError with the message.
     """
     *results, status, message = routine(*arguments)
     if status:
@@ -80,7 +47,7 @@ def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> 
 
 
 def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
-    """Return what the library has left under a handle; see `call`."""
+    """Return the results that the library holds under a handle; see `call`."""
     data, values = api.collect(handle, n_byte, n_value)
     header, _, texts = data.tobytes().partition(b"\0")
     found: Bundle = {}
@@ -91,25 +58,17 @@ def collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
             place[name] = texts[at["text"] : at["text"] + length]
             at["text"] += length
         else:
-            place[name] = _shaped(values, at["values"], extents, length)
+            chunk = values[at["values"] : at["values"] + length]
+            place[name] = chunk.reshape(extents, order="F") if extents else float(chunk[0])
             at["values"] += length
     if status:
         raise _ERRORS.get(status, NumericalError)(text(found["message"]))
     return found
 
 
-def _shaped(
-    values: NDArray[np.float64], start: int, extents: tuple[int, ...], length: int
-) -> float | NDArray[np.float64]:
-    """Return a number, or an array of the library."""
-    if not extents:
-        return float(values[start])
-    return values[start : start + length].reshape(extents, order="F")
-
-
 @lru_cache(maxsize=64)
 def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
-    """Return group, name, extents and length of what a header names; texts have no extents."""
+    """Return group, name, extents and length of each item of a header; texts have no extents."""
     items: list[tuple[str, str, tuple[int, ...] | None, int]] = []
     for line in header.decode().splitlines():
         full, _, form = line.partition("\t")
@@ -118,29 +77,25 @@ def _items(header: bytes) -> list[tuple[str, str, tuple[int, ...] | None, int]]:
             items.append((group, name, None, int(form[1:])))
             continue
         extents = tuple(int(extent) for extent in form.split(",") if extent)
-        length = 1
-        for extent in extents:
-            length *= extent
-        items.append((group, name, extents, length))
+        items.append((group, name, extents, math.prod(extents)))
     return items
 
 
 def text(value: bytes) -> str:
-    """Return a text of the library; bytes that are no UTF-8 stay what they are."""
+    """Return a text of the library; invalid UTF-8 is kept by surrogate escapes."""
     return value.decode(errors="surrogateescape")
 
 
 def trimmed(value: bytes) -> str:
-    """Text of the library without the blanks behind it."""
+    """Return a text of the library without trailing blanks."""
     return text(value).rstrip()
 
 
 def version() -> str:
-    """Version of the library."""
+    """Return the version of the library."""
     return text(call(api.describe_library)["version"])
 
 
 def compiler() -> str:
-    """Compiler of the library, with its options but for the places of files."""
-    # Options that name places say nothing.
+    """Return the compiler of the library and its options, without those that hold paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))

@@ -23,12 +23,11 @@ from thud._schema import (
     Modes,
     Sampling,
 )
-from thud.checks import LARGEST, require_kind, shown
+from thud.checks import LARGEST, require_choice, require_kind, require_words, shown
 from thud.errors import InputError
 from thud.files import replace_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from dataclasses import Field
     from typing import Any, Self
 
@@ -45,27 +44,10 @@ def group_of(model: str, option: Field[Any]) -> str:
 
 
 def new_model(name: str, options: dict[str, object]) -> ModelOptions:
-    """Return the options of a model by its name.
-
-    Raises
-    ------
-    InputError
-        Where the model or an option is not known; lists those that are.
-    """
-    if name not in MODELS:
-        message = f"&model: name = {name!r} is not allowed; allowed: {_listed(MODELS)}"
-        raise InputError(message)
-    known = [option.name for option in fields(MODELS[name])]
-    for option in options:
-        if option not in known:
-            message = f"&{name}: {option} is not a known key; allowed: {_listed(known)}"
-            raise InputError(message)
+    """Return the options of a model by its name; raise InputError where one is not known."""
+    require_choice("&model: name", name, MODELS)
+    require_words(f"&{name}", options, [option.name for option in fields(MODELS[name])])
     return MODELS[name](**options)  # type: ignore[arg-type]
-
-
-def _listed(words: Iterable[str]) -> str:
-    """Return words in quotes with commas between."""
-    return ", ".join(map(repr, words))
 
 
 @dataclass(frozen=True)
@@ -77,9 +59,9 @@ class Case:
     name : str
         Name of the case, also of its output directory.
     model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley or None
-        The source model, by its options; None where no impact is asked for.
+        Options of the source model; None: no impact.
     modes : Modes or None
-        The free modes that are asked for.
+        Options of the free modes; None: no free modes.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -99,7 +81,7 @@ class Case:
         Raises
         ------
         InputError
-            Where a value is neither a number nor text, nor a list of numbers where one is due.
+            Where a value is not a number, text or, for keys that take one, a list of numbers.
         """
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
@@ -133,12 +115,12 @@ class Case:
 
     @classmethod
     def from_text(cls, content: str) -> Self:
-        """Return the case of the text of a namelist file; keys that it lacks have their default."""
+        """Return the case of the text of a namelist file; missing keys have their default."""
         return cls.from_namelist(f90nml.reads(content))
 
     @classmethod
     def from_namelist(cls, namelist: f90nml.Namelist) -> Self:
-        """Return the case of a namelist; keys that it lacks have their default value."""
+        """Return the case of a namelist; missing keys have their default."""
         groups = {
             group: kind(**namelist[group]) for group, kind in GROUPS.items() if group in namelist
         }
@@ -161,7 +143,7 @@ class Case:
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
-    """Return a value as f90nml knows it."""
+    """Return a value as a type that f90nml writes."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple) and key in LISTS:
@@ -181,17 +163,7 @@ def case_text(case: Case) -> bytes:
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:
-    """Read a case from a namelist file.
-
-    Parameters
-    ----------
-    path
-        Path of the file.
-
-    Returns
-    -------
-    Case
-        The case with every key.
+    """Read a case, with every key, from a namelist file.
 
     Raises
     ------
@@ -202,7 +174,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
 
 
 def check_case(case: Case) -> None:
-    """Raise InputError with the sentence of the library where a case cannot be computed."""
+    """Raise InputError with the message of the library where a case is invalid."""
     call(api.check_text, case_text(case))
 
 

@@ -11,25 +11,26 @@ import numpy as np
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Container, Iterable
     from types import UnionType
 
+    from numpy.typing import ArrayLike, NDArray
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# What studies called otherwise before.
+# Former words of studies, and those that replace them.
 OLD_WORDS = {"base": "case", "lower": "low", "upper": "high", "level": "confidence"}
-# Longer values are told by their kind.
+# Longer values are shown by their kind.
 LONGEST_SHOWN = 80
-# No key takes a larger number, and Python does not print the largest ones.
+# No key takes a larger number, and Python refuses to print much larger ones.
 LARGEST = 10**300
-# The libraries that draw points take no larger seed.
+# Maximum seed of the libraries that draw points.
 LARGEST_SEED = 2**32 - 1
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Raise InputError where an argument is of another kind."""
+    """Raise InputError where an argument is not of a kind."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
@@ -38,8 +39,41 @@ def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
         raise InputError(message)
 
 
+def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
+    """Raise InputError where a word is not one of those that are allowed."""
+    choices = list(allowed)
+    if not isinstance(value, str) or value not in choices:
+        message = f"{name} = {shown(value)} is not known; allowed: {', '.join(map(repr, choices))}"
+        raise InputError(message)
+
+
+def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
+    """Return an array; raise InputError where it is ragged, masked or of other dimensions."""
+    allowed = "allowed: one dimension" + (", or a scalar" if 0 in dimensions else "")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # rows of different length
+        message = f"{name} is not an array of numbers; {allowed}"
+        raise InputError(message) from error
+    if array.ndim not in dimensions:
+        message = f"{name} has {array.ndim} dimensions; {allowed}"
+        raise InputError(message)
+    if np.ma.is_masked(values):
+        message = f"{name} has masked entries; allowed: values only"
+        raise InputError(message)
+    return array
+
+
+def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
+    """Return an array as float64; raise InputError where it holds other than real numbers."""
+    if array.size and array.dtype.kind not in kinds:
+        message = f"{name} is not an array of real numbers; allowed: one dimension of them"
+        raise InputError(message)
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
 def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
-    """Raise InputError where a value is no whole number between two others."""
+    """Raise InputError where a value is not a whole number from low to high."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not low <= value <= high:
         message = (
@@ -49,7 +83,7 @@ def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: 
 
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
-    """Raise InputError where a value is no finite number."""
+    """Raise InputError where a value is not a finite number."""
     number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
         value, bool
     )
@@ -59,7 +93,7 @@ def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the
 
 
 def shown(value: object) -> str:
-    """Return a value as a message shows it: what is long or has lines by its kind."""
+    """Return a value as a message shows it: by its kind where it is long or has several lines."""
     if isinstance(value, int) and abs(value) > LARGEST:
         return "a very large number"
     text = repr(value)
@@ -68,7 +102,7 @@ def shown(value: object) -> str:
 
 
 def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise InputError where a word is not known; names the new word for an old one."""
+    """Raise InputError where a word is not known; of a former word, name the new one."""
     allowed = list(known)
     for word in given:
         if word not in allowed:
@@ -79,7 +113,7 @@ def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> Non
 
 
 def refuse_old_words(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function raise InputError where it is called by an old word for one of its keywords."""
+    """Let a function raise InputError where it is called with a former word as keyword."""
     known = list(inspect.signature(function).parameters)
 
     @wraps(function)
@@ -89,10 +123,3 @@ def refuse_old_words(function: Callable[P, R]) -> Callable[P, R]:
         return function(*arguments, **keywords)
 
     return checked
-
-
-def require_output(output: str | None) -> None:
-    """Raise InputError where the directory of a command line has no name."""
-    if output is not None and not output.strip():
-        message = "--output has no value; allowed: a directory"
-        raise InputError(message)

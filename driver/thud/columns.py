@@ -15,30 +15,30 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# The first of them that a line holds stands between its columns; else blanks do.
+# The first of these that a line contains separates its columns; otherwise blanks do.
 SEPARATORS = ("\t", ";", ",")
 ALLOWED = (
-    "allowed: columns of time, s, and force, N, with commas, semicolons, tabs or blanks between "
-    "(decimal commas beside semicolons and tabs)"
+    "allowed: columns of time, s, and force, N, separated by commas, semicolons, tabs or "
+    "blanks (decimal commas with semicolons and tabs)"
 )
 
 
 def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
     """Return the numbers of a file of columns, shape (n_row, n_column).
 
-    Commas, semicolons, tabs or blanks stand between the columns; decimal commas are read beside
-    semicolons and tabs. Empty lines, what follows a ``#`` and lines above the first number are
-    left out.
+    Commas, semicolons, tabs or blanks separate the columns; decimal commas are read with
+    semicolons and tabs. Empty lines, comments after ``#`` and lines above the first number are
+    skipped.
 
     Raises
     ------
     InputError
-        Names the file, and the line that holds something else.
+        Names the file, and the line that is not numeric or has another number of columns.
     """
     try:
-        if not Path(path).is_file():  # to open a pipe could take for ever
+        if not Path(path).is_file():  # to open a pipe could block
             raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
-        # What a header holds in another code than UTF-8 does not matter.
+        # A header may be in another encoding than UTF-8.
         text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
     except (OSError, ValueError) as error:
         message = f"{path}: cannot be read ({error}); {ALLOWED}"
@@ -66,7 +66,7 @@ def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
 
 
 def _cells(line: str) -> list[str]:
-    """Return the texts of the columns of a line."""
+    """Return the cells of a line."""
     rest = line.partition("#")[0].strip().rstrip(";")
     separator = next((one for one in SEPARATORS if one in rest), None)
     if separator == ",":
@@ -75,7 +75,7 @@ def _cells(line: str) -> list[str]:
 
 
 def _number(cell: str) -> float | None:
-    """Return the number that a text is; None where it is none."""
+    """Return the number in a cell; None where it is not one."""
     try:
         return float(cell)
     except ValueError:

@@ -39,13 +39,13 @@ class Comparison:
     Attributes
     ----------
     impacts : dict of str to Impact or Recording
-        What is compared, by name.
+        What is compared, by its name.
     run_times : dict of str to float
-        Time that each model took, s; recordings have none.
+        Computing time of each model, s.
     force : str
         ``"elastic"`` or ``"floor"``: the force that is compared.
     source : str
-        Source whose limits are drawn.
+        Source of the limits.
     """
 
     impacts: dict[str, Impact | Recording]
@@ -81,7 +81,7 @@ class Comparison:
         return comparison_page(self.impacts, self.force, self.source, [HEADER, *self.table()])
 
     def html(self) -> str:
-        """Return the page as HTML with interactive plots, complete in one file."""
+        """Return the page as self-contained HTML with interactive plots."""
         figure = make_subplots(
             rows=2,
             cols=2,
@@ -106,7 +106,7 @@ class Comparison:
             look = {"color": COLOURS[i % len(COLOURS)]}
             group = {"name": html.escape(name), "legendgroup": str(i)}
             force = impact.force(self.force)
-            # Nothing is drawn long after the contact.
+            # The long free flight after the contact is not drawn.
             since = impact.time - impact.touch_time
             shown = (since >= 0) & (since < 1.5 * impact.contact_time)
             figure.add_trace(
@@ -164,11 +164,11 @@ def compare(
     Parameters
     ----------
     impacts
-        Cases, which are solved, impacts and recordings by name, at least one.
+        Cases (which are solved), impacts and recordings by name; one or more.
     force
         ``"elastic"`` or ``"floor"``.
     source
-        ``"rubber_ball"`` or ``"tyre"``: whose limits are drawn.
+        ``"rubber_ball"`` or ``"tyre"``: source of the limits.
     progress
         Show a progress bar.
 
@@ -183,7 +183,7 @@ def compare(
         Where there is nothing to compare, or the drops differ.
     """
     if not impacts:
-        message = "nothing is given to compare; allowed: one case, impact or recording or more"
+        message = "impacts is empty; allowed: one or more cases, impacts or recordings by name"
         raise InputError(message)
     solved: dict[str, Impact | Recording] = {}
     run_times = {}
@@ -217,7 +217,7 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
     Raises
     ------
     InputError
-        Names the file; also where two have the same name.
+        Names the file; also raised where two have the same name.
     """
     found: dict[str, Case | Recording] = {}
     for path in map(Path, paths):
@@ -228,7 +228,7 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
             given = read_case(path)
             name = given.name
         if name in found:
-            message = f"{path}: {name!r} is the name of another one too; allowed: different names"
+            message = f"{path}: {name!r} also names another input; allowed: different names"
             raise InputError(message)
         found[name] = given
     return found

@@ -13,7 +13,7 @@ from tqdm import tqdm
 from thud._api import call, collect, ensemble_api, text
 from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
-from thud.checks import require_kind, require_whole
+from thud.checks import require_array, require_choice, require_kind, require_real, require_whole
 from thud.errors import InputError
 from thud.impact import FORCES
 from thud.keys import find_key
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from thud.key import Key
 
 MAX_THREADS = 1024
-# About the work of one call of the library on each thread, s: between two calls it can be stopped.
+# Approximate time of one call of the library, s: interrupts are handled between calls.
 _CALL_TIME = 1.0
-# Most sets of one call, whose results the library holds.
+# Maximum number of sets of one call, whose results the library holds in memory.
 _MAX_CALL = 2**17
 
 
@@ -39,7 +39,7 @@ class Ensemble:
     Attributes
     ----------
     parameters : dict of str to ndarray, shape (n_set,)
-        What the drops differ in.
+        Parameters in which the drops differ.
     status : ndarray of int, shape (n_set,)
         0, or the exit code of the error: 1 bad input, 2 numerical failure.
     reason : ndarray of str, shape (n_set,)
@@ -47,24 +47,24 @@ class Ensemble:
     contact_time : ndarray, shape (n_set,)
         Time from first touch to release, s.
     peak_force, peak_floor_force : ndarray, shape (n_set,)
-        Largest elastic force and largest force on the floor, N.
+        Maximum of the elastic force and of the force on the floor, N.
     max_deflection : ndarray, shape (n_set,)
-        Largest deflection, m.
+        Maximum deflection, m.
     restitution : ndarray, shape (n_set,)
         Velocity at release over velocity at first touch.
     impulse : ndarray, shape (n_set,)
         Impulse given to the floor, N s.
     levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
-        Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, which the verdict
-        is passed on, and in other bands where the case asks for them.
+        Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
+        verdict is based, and in the other bands of the case.
     margin : ndarray, shape (n_set,)
         Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
     conforms : ndarray of bool, shape (n_set,)
-        Verdict of the standards by the force that the case judges.
+        Verdict of the standards on the force that the case judges.
     elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
-        The same by the elastic force and by that on the floor.
+        The same on the elastic force and on the force on the floor.
     elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
-        Forces, N, where they were asked for.
+        Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
     """
@@ -119,9 +119,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 ) -> Ensemble:
     """Drop many balls on a rigid floor.
 
-    The numbers are those of `solve`: of the shell model, whose drops are computed in batches, to
-    1e-10 in forces and 1e-6 dB in levels; of the others bit by bit. They do not depend on the
-    number of threads or on the order of the sets.
+    Results equal those of `solve`: for the shell model, which is computed in batches, to 1e-10 in
+    forces and 1e-6 dB in levels, for the others bit for bit. They do not depend on the number of
+    threads or on the order of the sets.
 
     Parameters
     ----------
@@ -129,15 +129,16 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Arrays of one dimension, or scalars, by the names of keys (entries of lists as
         ``"frequency(2)"``); they are broadcast against each other.
     case
-        Everything else; by default the paper's ball and drop.
+        All other keys; by default the paper's ball and drop.
     model
-        Source model, with its default options where it is not that of the case.
+        Source model; with its default options unless it is that of the case.
     threads
         Threads to use; all processors by default.
     levels
-        Compute levels and verdicts too; without them it takes less time.
+        Compute levels and verdicts too; without them it is faster.
     bands
-        Bands of the levels besides octaves, such as ``"third"``; by default those of the case.
+        Bands of the levels in addition to octaves, such as ``"third"``; by default those of the
+        case.
     forces
         Keep the force histories: 16 bytes per sample and set.
     sample_rate, duration, substeps
@@ -145,19 +146,19 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     source
         ``"rubber_ball"`` or ``"tyre"``: the limits that apply; by default those of the case.
     progress
-        Show how many sets are computed.
+        Show a progress bar.
 
     Returns
     -------
     Ensemble
-        Outcomes, levels and verdicts. Sets that cannot be computed have a status, a reason and
-        NaN, and leave the others as they are.
+        Outcomes, levels and verdicts. Sets that fail have a status, a reason and NaN, and do not
+        affect the others.
 
     Raises
     ------
     InputError
-        Where a key is not known, arrays do not broadcast or hold no numbers, the case, the bands
-        or the number of threads cannot be used, or the results have no space in memory.
+        Where a key is not known, arrays are not numeric or do not broadcast, the case, the bands
+        or the number of threads are invalid, or the results do not fit in memory.
     """
     base = Case() if case is None else case
     require_kind("case", base, Case)
@@ -181,7 +182,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     # Without parameters there is one drop, that of the case.
     columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
     sizes = call(ensemble_api.size_many, content)
-    width = _threads(threads)
+    width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
+    require_whole("threads", width, 1, MAX_THREADS)
     results = _allocate(len(numbers), sizes, forces=forces)
     work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
     with tqdm(total=len(numbers), unit="set", disable=not progress, leave=False) as bar:
@@ -209,7 +211,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 def _by_bands(
     level: NDArray[np.float64], wanted: str
 ) -> dict[tuple[str, str], NDArray[np.float64]]:
-    """Return levels by force and bands: octaves first, then what else is wanted."""
+    """Return levels by force and bands: octaves first, then other requested bands."""
     found = {}
     start = 0
     for bands in BANDWIDTHS:
@@ -222,7 +224,7 @@ def _by_bands(
 
 
 def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[Any]]:
-    """Return arrays for the results of sets."""
+    """Return arrays for the results of all sets."""
     outcome, band, force, sample = (
         int(sizes[name]) for name in ("outcome", "band", "force", "sample")
     )
@@ -239,11 +241,11 @@ def _allocate(count: int, sizes: Bundle, *, forces: bool) -> dict[str, NDArray[A
         }
     except MemoryError as error:
         size = f"{count} sets of {sample} samples" if forces else f"{count} sets"
-        message = f"forces = {forces} for {size} has no space in memory; allowed: fewer sets"
+        message = f"forces = {forces} for {size} does not fit in memory; allowed: fewer sets"
         raise InputError(message) from error
 
 
-def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
+def _compute(  # noqa: PLR0913, PLR0917 - those of the library
     content: bytes,
     columns: Mapping[str, Any],
     numbers: NDArray[np.float64],
@@ -253,7 +255,7 @@ def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
     *,
     judged: bool,
 ) -> None:
-    """Compute some sets and put their results in their place."""
+    """Compute some sets and store their results."""
     _, force_count, band = results["level"].shape
     sample = results["force"].shape[-1]
     forces = sample > 1
@@ -283,7 +285,7 @@ def _compute(  # noqa: PLR0913, PLR0917 - what the library asks for
 
 
 def get_cost(case: Case) -> float:
-    """Return about the time that one drop of many takes on one core, s."""
+    """Return the estimated time of one drop of many on one core, s."""
     return float(call(ensemble_api.size_many, case_text(case))["cost"])
 
 
@@ -294,60 +296,30 @@ def _columns(
     if not isinstance(parameters, Mapping):
         message = f"parameters = {parameters!r} is not allowed; allowed: arrays by their keys"
         raise InputError(message)
-    assert case.model is not None  # noqa: S101 - `solve_many` has seen to it
+    assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, case.model.name)[0] for name in parameters]
     for key in keys:
         if key not in KEYS:
             message = f"{key.name!r} is a parameter of studies; allowed: keys of the input"
             raise InputError(message)
-    given = [_array(name, values) for name, values in parameters.items()]
+    given = [require_array(name, values, (0, 1)) for name, values in parameters.items()]
     numbers = [_numbers(key, array) for key, array in zip(keys, given, strict=True)]
     try:
         arrays = np.broadcast_arrays(*map(np.atleast_1d, given))
         found = np.stack(np.broadcast_arrays(*map(np.atleast_1d, numbers)), axis=1)
     except ValueError as error:
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(parameters, given, strict=True))
-        message = f"the arrays do not fit each other: {shapes}; allowed: one length, or scalars"
+        message = f"the arrays differ in length: {shapes}; allowed: one length, or scalars"
         raise InputError(message) from error
     return {name: a.copy() for name, a in zip(parameters, arrays, strict=True)}, found
 
 
 def _numbers(key: Key, array: NDArray[Any]) -> NDArray[np.float64]:
-    """Return the numbers of one parameter; of choices their places, from 1."""
+    """Return the numbers of one parameter; of a choice its index, from 1."""
     if key.kind == "choice":
         words, index = np.unique(array.astype(str), return_inverse=True)
         for word in words:
-            if word not in key.choices:
-                allowed = ", ".join(map(repr, key.choices))
-                message = f"{key.name} = {str(word)!r} is not allowed; allowed: {allowed}"
-                raise InputError(message)
+            require_choice(key.name, str(word), key.choices)
         places = np.array([key.choices.index(word) + 1.0 for word in words])
         return places[index].reshape(array.shape)
-    if array.size and array.dtype.kind not in ("b" if key.kind == "flag" else "iuf"):
-        message = f"{key.name} is not an array of real numbers; allowed: one dimension of them"
-        raise InputError(message)
-    return array.astype(np.float64)
-
-
-def _array(key: str, values: ArrayLike) -> NDArray[Any]:
-    """Return an array of at most one dimension."""
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError) as error:  # rows of different length
-        message = f"{key} is not an array; allowed: one dimension"
-        raise InputError(message) from error
-    if array.ndim > 1:
-        message = f"{key} has {array.ndim} dimensions; allowed: one, or a scalar"
-        raise InputError(message)
-    if np.ma.is_masked(values):
-        message = f"{key} has masked entries; allowed: values only"
-        raise InputError(message)
-    return array
-
-
-def _threads(threads: int | None) -> int:
-    """Return the number of threads."""
-    if threads is None:
-        return min(len(os.sched_getaffinity(0)), MAX_THREADS)
-    require_whole("threads", threads, 1, MAX_THREADS)
-    return int(threads)
+    return require_real(key.name, array, "b" if key.kind == "flag" else "iuf")

@@ -2,7 +2,7 @@
 
 
 class ThudError(Exception):
-    """Any error of thud; its text is one sentence for the user.
+    """Base of the errors of thud; the message is one sentence for the user.
 
     Attributes
     ----------
@@ -14,16 +14,16 @@ class ThudError(Exception):
 
 
 class FitWarning(UserWarning):
-    """A fit has an answer that is not to be trusted in every respect."""
+    """A fit has a result that is not reliable in every respect."""
 
 
 class InputError(ThudError, ValueError):
-    """The input cannot be used; names group, key, value and allowed range."""
+    """The input is invalid; the message names group, key, value and allowed range."""
 
     exit_code = 1
 
 
 class NumericalError(ThudError, ArithmeticError):
-    """The computation could not be carried through."""
+    """The computation failed."""
 
     exit_code = 2

@@ -1,4 +1,4 @@
-"""Files that are never half written, and directories that one run at a time may write to."""
+"""Atomic writes, and locks of directories that one run at a time may write to."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from typing import TYPE_CHECKING
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
-# The file that lists which files of a result directory are not the user's.
+# Lists the files of a result directory that runs may replace.
 MANIFEST = ".thud"
-# A file of a result directory while it is written; also listed, so that nobody keeps it.
+# Temporary name of a file in a result directory; listed too, so that it is removed after a kill.
 PART = ".thud.new"
 
 
 def lock(folder: Path, result: Path) -> int:
-    """Keep other runs away from a directory until the descriptor is closed that it returns.
+    """Lock a directory until the returned descriptor is closed.
 
     Raises
     ------
     InputError
-        Where another run is at work there; names the result that it will write.
+        Where another run holds the lock; names the result that it will write.
     """
     descriptor = os.open(folder, os.O_RDONLY)
     try:
@@ -38,42 +38,36 @@ def lock(folder: Path, result: Path) -> int:
         message = f"{result} is being computed; allowed: wait, or another directory"
         raise InputError(message) from error
     except OSError:
-        # Some disks have no locks.
+        # Some file systems have no locks.
         pass
     return descriptor
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Hold an interrupt back until something short is done: libraries of files leave noise else."""
+def on_interrupt(handler: Callable[[int, object], object] | signal.Handlers) -> Iterator[None]:
+    """Handle interrupts by another handler; only the main thread can, others leave it as it is."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    held: list[int] = []
-    usual = signal.signal(signal.SIGINT, lambda number, _: held.append(number))
+    usual = signal.signal(signal.SIGINT, handler)
     try:
         yield
     finally:
         signal.signal(signal.SIGINT, usual)
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Defer an interrupt until a short operation is done; file libraries print errors otherwise."""
+    held: list[int] = []
+    with on_interrupt(lambda number, _: held.append(number)):
+        yield
     if held:
         raise KeyboardInterrupt
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
-    """Write a file under another name, then give it its own: nobody sees half a file.
-
-    Parameters
-    ----------
-    path
-        Path of the file; an older one is replaced.
-    content
-        All of it.
-
-    Raises
-    ------
-    OSError
-        With the path that was asked for, where it cannot be written.
-    """
+    """Write a file atomically, also over an existing one; an OSError names the path."""
     try:
         target = Path(path)
         _replace(target, content, target.with_name(f".{target.name}.{os.getpid()}.part"))
@@ -87,44 +81,27 @@ def add_files(
 ) -> None:
     """Add files, such as figures, to the results of a run.
 
-    They stay as long as the input does: a run of another input of the same case removes them.
-
-    Parameters
-    ----------
-    directory
-        Directory of the results.
-    files
-        Contents by name; older ones are replaced.
-    marker
-        What the file that says whose results these are, ``effective.nml`` or ``sets.nml``, held
-        when the new files were made.
-
-    Raises
-    ------
-    InputError
-        Where another run has replaced the results since then.
-    OSError
-        Where a file cannot be written.
+    Contents are given by name; existing files are replaced. A later run of another input in the
+    same directory removes them. The marker is the content of the file that identifies the results,
+    ``effective.nml`` or ``sets.nml``; raise InputError where another run has replaced them since.
     """
     if not files:
         return
     folder = Path(directory)
     with _locked(folder):
         if marker is not None and marker not in _markers(folder):
-            message = (
-                f"{folder} holds results of another input by now; allowed: to run the case again"
-            )
+            message = f"{folder} now holds results of another input; allowed: run the case again"
             raise InputError(message)
         manifest = folder / MANIFEST
         listed = manifest.read_text(encoding="utf-8").splitlines() if manifest.exists() else []
-        # Before the files are there: one that is not listed would pass for the user's.
+        # Written first: a file that is not listed counts as the user's.
         names = sorted({*listed, PART, *files})
         for name, content in {MANIFEST: "".join(f"{n}\n" for n in names).encode(), **files}.items():
             _replace(folder / name, content, folder / PART)
 
 
 def _markers(folder: Path) -> Iterator[bytes]:
-    """Yield the contents of the files that say whose results a directory holds."""
+    """Yield the contents of the files that identify the results of a directory."""
     for name in ("effective.nml", "sets.nml"):
         with suppress(OSError):
             yield (folder / name).read_bytes()
@@ -132,13 +109,13 @@ def _markers(folder: Path) -> Iterator[bytes]:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Wait until no run switches or adds to a result directory, and keep others waiting."""
+    """Hold the lock of a result directory, so that no other run switches or adds to it."""
     while True:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-        # Some disks have no locks.
+        # Some file systems have no locks.
         with suppress(OSError):
             fcntl.flock(descriptor, fcntl.LOCK_EX)
-        # Whoever had the lock may have put another directory in its place.
+        # The previous holder of the lock may have switched the directory.
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(descriptor), folder.stat()):
                 break
@@ -150,7 +127,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _replace(target: Path, content: bytes, part: Path) -> None:
-    """Write a file by way of another one beside it."""
+    """Write a file under a temporary name in the same directory, then rename it."""
     try:
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class FreeModes:
-    """Axisymmetric elastic modes without twist, in ascending order; the rigid motion is left out.
+    """Axisymmetric elastic modes without twist, in ascending order, without the rigid motion.
 
     Nodes run from the lowest point to the highest and from the inner surface to the outer one;
     components are the distance from the axis and the height.
@@ -38,11 +38,11 @@ class FreeModes:
         Mass of the ball times the squared amplitude of the lowest point at unit modal mass: how
         strongly a contact there drives the mode; 1 for the rigid motion.
     rigid_frequency : float
-        What the frequency of the rigid motion came out as, Hz; exactly it is 0.
+        Computed frequency of the rigid motion, Hz; the exact one is 0.
     start : ndarray, shape (n_line, n_ring, 2)
-        Nodes around the centre of the ball, m; nine to an element.
+        Nodes relative to the centre of the ball, m; nine per element.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
-        Displacements, the largest of length 1, the lowest point moving upwards.
+        Displacements of maximum length 1, the lowest point moving upwards.
     """
 
     ball: Ball
@@ -68,7 +68,7 @@ def free_modes(
     ball
         By default the rubber ball of the paper. Poisson's ratio may be 1/2.
     count
-        Number of elastic modes; the rigid motion does not count.
+        Number of elastic modes.
     radial_elements, polar_elements
         Elements through the wall and from pole to pole.
 
@@ -93,7 +93,7 @@ def free_modes(
 
 
 def new_modes(ball: Ball, found: Bundle) -> FreeModes:
-    """Return the free modes that the library has left in a bundle."""
+    """Return the free modes in a bundle of the library."""
     modes = found["modes"]
     return FreeModes(
         ball,
@@ -112,7 +112,7 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
     Parameters
     ----------
     model
-        The model; its options of the group ``&material`` count.
+        The model, of which the options of ``&material`` are used.
     frequency : array_like, shape (n,)
         Frequencies, Hz.
 

@@ -1,4 +1,4 @@
-"""Impact of a source on a rigid floor: the answer of every source model."""
+"""Impact of a source on a rigid floor: the result of every source model."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 from thud._api import api, call
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
-from thud.checks import require_kind
+from thud.checks import require_choice, require_kind
 from thud.errors import InputError
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
-from thud.motion import Motion
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -21,6 +20,41 @@ if TYPE_CHECKING:
     from thud._api import Bundle
 
 FORCES = ("elastic", "floor")
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Snapshots of the half section of the ball, the floor at height 0.
+
+    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
+    components are the distance from the axis and the height.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n_snapshot,)
+        Times since the start of the record, s.
+    start : ndarray, shape (n_line, n_ring, 2)
+        Positions of the nodes before the impact, m.
+    position : ndarray, shape (n_snapshot, n_line, n_ring, 2)
+        Positions of the nodes, m.
+    velocity : ndarray, shape (n_snapshot, n_line, n_ring, 2)
+        Velocities of the nodes, m/s.
+    contact_pressure : ndarray, shape (n_snapshot, n_line)
+        Pressure on the floor at the nodes of the outer surface, Pa.
+    cavity_pressure : ndarray, shape (n_snapshot,)
+        Overpressure of the gas in the ball, Pa.
+    """
+
+    time: NDArray[np.float64]
+    start: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    contact_pressure: NDArray[np.float64]
+    cavity_pressure: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        """Return the size of the snapshots, without their arrays."""
+        return f"<Motion: {len(self.time)} snapshots of {self.start[..., 0].size} nodes>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +72,15 @@ class Impact:
     elastic_force : ndarray, shape (n_sample,)
         Force of shell and gas, the ball force of the paper (eq. 1), N.
     floor_force : ndarray, shape (n_sample,)
-        Whole force on the floor, flux of momentum included, N.
+        Total force on the floor, flux of momentum included, N.
     parts : dict of str to ndarray, shape (n_sample,)
-        The parts that the model tells apart, N.
+        Components of the force that the model distinguishes, N.
     channels : dict of str to ndarray, shape (n_sample,)
-        Whatever else the model has to tell, such as the contact radius; the names end with units.
+        Other histories of the model, such as the contact radius; the names end with units.
     facts : dict of str to float
-        Numbers that the model chose or found, such as the bulk modulus; SI units.
+        Other numbers of the model, such as the bulk modulus; SI units.
     motion : Motion or None
-        Snapshots of the deformed ball, of models that have some.
+        Snapshots of the deformed ball; None where the model has none.
     sample_rate : float
         Samples per second, Hz.
     impact_velocity : float
@@ -54,21 +88,21 @@ class Impact:
     contact_time : float
         Time from first touch to release, s.
     peak_force : float
-        Largest elastic force, N.
+        Maximum elastic force, N.
     peak_floor_force : float
-        Largest force on the floor, N.
+        Maximum force on the floor, N.
     max_deflection : float
-        Largest deflection, m.
+        Maximum deflection, m.
     restitution : float
         Velocity at release over velocity at first touch.
     impulse : float
         Time integral of the force on the floor, N s.
     exact_contact_time : float
-        Contact time between samples, s, of models that find it in whole steps.
+        Contact time interpolated between samples, s, for models whose contact ends on a step.
     touch_time : float
         Time of first touch in the record, s.
     impulse_residual, energy_residual : float
-        How far the balances of impulse and energy miss, relative.
+        Relative residuals of the balances of impulse and energy.
     """
 
     case: Case
@@ -95,7 +129,7 @@ class Impact:
     energy_residual: float
 
     def __repr__(self) -> str:
-        """Return the numbers that describe the impact; its arrays would fill pages."""
+        """Return the main numbers of the impact, without its arrays."""
         model = self.case.model.name if self.case.model else ""
         return (
             f"<Impact, {model}: contact {1e3 * self.contact_time:.2f} ms, "
@@ -119,15 +153,13 @@ class Impact:
 
     def _part(self, name: str) -> NDArray[np.float64]:
         if name not in self.parts:
-            message = f"this model has no {name}; it has {list(self.parts)}"
+            message = f"this model has no {name}; available: {', '.join(self.parts)}"
             raise AttributeError(message)
         return self.parts[name]
 
     def force(self, kind: str = "elastic") -> NDArray[np.float64]:
         """Return the ``"elastic"`` or the ``"floor"`` force, N, shape (n_sample,)."""
-        if kind not in FORCES:
-            message = f"force = {kind!r} is not known; allowed: {', '.join(map(repr, FORCES))}"
-            raise InputError(message)
+        require_choice("force", kind, FORCES)
         return self.elastic_force if kind == "elastic" else self.floor_force
 
     def levels(
@@ -205,14 +237,14 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Returns
     -------
     Impact
-        Force, motion and the numbers that describe them.
+        Force, motion and scalar results.
 
     Raises
     ------
     InputError
         Names group, key, value and allowed range.
     NumericalError
-        Where the drop leads out of the model or the steps are too coarse.
+        Where the drop leaves the range of the model or the steps are too coarse.
     """
     return solve_case(
         Case(
@@ -230,12 +262,12 @@ def solve_case(case: Case) -> Impact:
     if case.model is None:
         message = "&model is missing; allowed: a case with a source model"
         raise InputError(message)
-    # Modes beside the impact have their own function.
+    # Free modes of the case have their own function.
     return new_impact(case, call(api.solve, case_text(replace(case, modes=None))))
 
 
 def new_impact(case: Case, found: Bundle) -> Impact:
-    """Return the impact that the library has left in a bundle."""
+    """Return the impact in a bundle of the library."""
     samples, scalars = found["samples"], found["scalars"]
     return Impact(
         case,
@@ -250,7 +282,7 @@ def new_impact(case: Case, found: Bundle) -> Impact:
 
 
 def _motion(**fields: NDArray[np.float64]) -> Motion:
-    """Return snapshots: their number first, then nodes from pole to pole and through the wall."""
+    """Return snapshots with the axes in the order of `Motion`."""
     return Motion(
         **{
             name: values if name == "start" else np.moveaxis(values, -1, 0)

@@ -1,4 +1,4 @@
-"""One key of the input."""
+"""Declaration of a key of the input."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ Kind = Literal["real", "whole", "choice", "flag", "list", "text"]
 
 @dataclass(frozen=True)
 class Key:
-    """What the library declares of a key.
+    """Key as the library declares it.
 
     Attributes
     ----------
     owner : str
-        The source model, or ``"modes"``, that uses it; empty where every impact does.
+        The source model, or ``"modes"``, that uses it; empty for keys of every impact.
     group, name : str
         Namelist group and name.
     kind : str
@@ -24,14 +24,14 @@ class Key:
     unit : str
         SI unit; empty for pure numbers.
     meaning : str
-        What it means.
+        Description.
     choices : tuple of str
-        What a choice may be.
+        Allowed values of a choice.
     lower, upper : float or str
-        Ends of the allowed range of numbers; an end that depends on other keys of the group is a
-        product or quotient of numbers and their names.
+        Limits of the allowed range; one that depends on other keys of the group is a product or
+        quotient of numbers and names of keys.
     whole : bool
-        It takes whole numbers.
+        Whether it takes whole numbers only.
     """
 
     owner: str

@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 Value = float | int | str | bool
 
-# The group that says which files a run writes does nothing for a set.
+# Group of the files that a run writes; it has no effect on sets.
 OF_FILES = "output"
 
-# Keys of studies alone: they act on the mass and on the modulus of elasticity of the ball.
+# Keys of studies only: they change the mass and the modulus of elasticity of the ball.
 DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
 @cache
 def known_keys(model: str) -> Mapping[str, Key]:
-    """Return the keys that sets of a model may differ in, by their names."""
+    """Return the keys in which sets of a model may differ, by name."""
     known = {
         key.name: key
         for key in KEYS
@@ -39,12 +39,12 @@ def known_keys(model: str) -> Mapping[str, Key]:
 
 
 def find_key(name: str, model: str) -> tuple[Key, int | None]:
-    """Return a key by its name, and which entry of a list is meant: ``"frequency(2)"``.
+    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2.
 
     Raises
     ------
     InputError
-        Where the model has no such key; lists those that it has.
+        Where the model has no such key; lists its keys.
     """
     known = known_keys(model)
     match = re.fullmatch(r"(\w+)(?:\(([1-9]\d{0,3})\))?", name)
@@ -56,20 +56,7 @@ def find_key(name: str, model: str) -> tuple[Key, int | None]:
 
 
 def put(case: Case, values: Mapping[str, object]) -> Case:
-    """Return a case with other values of some keys.
-
-    Parameters
-    ----------
-    case
-        The case.
-    values
-        Values by the names of keys, entries of lists as ``"frequency(2)"``.
-
-    Returns
-    -------
-    Case
-        The case with these values.
-    """
+    """Return a case with other values of some keys; entries of lists are named as in `find_key`."""
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
@@ -81,10 +68,7 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
         else:
             entries = list(place.get(key.name, getattr(case.model, key.name)))  # type: ignore[call-overload]
             if entry > len(entries):
-                message = (
-                    f"{name} does not exist; allowed: an entry of the {len(entries)} "
-                    f"that the case has"
-                )
+                message = f"{name} does not exist; allowed: entries 1 to {len(entries)} of the case"
                 raise InputError(message)
             entries[entry - 1] = value
             place[key.name] = tuple(entries)
@@ -105,13 +89,13 @@ def plain_words(name: str) -> str:
 
 
 def limits(key: Key, case: Case) -> tuple[float, float]:
-    """Return the ends of the allowed range of a key, those that depend on other keys for a case."""
+    """Return the limits of a key, evaluated for the other keys of a case."""
     group = getattr(case, key.group if key.group in GROUPS else "model")
     return _end(key.lower, group), _end(key.upper, group)
 
 
 def _end(end: float | str, group: object) -> float:
-    """Return the end of a range; as text it is a product or quotient of numbers and keys."""
+    """Return a limit; a text is a product or quotient of numbers and keys."""
     if not isinstance(end, str):
         return end
     value, operator = 1.0, "*"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._api import call_direct, level_api, trimmed
+from thud.checks import require_array, require_choice, require_real
 from thud.errors import InputError
 
 if TYPE_CHECKING:
@@ -49,16 +50,16 @@ class Bands:
 
 @dataclass(frozen=True)
 class Criterion:
-    """One quantity and the range that the standards ask for.
+    """One quantity and the range that the standards require.
 
     Attributes
     ----------
     name, unit : str
         Name and unit of the quantity; levels in dB re 1 N.
     value, lower, upper : float
-        Value of the source and the ends of the range, which belong to it.
+        Value of the source, and the limits, which are allowed values.
     conforms : bool
-        The value lies in the range.
+        Whether the value lies within the limits.
     """
 
     name: str
@@ -86,7 +87,7 @@ class Conformity:
 
     @property
     def conforms(self) -> bool:
-        """All criteria are met."""
+        """Whether all criteria are met."""
         return all(criterion.conforms for criterion in self.criteria)
 
     def __bool__(self) -> bool:
@@ -105,17 +106,16 @@ def get_bands(bands: str = "octave") -> Bands:
     Raises
     ------
     InputError
-        Where `bands` is something else.
+        Where `bands` is not one of these.
     """
     if not isinstance(bands, str):
-        message = f"bands = {bands!r} is not known; allowed: {', '.join(map(repr, BANDWIDTHS))}"
-        raise InputError(message)
+        require_choice("bands", bands, BANDWIDTHS)
     return _bands(bands)
 
 
 @cache
 def _bands(name: str) -> Bands:
-    """Return the bands of a set."""
+    """Return the bands of a name."""
     (n_band,) = call_direct(level_api.count_bands, _word(name))
     columns = level_api.get_bands(name, n_band)
     for column in columns:
@@ -140,20 +140,20 @@ def force_exposure_levels(
     bands
         ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
     method
-        ``"exact"``: the energy of the record as it is; ``"fft"``: the sum over the 1 Hz bins of
-        a record of 1 s, as in the paper.
+        ``"exact"``: the band energy of the finite record; ``"fft"``: the sum over the 1 Hz bins
+        of a record of 1 s, as in the paper.
 
     Returns
     -------
     ndarray, shape (n_band,)
-        Levels in ascending bands, dB re 1 N and 1 s. Bands whose energy is lost in the rounding
-        of the whole (156 dB below it) have the level of that rounding.
+        Levels in ascending bands, dB re 1 N and 1 s. The rounding error, 156 dB below the total
+        energy, is the minimum level of a band.
 
     Raises
     ------
     InputError
         Where the record is empty, zero throughout, not finite or not one-dimensional, or the
-        rate, the bands or the method cannot be used.
+        rate, the bands or the method are invalid.
     """
     count = len(get_bands(bands).nominal)
     record = _record(force)
@@ -164,19 +164,9 @@ def force_exposure_levels(
 
 
 def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
-    """Return what a force plate records of a force: the part below 1.25 kHz (paper, section 3).
+    """Return the part of a force that a force plate records, below 1.25 kHz (paper, section 3).
 
-    Parameters
-    ----------
-    force : ndarray, shape (n_sample,)
-        Force, N, that starts and ends at zero.
-    sample_rate : float
-        Samples per second, Hz.
-
-    Returns
-    -------
-    ndarray, shape (n_sample,)
-        The part, N.
+    Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
     """
     recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
     return recorded
@@ -185,17 +175,9 @@ def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.f
 def peak_count(force: ArrayLike, sample_rate: float) -> int:
     """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
 
-    Parameters
-    ----------
-    force : array_like, shape (n_sample,)
-        Force, N, that starts and ends at zero; the part below 1.25 kHz counts.
-    sample_rate : float
-        Samples per second, Hz.
-
-    Raises
-    ------
-    InputError
-        Where the record is empty, not finite or not one-dimensional, or the rate is not positive.
+    The force, N, shape (n_sample,), starts and ends at zero; only its part below 1.25 kHz is used.
+    Raise InputError where it is empty, not finite or not one-dimensional, or the rate, Hz, is not
+    positive.
     """
     record = _record(force)
     if not record.size or not np.isfinite(record).all():
@@ -233,14 +215,14 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     mass
         Mass of the source, kg.
     drop_height
-        Height of drop, m.
+        Drop height, m.
     source
         ``"rubber_ball"`` or ``"tyre"``.
 
     Raises
     ------
     InputError
-        Where the source is not known or `levels` does not hold five numbers.
+        Where the source is not known or `levels` are not five numbers.
     """
     octaves = _record(levels, "levels")
     nominal = get_bands(BANDWIDTHS[0]).nominal
@@ -279,26 +261,12 @@ def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
-    """Return a record as the library takes it."""
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError) as error:  # rows of different length
-        message = f"{name} is not an array of numbers; allowed: one dimension of real numbers"
-        raise InputError(message) from error
-    if array.ndim != 1:
-        message = f"{name} has {array.ndim} dimensions; allowed: one, of real numbers"
-        raise InputError(message)
-    if array.size and array.dtype.kind not in "iuf":
-        message = f"{name} is not an array of real numbers; allowed: one dimension of them"
-        raise InputError(message)
-    if np.ma.is_masked(values):
-        message = f"{name} has masked entries; allowed: numbers only"
-        raise InputError(message)
-    return np.ascontiguousarray(array, dtype=np.float64)
+    """Return a record as a contiguous array."""
+    return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
 def _number(name: str, value: object) -> float:
-    """Return a number as a float."""
+    """Return a number as float; raise InputError where it is not one."""
     try:
         return float(value)  # type: ignore[arg-type]
     except (OverflowError, TypeError, ValueError) as error:
@@ -308,5 +276,5 @@ def _number(name: str, value: object) -> float:
 
 
 def _word(value: object) -> bytes:
-    """Return a word for the library, which knows those of ASCII only."""
+    """Return a word in ASCII, for the library."""
     return str(value).encode("ascii", "replace")

@@ -16,33 +16,33 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# Part of the largest force below which a recording counts as noise.
+# Fraction of the maximum force below which a recording counts as noise.
 NOISE = 0.01
-# Samples that a recording needs.
+# Minimum number of samples.
 MIN_ROWS = 8
-# Sampling intervals, s.
+# Minimum and maximum sampling interval, s.
 STEPS = (1e-9, 1e3)
-# Parts of the sampling interval by which times may miss an even grid: any, and rounded ones.
+# Fractions of the sampling interval by which any times, and rounded times, may miss an even grid.
 JITTER = 1e-3
 ROUNDED = 0.25
-# Digits of a number.
+# Significant decimal digits of a float.
 DIGITS = 17
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Force of one impact as it was recorded.
+    """Recorded force of one impact.
 
     Attributes
     ----------
     time : ndarray, shape (n_sample,)
-        Time since the force first passes 1 % of its largest value, s.
+        Time since the force first exceeds 1 % of its maximum, s.
     record : ndarray, shape (n_sample,)
         Force, N.
     sample_rate : float
         Samples per second, Hz.
     origin : float
-        When the force first passes 1 % of its largest value, in the times of the file, s.
+        Time in the file at which the force first exceeds 1 % of its maximum, s.
     """
 
     time: NDArray[np.float64]
@@ -57,8 +57,8 @@ class Recording:
         Raises
         ------
         InputError
-            Where the file is missing or does not hold at least eight evenly spaced samples of a
-            force that is positive.
+            Where the file is missing or has fewer than eight samples, times that are not evenly
+            spaced, or a force that is not mainly positive.
         """
         return cls.from_arrays(read_table(path), str(path))
 
@@ -83,7 +83,7 @@ class Recording:
         if -force.min() > force.max():
             message = (
                 f"{name}: the force is mostly negative, {force.min():.4g} to {force.max():.4g} N; "
-                "allowed: the force on the floor, positive when it presses (change its sign)"
+                "allowed: the force on the floor, positive in compression (change its sign)"
             )
             raise InputError(message)
         first = np.flatnonzero(force > NOISE * force.max())[0]
@@ -97,13 +97,13 @@ class Recording:
 
     @property
     def contact_time(self) -> float:
-        """Time during which the force passes 1 % of its largest value, s."""
+        """Time during which the force exceeds 1 % of its maximum, s."""
         above = np.flatnonzero(self.record > NOISE * self.record.max())
         return float((above[-1] - above[0] + 1) / self.sample_rate)
 
     @property
     def peak_force(self) -> float:
-        """Largest force, N."""
+        """Maximum force, N."""
         return float(self.record.max())
 
     @property
@@ -112,7 +112,7 @@ class Recording:
         return float("nan")
 
     def force(self, kind: str = "floor") -> NDArray[np.float64]:  # noqa: ARG002 - there is one
-        """Return the force, N, shape (n_sample,), whatever `kind` is asked for."""
+        """Return the force, N, shape (n_sample,), for any `kind`."""
         return self.record
 
     def levels(
@@ -125,19 +125,19 @@ class Recording:
 
 
 def _even_grid(time: NDArray[np.float64], name: str) -> tuple[float, float]:
-    """Return begin and step, s, of the even grid that fits times best.
+    """Return start and step, s, of the even grid that fits times best.
 
-    Times may miss it by their rounding to the last written digit: at 44.1 kHz, six decimals are a
-    twentieth of a step.
+    Times may miss it by their rounding to the last written digit: at 44.1 kHz, the sixth decimal
+    is a twentieth of a step.
     """
     place = np.arange(len(time)) - (len(time) - 1) / 2
     with np.errstate(over="ignore", invalid="ignore"):
         step = float(place @ time / (place @ place))
-    least, most = STEPS
-    if not least <= step <= most:
+    minimum, maximum = STEPS
+    if not minimum <= step <= maximum:
         message = (
             f"{name}: the times rise by {step:.4g} s from row to row; "
-            f"allowed: {least:g} to {most:g} s"
+            f"allowed: {minimum:g} to {maximum:g} s"
         )
         raise InputError(message)
     miss = np.abs(time - time.mean() - place * step) / step
@@ -154,9 +154,9 @@ def _even_grid(time: NDArray[np.float64], name: str) -> tuple[float, float]:
 
 
 def _last_digit(time: NDArray[np.float64]) -> float:
-    """Return what the last digit of times is worth, s, by decimals or by significant digits."""
+    """Return the unit of the last digit of times, s, by decimals or by significant digits."""
     size = np.abs(time)
-    # What numbers of this size cannot tell apart.
+    # Rounding error of numbers of this size.
     rounding = 4 * np.spacing(size.max())
     scale = 10.0 ** np.floor(np.log10(np.maximum(size, rounding)))
     worth = 0.0

@@ -1,4 +1,4 @@
-"""Results of a run, read back from its directory."""
+"""Reads the results of a run back from its directory."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ import numpy as np
 from thud._schema import SCALARS
 from thud.case import Case
 from thud.errors import InputError
-from thud.impact import Impact
-from thud.motion import Motion
+from thud.impact import Impact, Motion
 
 if TYPE_CHECKING:
     import os
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
-    """Read the impact that ``thud`` or ``thud-driver run`` has written, every digit of it.
+    """Read the impact that ``thud`` or ``thud-driver run`` has written, without loss of digits.
 
     Parameters
     ----------
@@ -69,14 +68,14 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
 
 
 def _table(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Return the columns of a file by their names."""
+    """Return the columns of a CSV file by name."""
     with path.open(encoding="utf-8") as file:
         names = file.readline().strip().split(",")
         return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
 
 
 def _read_motion(folder: Path) -> Motion:
-    """Return the snapshots that a list of VTU files names."""
+    """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
     entries = re.findall(r'timestep="(.*?)" file="(.*?)"', (folder / "motion.pvd").read_text())
     shots = [_read_vtu(folder / name) for _, name in entries]
     # The first element has its first two nodes on neighbouring rings.
@@ -102,7 +101,7 @@ def _read_vtu(path: Path) -> dict[str, NDArray[Any]]:
         r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>',
         path.read_text(encoding="ascii"),
     )
-    # The length of the data stands before them, in eight bytes.
+    # The first eight bytes are the length of the data.
     return {
         name: np.frombuffer(base64.b64decode(data), f"<{kind[0].lower()}8", offset=8)
         for kind, name, data in arrays

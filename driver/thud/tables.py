@@ -9,7 +9,7 @@ if TYPE_CHECKING:
 
 
 def format_rows(rows: Iterable[Sequence[str]]) -> str:
-    """Return rows of text as lines with columns of even width.
+    """Return rows of text as lines with aligned columns.
 
     >>> print(format_rows([("octave", "level"), ("31.5", "39")]))
     octave  level

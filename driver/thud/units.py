@@ -6,7 +6,7 @@ from decimal import Decimal
 
 from thud.errors import InputError
 
-# By the unit of a key: units that may be given, and their power of ten.
+# By the unit of a key: the allowed units and their power of ten.
 MULTIPLES: dict[str, dict[str, int]] = {
     "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
     "s": {"s": 0, "ms": -3, "us": -6},
@@ -21,28 +21,16 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "K": {"K": 0},
     "": {"1": 0, "%": -2},
 }
-# Those that tables and figures choose from, ascending.
+# Units of tables and figures, ascending.
 HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
 
 
 def power_of(unit: object, key_unit: str, place: str) -> int:
-    """Return the power of ten that brings a unit to that of a key.
+    """Return the power of ten that converts a unit to that of a key.
 
-    Parameters
-    ----------
-    unit
-        The unit that is given.
-    key_unit
-        The unit of the key.
-    place
-        Where the unit stands, for the message.
-
-    Raises
-    ------
-    InputError
-        Where the unit does not fit; lists those that do.
+    Raise InputError with the place of the unit and the allowed ones where it does not fit.
     """
-    # Units without multiples are taken as they are.
+    # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
     if not isinstance(unit, str) or unit not in multiples:
         message = f"{place}: unit {unit!r} does not fit; allowed: {', '.join(multiples)}"
@@ -51,7 +39,7 @@ def power_of(unit: object, key_unit: str, place: str) -> int:
 
 
 def scaled(value: float, power: int) -> float:
-    """Return a number times a power of ten, as exactly as if it had been written that way.
+    """Return a number times a power of ten, correctly rounded.
 
     >>> scaled(35, -3)
     0.035
@@ -60,7 +48,7 @@ def scaled(value: float, power: int) -> float:
 
 
 def handy_unit(unit: str, value: float) -> tuple[str, float]:
-    """Return a unit in which a value has a digit before its point, and how many SI units it is."""
+    """Return a unit in which a value is at least 1, and its size in SI units."""
     known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
     small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
     return small[-1] if small and value else (unit, 1.0)

@@ -191,6 +191,6 @@ def test_interrupted_fit_does_not_say_that_it_is_kept(
         "parameters.mass = {}\n[target]\nlevels = [39, 31, 23, 17, 12]"
     )
     assert cli.main(["fit", "-q", "study.toml"]) == cli.INTERRUPTED
-    sentence = "thud-driver: interrupted; a fit is kept only when it is done\n"
+    sentence = "thud-driver: interrupted; nothing is written\n"
     assert capsys.readouterr().err == sentence
     assert not list((tmp_path / "outputs/study").iterdir())

@@ -109,7 +109,7 @@ def test_ended_study_goes_on_where_it_stopped(
     _, errors = process.communicate()
     if end == signal.SIGINT:
         assert process.returncode == 130
-        assert errors == "thud-driver: interrupted; what was finished is kept\n"
+        assert errors == "thud-driver: interrupted; finished results are kept\n"
     else:
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()

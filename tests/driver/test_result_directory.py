@@ -167,7 +167,7 @@ def test_figures_are_not_added_to_results_of_another_input(
 ) -> None:
     out = tmp_path / "outputs/case"
     run("b/case.nml")
-    with pytest.raises(thud.InputError, match="another input by now; allowed: "):
+    with pytest.raises(thud.InputError, match="results of another input; allowed: "):
         add_files(out, {"force.png": b""}, two_inputs["a"]["effective.nml"])
     assert read_bytes(out) == two_inputs["b"]
     add_files(out, {"force.png": b""}, two_inputs["b"]["effective.nml"])

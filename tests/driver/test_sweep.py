@@ -397,7 +397,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ),
         (
             "fixed = {model='measured_modes', frequency=[1], 'frequency(2)'=3}\nparameters.mass={}",
-            r"frequency\(2\) does not exist; allowed: an entry of the 1 that",
+            r"frequency\(2\) does not exist; allowed: entries 1 to 1 of the case",
         ),
     ],
 )  # fmt: skip

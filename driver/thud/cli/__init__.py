@@ -8,17 +8,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from thud._api import version
-from thud.cli.command import (
-    NO_FIGURES,
-    QUIET,
-    Command,
-    argument,
-    exit_code,
-    output,
-    sentence,
-)
-from thud.cli.compare import compare_cases
-from thud.cli.figures import draw_figures
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
 from thud.errors import InputError, ThudError
@@ -36,7 +27,7 @@ COMMANDS = {
             output(
                 "the results; one below it for each of several cases (default: outputs/<case name>)"
             ),
-            argument("--check", action="store_true", help="exit with 3 where a source fails"),
+            argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
             NO_FIGURES,
             argument(
                 "--animation", action="store_true", help="also motion.gif, of cases with snapshots"
@@ -60,7 +51,7 @@ COMMANDS = {
             QUIET,
         ),
         compare_cases,
-        "a page is kept only when it is done",
+        "nothing is written",
     ),
     **study_commands(),
     "figures": Command(
@@ -72,26 +63,17 @@ COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
-
-    Parameters
-    ----------
-    arguments
-        Words of the command line; by default those of this process.
-
-    Returns
-    -------
-    int
-        0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming,
-        130 interrupted.
-    """
+    """Run the command with arguments, by default those of this process; return the exit code."""
     try:
         options = _parser().parse_args(arguments)
     except SystemExit as stop:
-        # argparse leaves with 2 for bad usage, which is a numerical failure here.
+        # argparse exits with 2 for bad usage, which is a numerical failure here.
         return InputError.exit_code if stop.code else 0
     command = COMMANDS[options.name]
     try:
+        if options.output is not None and not options.output.strip():
+            message = "--output has no value; allowed: a directory"
+            raise InputError(message)
         code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt:
@@ -99,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
-            # A screen that is full or closed; what Python still wants to write goes nowhere.
+            # Standard output is full or closed: discard what is still buffered.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"thud-driver: {sentence(error)}", file=sys.stderr)
         return exit_code(error)

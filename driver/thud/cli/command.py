@@ -1,4 +1,4 @@
-"""What a command of ``thud-driver`` is, and the arguments and messages that several share."""
+"""Type of the commands of ``thud-driver``, and the arguments and messages that they share."""
 
 from __future__ import annotations
 
@@ -26,31 +26,31 @@ class Command(NamedTuple):
     function : callable
         Runs it; returns the exit code.
     kept : str
-        What an interruption leaves.
+        What remains after an interrupt, for its message.
     """
 
     help: str
     arguments: tuple[Argument, ...]
     function: Callable[[argparse.Namespace], int]
-    kept: str = "what was finished is kept"
+    kept: str = "finished results are kept"
 
 
 def argument(*names: str, **settings: object) -> Argument:
-    """Return an argument."""
+    """Return an argument from the parameters of ``add_argument``."""
     return names, settings
 
 
 def output(meaning: str, **settings: object) -> Argument:
-    """Return the argument of a directory."""
+    """Return the argument of the output directory."""
     return argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}", **settings)
 
 
-QUIET = argument("-q", "--quiet", action="store_true", help="show nothing but errors and remarks")
+QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and remarks")
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 
 
 def exit_code(error: Exception) -> int:
-    """Return the exit code of an error; a file that cannot be written is bad input."""
+    """Return the exit code of an error; an OSError counts as bad input."""
     return error.exit_code if isinstance(error, ThudError) else InputError.exit_code
 
 

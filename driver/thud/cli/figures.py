@@ -1,4 +1,4 @@
-"""The command that draws the figures of the paper and of the documentation."""
+"""The commands that only draw: comparisons, and the figures of paper and documentation."""
 
 from __future__ import annotations
 
@@ -7,17 +7,29 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.checks import require_output
+from thud.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse
+
+
+def compare_cases(options: argparse.Namespace) -> int:
+    """Compare cases and recordings; return the exit code."""
+    from thud import comparison  # noqa: PLC0415 - matplotlib takes its time
+
+    found = comparison.read_all(options.cases)
+    page = comparison.compare(found, options.force, options.source, progress=not options.quiet)
+    paths = page.save(options.output)
+    if not options.quiet:
+        print(format_rows([comparison.HEADER, *page.table()]))
+        print(f"Page: {paths[-1]}")
+    return 0
 
 
 def draw_figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper and of the documentation; return the exit code."""
     from thud import plot  # noqa: PLC0415 - matplotlib takes its time
 
-    require_output(options.output)
     folder = Path(options.output)
     folder.mkdir(parents=True, exist_ok=True)
     figures = plot.documentation_figures()

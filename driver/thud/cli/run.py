@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import signal
 import sys
-import threading
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -15,16 +13,14 @@ from tqdm import tqdm
 
 from thud._api import api, call, text
 from thud.case import Case, read_case
-from thud.checks import require_output
 from thud.cli.command import exit_code, sentence
 from thud.errors import InputError, ThudError
-from thud.files import add_files
+from thud.files import add_files, on_interrupt
 from thud.free_modes import new_modes
 from thud.impact import new_impact
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
 
     from thud._api import Bundle
 
@@ -32,7 +28,7 @@ NOT_CONFORMING = 3
 
 
 def run_cases(options: argparse.Namespace) -> int:
-    """Run cases, a bad one or not; return the exit code."""
+    """Run all cases, even where one fails; return the exit code."""
     worst = 0
     options.done = {}
     for path in tqdm(options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet):
@@ -50,7 +46,6 @@ def run_cases(options: argparse.Namespace) -> int:
 
 def _run_case(path: str, options: argparse.Namespace) -> bool:
     """Run one case as the executable does, then draw it; return whether it conforms."""
-    require_output(options.output)
     case = read_case(path)
     output = options.output or ""
     if output and len(options.cases) > 1:
@@ -58,11 +53,13 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     if case.name in options.done:
         message = (
             f"{path}: its name {case.name!r} is that of {options.done[case.name]}, "
-            "whose results it would replace; allowed: cases of different names, or one by one"
+            "whose results it would replace; allowed: different names, or separate runs"
         )
         raise InputError(message)
     options.done[case.name] = path
-    with _interruptible():
+    # An interrupt ends the process at once: Python would wait for the library, and results are
+    # switched in one step.
+    with on_interrupt(signal.SIG_DFL):
         found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
     if found["remark"]:
         tqdm.write(f"thud-driver: {text(found['remark'])}", file=sys.stderr)
@@ -76,7 +73,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
 
 
 def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, bytes]:
-    """Return the files of the figures of a run, drawn from what it has in memory."""
+    """Return the files of the figures of a run, drawn from its results in memory."""
     if not (figures or animation):
         return {}
     from thud import plot  # noqa: PLC0415 - matplotlib takes its time
@@ -91,19 +88,3 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
         if animation and impact is not None and impact.motion:
             plot.animate(impact, folder / "motion.gif")
         return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-@contextmanager
-def _interruptible() -> Iterator[None]:
-    """Let an interrupt end the process at once; Python would wait for the end of the call.
-
-    Nothing is lost: results are written as a whole, or not at all.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    usual = signal.signal(signal.SIGINT, signal.SIG_DFL)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, usual)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.checks import require_output
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
 from thud.errors import NumericalError, ThudError
 from thud.studies.directory import save
@@ -19,13 +18,13 @@ if TYPE_CHECKING:
 
     from thud.studies.kind import How
 
-_STUDY = argument("study", metavar="STUDY.toml", help="case, parameters, and what the kind needs")
+_STUDY = argument("study", metavar="STUDY.toml", help="study file")
 _SETS = (
-    argument("--yes", action="store_true", help="start however many sets there are"),
+    argument("--yes", action="store_true", help="start without limit to the number of sets"),
     argument(
         "--backend",
         choices=("threads", "processes", "dask"),
-        help="where sets are computed; the results are the same (default: threads)",
+        help="how sets are computed; the results are the same (default: threads)",
     ),
     argument("--workers", type=int, metavar="N", help="threads or processes"),
     argument("--scheduler", metavar="ADDRESS", help="of Dask, tcp://host:8786"),
@@ -44,7 +43,7 @@ def study_commands() -> dict[str, Command]:
                 _STUDY,
                 output(
                     "the results"
-                    + ("; an interrupted study goes on there" if entry.has_sets else "")
+                    + ("; an interrupted study resumes there" if entry.has_sets else "")
                     + " (default: outputs/<study name>)"
                 ),
                 *(_SETS if entry.has_sets else ()),
@@ -53,17 +52,14 @@ def study_commands() -> dict[str, Command]:
                 QUIET,
             ),
             run_study,
-            Command._field_defaults["kept"]
-            if entry.has_sets
-            else "a fit is kept only when it is done",
+            Command._field_defaults["kept"] if entry.has_sets else "nothing is written",
         )
         for name, entry in KINDS.items()
     }
 
 
 def run_study(options: argparse.Namespace) -> int:
-    """Run a study, print what it tells, save files and figures; return the exit code."""
-    require_output(options.output)
+    """Run a study, print its results, save files and figures; return the exit code."""
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
     how: How = {"progress": not options.quiet}

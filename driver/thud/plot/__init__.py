@@ -1,12 +1,19 @@
 """Figures, each in a file of its own.
 
 A file holds the function that draws its figure, as wide as a column of a journal page, and declares
-where it belongs: ``thud-driver run`` leaves ``IMPACT_FIGURES`` and ``MODES_FIGURES`` beside the
-results of a case, ``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
+its use: ``thud-driver run`` adds ``IMPACT_FIGURES`` and ``MODES_FIGURES`` to the results of a case,
+``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
 """
 
-from thud.plot.catalogue import case_figures as case_figures
-from thud.plot.catalogue import documentation_figures as documentation_figures
+import importlib
+import pkgutil
+from collections.abc import Callable
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from thud.free_modes import FreeModes
+from thud.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
@@ -34,3 +41,30 @@ from thud.plot.motion import motion as motion
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
 from thud.plot.sweep import draw_sweep as draw_sweep
 from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
+
+
+def case_figures(impact: Impact | None = None, modes: FreeModes | None = None) -> dict[str, Figure]:
+    """Draw the figures of a case that has an impact, free modes or both.
+
+    Return the figures by the names of their files, without those that have nothing to show.
+    """
+    given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes}
+    drawn = {
+        name: draw(results)
+        for kind, results in given.items()
+        if results
+        for name, draw in _declared(kind).items()
+    }
+    return {name: figure for name, figure in drawn.items() if figure}
+
+
+def documentation_figures() -> dict[str, Callable[[], Figure]]:
+    """Return functions that compute and draw the figures of the documentation, by name."""
+    return _declared("DOCUMENTATION_FIGURES")
+
+
+def _declared(kind: str) -> dict[str, Callable[..., Any]]:
+    """Return the figures that the files of this package declare under a name."""
+    found = pkgutil.iter_modules(__path__, f"{__name__}.")
+    modules = [importlib.import_module(file.name) for file in found]
+    return {name: draw for module in modules for name, draw in getattr(module, kind, {}).items()}

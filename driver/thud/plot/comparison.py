@@ -29,21 +29,8 @@ def comparison_page(
 ) -> Figure:
     """Draw forces, octave and third levels of several impacts, and a table, on one page.
 
-    Parameters
-    ----------
-    impacts
-        Impacts and recordings by name.
-    force
-        ``"elastic"`` or ``"floor"``.
-    source
-        ``"rubber_ball"`` or ``"tyre"``: whose tolerance band is drawn.
-    table
-        Header and rows of text.
-
-    Returns
-    -------
-    Figure
-        As wide as the text of a page.
+    The table is a header and rows of text; the tolerance band is that of the source. Arguments are
+    those of `thud.compare`.
     """
     figure = Figure(figsize=(2 * WIDTH, 7.5), dpi=200, layout="constrained")
     rows = figure.add_gridspec(3, 2, height_ratios=[3, 3, 0.35 + 0.25 * len(table)])

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from thud.keys import plain_words
-from thud.plot.look import COLOURS, SIZE, WIDTH, dress, new_figure
+from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,27 +19,17 @@ if TYPE_CHECKING:
 
     from thud.studies.fitting.result import Fit
 
-# More parameters than that are drawn as a table of correlations.
+# More parameters have a table of correlations.
 MAX_PARAMETERS = 5
-GREY = "0.85"
-# Letters of a label along all panels.
+# Characters of a label along all panels.
 LINE = 44
 
 
 def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
-    """Draw joint confidence regions of pairs of parameters, or their correlations.
+    """Draw joint confidence regions of two or more parameters, or their correlations.
 
-    Parameters
-    ----------
-    fit
-        A fit of two or more parameters.
-    units
-        Unit of each parameter: name, and how many SI units it is.
-
-    Returns
-    -------
-    Figure
-        One panel for each pair; correlations as a table for more than five parameters.
+    There is one panel for each pair; more than five parameters have a table of correlations. Units
+    are given by name and size in SI units.
     """
     count = len(fit.names)
     known = np.isfinite(np.diag(fit.covariance)).all()

@@ -25,17 +25,9 @@ _TINY = 0.05
 
 
 def draw_design_map(result: DesignMap) -> Figure:
-    """Draw the margin over two parameters, its zero as a line, and what meets all criteria.
+    """Draw the margin of a design map, dB, its zero as a line, and the sets that conform.
 
-    Parameters
-    ----------
-    result
-        What `design_map` gives.
-
-    Returns
-    -------
-    Figure
-        Margin in dB, positive where all octave levels lie within their limits.
+    The margin is positive where all octave levels lie within their limits.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from thud.plot.confidence import confidence
-from thud.plot.look import COLOURS, SIZE, dress, legend_above, new_figure
+from thud.plot.look import COLOURS, GREY, SIZE, dress, legend_above, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -19,31 +19,20 @@ if TYPE_CHECKING:
     from thud.studies.fitting.force_target import ForceMisfit
     from thud.studies.fitting.result import Fit
 
-# More names of bands than that are turned.
+# More names of bands are rotated.
 MAX_UPRIGHT = 5
-GREY = "0.85"
-# Names that are too long for the axis or the key.
+# Names that are too long for the axis.
 BROKEN = {"contact time": "contact\ntime", "restitution": "resti-\ntution"}
-# Where half of the samples are this part of the maximum force off, they show beside the lines.
+# Median difference, relative to the maximum force, above which the unfiltered record is drawn too.
 VISIBLE = 0.003
-# Time that is drawn before and after the contact, as part of it.
+# Time that is drawn before and after the contact, as fraction of it.
 BEFORE, AFTER = 0.15, 0.4
 
 
 def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
-    """Draw a fit, and how well several parameters are known together.
+    """Draw a fit: the figure ``"fit"`` and, of two parameters or more, ``"confidence"``.
 
-    Parameters
-    ----------
-    fit
-        The fit.
-    units
-        Unit of each parameter: name, and how many SI units it is.
-
-    Returns
-    -------
-    dict of str to Figure
-        ``"fit"``; of two parameters or more also ``"confidence"``.
+    Units are given by name and size in SI units.
     """
     figures = {"fit": target_and_fit(fit)}
     if len(fit.names) > 1:
@@ -52,18 +41,7 @@ def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figu
 
 
 def target_and_fit(fit: Fit) -> Figure:
-    """Draw target and model, and below it their difference over the uncertainty.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-
-    Returns
-    -------
-    Figure
-        Forces in kN against time in ms, or levels in dB.
-    """
+    """Draw target and model, in kN against ms or in dB, and below it their difference."""
     figure = new_figure(3.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
     dress(above)
@@ -110,7 +88,7 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
 
 
 def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
-    """Draw levels with their uncertainty, and whatever else was compared in the residuals."""
+    """Draw levels with their uncertainty, and the residuals of all quantities."""
     column = fit.misfit.columns(fit.impact, 0.0)
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
     values = {

@@ -12,7 +12,7 @@ from thud.levels import record_force
 from thud.plot.examples import solve_published
 from thud.plot.look import SIZE, Curve, add_legend, empty_axes, iterate_curves, line_style, named
 
-# Part of the maximum force above which what a force plate does not record is drawn too.
+# Unrecorded part, relative to the maximum force, above which the unfiltered force is drawn too.
 UNSEEN = 0.02
 
 
@@ -38,7 +38,7 @@ def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") 
 
 
 def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
-    """Draw forces against time as force plates record them; thin and grey, what is above that."""
+    """Draw forces against time as force plates record them, and unfiltered ones in grey."""
     peak = end = 0.0
     band = ""
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
@@ -68,7 +68,7 @@ def _draw_heights() -> Figure:
 
 
 def _draw_viscosity() -> Figure:
-    """Draw what the viscosity of the rubber does to the force."""
+    """Draw the effect of the viscosity of the rubber on the force."""
     impacts = {"viscous": solve_published(), "elastic": solve_published("none")}
     return force_history(impacts, "floor")
 

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from thud.errors import InputError
 from thud.plot.look import SIZE
 
-# A map that grows in lightness only, for any colour vision and for print.
+# Of monotonic lightness, for any colour vision and for print.
 COLOUR_MAP = "cividis"
-# More would not be readable at column width.
+# More are not readable at column width.
 MAX_PANELS = 30
 
 
 def require_panels(name: str, value: object) -> None:
-    """Raise InputError where a number of panels is not one that a figure can have."""
+    """Raise InputError where a number of panels is not allowed."""
     if not isinstance(value, int) or not 1 <= value <= MAX_PANELS:
         message = f"{name} = {value!r} is not allowed; allowed: 1 to {MAX_PANELS}"
         raise InputError(message)
@@ -45,7 +45,7 @@ def draw_section(
 
 
 def add_colour_bar(figure: Figure, panels: Any, scale: Normalize, label: str) -> None:  # noqa: ANN401 - axes or an array of them
-    """Add the scale of the colours below the panels."""
+    """Add the colour bar below the panels."""
     colours = mpl.cm.ScalarMappable(scale, COLOUR_MAP)
     bar = figure.colorbar(colours, ax=panels, location="bottom", shrink=0.7, aspect=30, pad=0.02)
     bar.set_label(label, fontsize=SIZE)

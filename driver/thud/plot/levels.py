@@ -68,7 +68,7 @@ def draw_tolerance(axes: Axes, source: str) -> None:
 
 
 def _draw_models() -> Figure:
-    """Draw what the paper had, its improvement, and the finite elements."""
+    """Draw the model of the paper, its improvement, and the finite elements."""
     impacts = {
         "hollow sphere": solve(),
         "modal ball": solve(model="modal_ball"),
@@ -78,7 +78,7 @@ def _draw_models() -> Figure:
 
 
 def _draw_fluxes() -> Figure:
-    """Draw the readings of the paper's flux term."""
+    """Draw the interpretations of the flux term of the paper."""
     choices = ("momentum_balance", "retarding", "conservative", "none")
     return levels({choice: solve(momentum_flux=choice) for choice in choices}, "elastic")
 

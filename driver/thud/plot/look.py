@@ -27,6 +27,8 @@ Curve = TypeVar("Curve", bound=Impact | Recording)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+# Areas behind curves.
+GREY = "0.85"
 # Width of a column, inch, and size of text, pt.
 WIDTH = 3.5
 SIZE = 8
@@ -59,7 +61,7 @@ def dress(axes: Axes) -> Axes:
 def legend_above(
     axes: Axes, columns: int, place: Literal["lower left", "lower right"] = "lower left"
 ) -> Legend:
-    """Put the legend over the axes, where no curve is; `place` is its corner that stays there."""
+    """Put the legend above the axes; `place` is its corner that is fixed to them."""
     return axes.legend(
         fontsize=SIZE - 1, frameon=False, ncols=columns, loc=place,
         bbox_to_anchor=(float(place == "lower right"), 1), **COMPACT,
@@ -67,7 +69,7 @@ def legend_above(
 
 
 def literal(label: str) -> str:
-    """Return a label in which matplotlib finds no formula, and that it does not hide."""
+    """Return a label that matplotlib neither takes for a formula nor hides."""
     return label.lstrip("_").replace("$", r"\$")
 
 
@@ -94,7 +96,7 @@ def add_curves(
 
 
 def named(impact: Impact) -> dict[str, Impact]:
-    """Return an impact by the name of its case in words."""
+    """Return an impact by the name of its case, in words."""
     return {impact.case.name.replace("_", " "): impact}
 
 
@@ -109,7 +111,7 @@ def iterate_curves(
         Where `impacts` is not a mapping of names to impacts, or empty.
     """
     if not isinstance(impacts, Mapping) or not impacts:
-        message = "impacts are not given; allowed: a mapping of names to impacts, at least one"
+        message = "impacts are not given; allowed: a mapping of names to one or more impacts"
         raise InputError(message)
     for name, impact in impacts.items():
         require_kind(name, impact, Impact | Recording)
@@ -123,13 +125,13 @@ def iterate_curves(
 
 
 def add_legend(axes: Axes, impacts: Mapping[str, Impact]) -> None:
-    """Add the legend; a single impact gives it its name."""
+    """Add the legend, titled by the name of a single impact."""
     title = literal(next(iter(impacts))) if len(impacts) == 1 else None
     axes.legend(fontsize=SIZE, frameon=False, title=title, title_fontsize=SIZE)
 
 
 def octave_axis(axes: Axes, bands: str = "octave") -> None:
-    """Name the bands."""
+    """Label the axis with the bands."""
     names = [f"{frequency:g}" for frequency in get_bands(bands).nominal]
     axes.set_xticks(np.arange(len(names)), names)
     axes.xaxis.set_minor_locator(NullLocator())
@@ -150,14 +152,14 @@ def octave_boxes(
 
 
 def save(figure: Figure, path: str | os.PathLike[str]) -> None:
-    """Save a figure in the format of the path's ending, completely or not at all.
+    """Save a figure atomically, in the format of the ending of its path.
 
     Parameters
     ----------
     figure
         The figure.
     path
-        Path of the file; an older one is replaced.
+        Path of the file; an existing one is replaced.
 
     Raises
     ------
@@ -171,7 +173,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         message = f"{path}: ending {kind!r} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
     content = io.BytesIO()
-    # Without a date and with names that do not change, the same figure gives the same bytes.
+    # Without a date and with constant names, the same figure gives the same bytes.
     metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     with mpl.rc_context({"svg.hashsalt": "thud"}):
         figure.savefig(content, format=kind, metadata=metadata)

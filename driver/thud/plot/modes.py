@@ -13,7 +13,7 @@ from thud.plot.examples import PUBLISHED
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure
 
-# Part of the radius that the maximum displacement of a mode is drawn with.
+# Drawn maximum displacement of a mode, as fraction of the radius.
 AMPLITUDE = 0.3
 
 

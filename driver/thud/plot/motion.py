@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.files import replace_file
-from thud.impact import Impact
-from thud.motion import Motion
+from thud.impact import Impact, Motion
 from thud.plot.examples import solve_published
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure
@@ -46,7 +45,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     Raises
     ------
     InputError
-        Where the impact has no snapshots, or no figure has so many panels.
+        Where the impact has no snapshots, or there are too many instants.
     """
     shown = _snapshots(impact)
     require_panels("instants", instants)
@@ -122,7 +121,7 @@ def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
 
 
 def _label(impact: Impact) -> str:
-    """Return what colours and arrows mean."""
+    """Return the meaning of colours and arrows."""
     return f"Displacement, mm (arrows: a third of the radius is {impact.impact_velocity:.1f} m/s)"
 
 

@@ -18,26 +18,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Which = Literal["x", "y"]
-# Numbers outside of these, of a parameter that has its key's unit, are shown in a handier one.
+# Outside of these, numbers in the unit of the key are shown in a handier unit.
 _PLAIN = (1e-2, 1e4)
-# Maximum over minimum, from which ticks of a logarithmic axis are 1, 2, 5, and powers of ten.
+# Maximum over minimum from which logarithmic ticks are 1, 2, 5, and powers of ten.
 _HALF_DECADE, _DECADES = 5.0, 200.0
 
 
 def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
     """Give an axis the name, unit and scale of a numeric parameter.
 
-    Parameters
-    ----------
-    axes, which
-        The axes, and which of them: ``"x"`` or ``"y"``.
-    parameter
-        Values of the parameter, with the attributes of the dataset.
-
-    Returns
-    -------
-    float
-        What the values have to be multiplied by for the axis.
+    The parameter has the attributes of the dataset. Return the factor of its values on the axis.
     """
     unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_power"])
     values = parameter.values

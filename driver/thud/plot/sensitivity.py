@@ -18,15 +18,7 @@ if TYPE_CHECKING:
 def draw_sensitivity(result: Sensitivity) -> Figure:
     """Draw total Sobol indices as bars, first orders as marks on them, both with intervals.
 
-    Parameters
-    ----------
-    result
-        What `sensitivity` gives.
-
-    Returns
-    -------
-    Figure
-        One group of bars for each output.
+    There is one group of bars for each output.
     """
     indices = result.indices
     parameters = [str(name) for name in indices["parameter"].values]

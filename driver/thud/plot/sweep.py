@@ -20,18 +20,18 @@ if TYPE_CHECKING:
 
     Columns = dict[str, NDArray[Any]]
 
-# More values of a parameter than this are put into as many classes.
+# More values of a parameter are grouped in classes.
 _MAX_VALUES = 32
 _CLASSES = 16
-# More points of a line than this have no markers, half as many in half the width.
+# Maximum number of markers of a line; half of it in half the width.
 _MAX_MARKS = 16
-# Texts of a parameter up to this many have a panel each.
+# Maximum number of values of a text parameter that have a panel each.
 _MAX_PANELS = 6
 _TINY = 0.05
 
 
 class _Judged(NamedTuple):
-    """Levels of each set less the nominal ones, minimum and maximum tolerance of all, dB."""
+    """Levels minus nominal levels of each set, minimum and maximum tolerance, dB."""
 
     excess: NDArray[np.float64]
     tolerance: tuple[float, float]
@@ -40,18 +40,9 @@ class _Judged(NamedTuple):
 def draw_sweep(dataset: xr.Dataset) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
-    Each value of the first parameter of texts, up to six of them, has its panel. Lines are medians
-    over the other parameters, shades reach from the minimum to the maximum.
-
-    Parameters
-    ----------
-    dataset
-        What `sweep` gives.
-
-    Returns
-    -------
-    Figure
-        Level of the judged force over nominal level, dB.
+    Levels are those of the judged force relative to the nominal ones, dB. Each value of the first
+    text parameter, up to six of them, has its panel. Lines are medians over the other parameters,
+    shades extend from the minimum to the maximum.
     """
     columns = _columns(dataset)
     varied = [name for name, values in columns.items() if len(np.unique(values)) > 1]
@@ -91,7 +82,7 @@ def _columns(dataset: xr.Dataset) -> Columns:
 
 
 def _judge(dataset: xr.Dataset, columns: Columns) -> _Judged:
-    """Return the levels of each set's judged force against the nominal ones of its source."""
+    """Return the levels of the judged force relative to the nominal levels of the source."""
     levels = {
         force: dataset[f"{force}_level"].values.reshape(-1, len(dataset["octave"]))
         for force in FORCES
@@ -144,7 +135,7 @@ def _draw_octaves(
 def _classes(
     values: NDArray[Any],
 ) -> tuple[NDArray[np.float64], list[NDArray[np.bool_]], list[str] | None]:
-    """Return places on an axis, which sets belong to each, and their names where they have some."""
+    """Return places on an axis, the sets of each, and the names of texts."""
     found = np.unique(values)
     if values.dtype.kind not in "iuf":
         members = [values == value for value in found]
@@ -158,13 +149,13 @@ def _classes(
 
 
 def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of NumPy
-    """Return what a function makes of numbers; NaN where there are none."""
+    """Return a function of the finite numbers; NaN where there are none."""
     known = part[np.isfinite(part)]
     return float(function(known)) if known.size else np.nan
 
 
 def _add_legend(figure: Figure, judged: _Judged, split: str | None, others: list[str]) -> None:
-    """Name the octaves over the panels, and what panels, lines, shades and grey are."""
+    """Add the legend above the panels, with the meaning of panels, lines, shades and grey."""
     minimum, maximum = judged.tolerance
     lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:

@@ -16,17 +16,9 @@ if TYPE_CHECKING:
 
 
 def draw_uncertainty(result: Uncertainty) -> Figure:
-    """Draw the distribution of each octave level over the tolerances of the standards.
+    """Draw the distribution of octave levels over the tolerances of the standards.
 
-    Parameters
-    ----------
-    result
-        What `uncertainty` gives.
-
-    Returns
-    -------
-    Figure
-        Level over nominal level, dB; bars reach over 95 % of the sets.
+    Levels are relative to the nominal ones, dB; bars cover 95 % of the sets.
     """
     lower, upper = octave_limits(result.source)
     nominal = (lower + upper) / 2
