@@ -223,8 +223,8 @@ class FiniteElement:
         Part of the shear modulus with the second invariant, of mooney_rivlin; 0 <= mooney_share <=
         1; group ``&material``.
     bulk_ratio : float
-        Most bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <= bulk_ratio
-        <= 100000; group ``&material``.
+        Maximum bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <=
+        bulk_ratio <= 100000; group ``&material``.
     viscosity : str
         Law of viscosity; "none", "kelvin_voigt", "constant_loss", "prony"; group ``&material``.
     loss_factor : float
@@ -339,9 +339,9 @@ GROUPS = {
 # Unit and meaning of the numbers that describe an impact.
 SCALARS = {
     "contact_time": ("s", "contact time"),
-    "peak_force": ("N", "largest elastic force"),
-    "peak_floor_force": ("N", "largest force on the floor"),
-    "max_deflection": ("m", "largest deflection"),
+    "peak_force": ("N", "maximum elastic force"),
+    "peak_floor_force": ("N", "maximum force on the floor"),
+    "max_deflection": ("m", "maximum deflection"),
     "restitution": ("", "coefficient of restitution"),
     "impulse": ("N s", "time integral of the force on the floor"),
     "impact_velocity": ("m/s", "velocity at first touch"),
@@ -390,7 +390,7 @@ KEYS = (
     Key("finite_element", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
     Key("finite_element", "material", "mooney_share", "real", "", "part of the shear modulus with the second invariant, of mooney_rivlin", (), 0.0, 1.0),
-    Key("finite_element", "material", "bulk_ratio", "real", "", "most bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
+    Key("finite_element", "material", "bulk_ratio", "real", "", "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
     Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'constant_loss', 'prony')),
     Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
     Key("finite_element", "material", "loss_frequency", "real", "Hz", "where the ball's modulus is the storage modulus", (), 1.0, 10000.0),

@@ -1,14 +1,14 @@
 !> The flat API for Python: plain arguments, explicit shapes, a status. f2py wraps these procedures and nothing
 !> else; they pass on and decide nothing.
 !>
-!> Results are bundles that say themselves what they hold: a procedure leaves one and gives its handle and its
-!> sizes; `collect` hands it over and frees it. `status` is 0, or the code of the error whose sentence is the text
-!> `message` of the bundle. Procedures marked `threadsafe` let other Python threads run meanwhile.
+!> Results are self-describing bundles: a procedure leaves one and returns its handle and its sizes; `collect` hands
+!> it over and frees it. `status` is 0, or the code of the error whose sentence is the text `message` of the bundle.
+!> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
    use thud_bundle, only: bundle_type, leave, take
-   use thud_case, only: case_type
+   use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, get_loss_factors, results_type
+   use thud_compute, only: compute_case, results_type
    use thud_constants, only: compiler, version
    use thud_error, only: error_type
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
@@ -28,10 +28,8 @@ contains
       !f2py threadsafe
       !> Handle of the bundle; it can be used once.
       integer(int64), intent(in) :: handle
-      !> Size of its header and its texts.
-      integer, intent(in) :: n_byte
-      !> Number of its numbers, at least 1.
-      integer, intent(in) :: n_value
+      !> Size of its header and its texts; number of its numbers, at least 1.
+      integer, intent(in) :: n_byte, n_value
       !> Header, a zero, and texts: [n_byte].
       integer(int8), intent(out) :: bytes(n_byte)
       !> The numbers, in the order of the header: [n_value].
@@ -47,14 +45,9 @@ contains
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> 0; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(error_type), allocatable :: error
 
@@ -66,17 +59,11 @@ contains
 
    !> The full input of a namelist file.
    subroutine effective_case(path, status, handle, n_byte, n_value)
-      ! Not threadsafe: functions of its texts keep their lengths in static memory.
-      !> Path of the file.
+      ! Not threadsafe: functions with deferred-length texts keep the length in static memory.
       character(len=*), intent(in) :: path
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(error_type), allocatable :: error
@@ -94,16 +81,10 @@ contains
    !> Whether the text of a namelist file is a case.
    subroutine check_text(text, status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> The text.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(error_type), allocatable :: error
@@ -118,14 +99,9 @@ contains
       !f2py threadsafe
       !> Text of a namelist file.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(results_type) :: results
@@ -140,12 +116,11 @@ contains
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, history)
-      !> The bundle.
       type(bundle_type), intent(inout) :: bundle
-      !> The history.
       type(force_history_type), intent(in) :: history
       real(wp) :: scalars(size(scalar_fields))
-      integer :: i, n(1)
+      integer :: n(1)
+      integer :: i
 
       n = size(history%deflection)
       scalars = get_scalars(history)
@@ -183,14 +158,9 @@ contains
       ! Not threadsafe: ARPACK keeps its state in static memory.
       !> Text of a namelist file with the group `&modes`.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(results_type) :: results
@@ -206,9 +176,7 @@ contains
 
    !> Adds free modes to a bundle.
    subroutine add_modes(bundle, modes)
-      !> The bundle.
       type(bundle_type), intent(inout) :: bundle
-      !> The modes.
       type(free_modes_type), intent(in) :: modes
 
       call bundle%add_array('modes.frequency', shape(modes%frequency), modes%frequency)
@@ -230,14 +198,9 @@ contains
       integer, intent(in) :: n
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(n)
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(error_type), allocatable :: error
@@ -245,28 +208,25 @@ contains
 
       allocate (bundle)
       call read_case(text, 'python', case, error)
-      if (.not. allocated(error)) call get_loss_factors(case, frequency, loss_factor, error)
+      if (.not. allocated(error)) then
+         associate (model => case%models(get_model_number(case))%model)
+            call model%get_loss_factors(case%ball, frequency, loss_factor, error)
+         end associate
+      end if
       if (.not. allocated(error)) call bundle%add_array('loss_factors', [n], loss_factor)
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine loss_factors
 
    !> Runs a namelist file as the executable does, and keeps what it has computed.
    subroutine run(path, output, progress, status, handle, n_byte, n_value)
-      ! Not threadsafe: functions of its texts keep their lengths in static memory.
-      !> Path of the file.
-      character(len=*), intent(in) :: path
-      !> Output directory, empty for the default.
-      character(len=*), intent(in) :: output
+      ! Not threadsafe: functions with deferred-length texts keep the length in static memory.
+      !> Path of the file; output directory, empty for the default.
+      character(len=*), intent(in) :: path, output
       !> 1 to show progress on a terminal.
       integer, intent(in) :: progress
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(results_type) :: results

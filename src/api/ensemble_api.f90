@@ -21,14 +21,9 @@ contains
       !f2py threadsafe
       !> Text of a namelist file.
       character(len=*), intent(in) :: text
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> The handle.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(many_type) :: many
@@ -52,26 +47,16 @@ contains
    subroutine drop_many(text, names, n_column, n_drop, values, threads, judged, n_outcome, n_band, n_force, n_sample, &
       n_kept, drop_status, outcome, level, conforms, margin, verdict, force, status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> Text of a namelist file.
-      character(len=*), intent(in) :: text
-      !> Names of the keys, with commas between.
-      character(len=*), intent(in) :: names
-      !> Number of keys.
-      integer, intent(in) :: n_column
-      !> Number of drops.
-      integer, intent(in) :: n_drop
+      !> Text of a namelist file; names of the keys, with commas between.
+      character(len=*), intent(in) :: text, names
+      !> Numbers of keys, drops and threads.
+      integer, intent(in) :: n_column, n_drop, threads
       !> Values of the keys, of a choice its number from 1: [n_column, n_drop].
       real(wp), intent(in) :: values(n_column, n_drop)
-      !> Number of threads.
-      integer, intent(in) :: threads
       !> 0 where neither levels nor verdicts are wanted.
       integer, intent(in) :: judged
-      !> Numbers of an outcome, from `size_many`, as the next three.
-      integer, intent(in) :: n_outcome
-      !> Bands, octaves first.
-      integer, intent(in) :: n_band
-      !> Kinds of force.
-      integer, intent(in) :: n_force
+      !> Numbers of outcomes, bands and forces, from `size_many`.
+      integer, intent(in) :: n_outcome, n_band, n_force
       !> Samples of each record, or 1 where no forces are wanted.
       integer, intent(in) :: n_sample
       !> Drops whose forces are wanted, n_drop or 1.
@@ -90,14 +75,9 @@ contains
       integer, intent(out) :: verdict(n_drop)
       !> Forces, N: [n_sample, n_force, n_kept].
       real(wp), intent(out) :: force(n_sample, n_force, n_kept)
-      !> Status; this and the next three as in `leave`.
-      integer, intent(out) :: status
-      !> Handle of the sentences of the errors.
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
-      !> Size of the texts.
-      integer, intent(out) :: n_byte
-      !> Number of numbers.
-      integer, intent(out) :: n_value
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
       type(column_type), allocatable :: columns(:)

@@ -18,12 +18,8 @@ contains
    !> Numbers of band sets, of sources and of criteria.
    subroutine count_names(n_set, n_source, n_criterion)
       !f2py threadsafe
-      !> Number of band sets.
-      integer, intent(out) :: n_set
-      !> Number of sources with limits.
-      integer, intent(out) :: n_source
-      !> Number of criteria of a verdict.
-      integer, intent(out) :: n_criterion
+      !> Numbers of band sets, of sources with limits, and of criteria of a verdict.
+      integer, intent(out) :: n_set, n_source, n_criterion
 
       n_set = size(band_set_names)
       n_source = size(source_names)
@@ -33,10 +29,8 @@ contains
    !> Names of band sets and sources.
    subroutine get_names(n_set, n_source, sets, sources)
       !f2py threadsafe
-      !> Number of band sets, from `count_names`, as the next.
-      integer, intent(in) :: n_set
-      !> Number of sources.
-      integer, intent(in) :: n_source
+      !> Numbers of band sets and sources, from `count_names`.
+      integer, intent(in) :: n_set, n_source
       !> Band sets; verdicts use the first: [n_set].
       character(len=24), intent(out) :: sets(n_set)
       !> Sources with limits: [n_source].
@@ -49,13 +43,10 @@ contains
    !> Number of bands of a set.
    subroutine count_bands(set, n_band, status, message)
       !f2py threadsafe
-      !> Name of the set.
       character(len=*), intent(in) :: set
-      !> Number of bands.
       integer, intent(out) :: n_band
-      !> Code of the error, or 0.
+      !> Code of the error, or 0, and its sentence.
       integer, intent(out) :: status
-      !> Sentence of the error.
       character(len=1024), intent(out) :: message
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
@@ -68,18 +59,13 @@ contains
    !> Bands of a set.
    subroutine get_bands(set, n_band, nominal, centre, lower, upper)
       !f2py threadsafe
-      !> Name of the set.
       character(len=*), intent(in) :: set
       !> Number of bands, from `count_bands`.
       integer, intent(in) :: n_band
-      !> Rounded mid frequencies, Hz: [n_band].
-      real(wp), intent(out) :: nominal(n_band)
-      !> Exact mid frequencies, Hz: [n_band].
-      real(wp), intent(out) :: centre(n_band)
-      !> Lower edges, Hz: [n_band].
-      real(wp), intent(out) :: lower(n_band)
-      !> Upper edges, Hz: [n_band].
-      real(wp), intent(out) :: upper(n_band)
+      !> Rounded and exact mid frequencies, Hz: [n_band].
+      real(wp), intent(out) :: nominal(n_band), centre(n_band)
+      !> Edges, Hz: [n_band].
+      real(wp), intent(out) :: lower(n_band), upper(n_band)
       type(band_type) :: bands(n_band)
 
       bands = get_set_bands(set)
@@ -93,23 +79,19 @@ contains
    subroutine force_exposure(force, n_sample, sample_rate, set, method, n_band, levels, status, message)
       !f2py threadsafe
       !f2py integer, intent(hide), depend(force) :: n_sample = len(force)
-      !> Number of samples.
       integer, intent(in) :: n_sample
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(n_sample)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Name of the band set.
-      character(len=*), intent(in) :: set
-      !> `exact` or `fft`.
-      character(len=*), intent(in) :: method
+      !> Name of the band set; `exact` or `fft`.
+      character(len=*), intent(in) :: set, method
       !> Number of bands, from `count_bands`.
       integer, intent(in) :: n_band
       !> Levels, dB: [n_band].
       real(wp), intent(out) :: levels(n_band)
-      !> Code of the error, or 0.
+      !> Code of the error, or 0, and its sentence.
       integer, intent(out) :: status
-      !> Sentence of the error.
       character(len=1024), intent(out) :: message
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
@@ -124,13 +106,11 @@ contains
    subroutine count_peaks(force, n_sample, sample_rate, n_peak)
       !f2py threadsafe
       !f2py integer, intent(hide), depend(force) :: n_sample = len(force)
-      !> Number of samples.
       integer, intent(in) :: n_sample
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(n_sample)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Number of peaks.
       integer, intent(out) :: n_peak
 
       n_peak = get_peak_count(force, sample_rate)
@@ -140,7 +120,6 @@ contains
    subroutine record_force(force, n_sample, sample_rate, recorded)
       !f2py threadsafe
       !f2py integer, intent(hide), depend(force) :: n_sample = len(force)
-      !> Number of samples.
       integer, intent(in) :: n_sample
       !> Force, N: [n_sample].
       real(wp), intent(in) :: force(n_sample)
@@ -159,37 +138,22 @@ contains
       !f2py integer, intent(hide), depend(levels) :: n_octave = len(levels)
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
-      !> Number of octaves.
       integer, intent(in) :: n_octave
       !> Octave levels, dB: [n_octave].
       real(wp), intent(in) :: levels(n_octave)
-      !> Contact time, s.
-      real(wp), intent(in) :: contact_time
-      !> Coefficient of restitution.
-      real(wp), intent(in) :: restitution
-      !> Number of peaks of the force.
-      integer, intent(in) :: n_peak
-      !> Mass, kg.
-      real(wp), intent(in) :: mass
-      !> Height of drop, m.
-      real(wp), intent(in) :: drop_height
-      !> Number of criteria, from `count_names`.
-      integer, intent(in) :: n_criterion
-      !> Names of the criteria: [n_criterion].
+      !> Contact time, s, coefficient of restitution, mass, kg, and drop height, m.
+      real(wp), intent(in) :: contact_time, restitution, mass, drop_height
+      !> Number of peaks of the force; number of criteria, from `count_names`.
+      integer, intent(in) :: n_peak, n_criterion
+      !> Names and units of the criteria: [n_criterion].
       character(len=24), intent(out) :: names(n_criterion)
-      !> Units of the criteria: [n_criterion].
       character(len=8), intent(out) :: units(n_criterion)
-      !> Values: [n_criterion].
-      real(wp), intent(out) :: value(n_criterion)
-      !> Minimum conforming values: [n_criterion].
-      real(wp), intent(out) :: lower(n_criterion)
-      !> Maximum conforming values: [n_criterion].
-      real(wp), intent(out) :: upper(n_criterion)
+      !> Values, minimum and maximum conforming ones: [n_criterion].
+      real(wp), intent(out) :: value(n_criterion), lower(n_criterion), upper(n_criterion)
       !> 1 where the criterion is met, else 0: [n_criterion].
       integer, intent(out) :: met(n_criterion)
-      !> Code of the error, or 0.
+      !> Code of the error, or 0, and its sentence.
       integer, intent(out) :: status
-      !> Sentence of the error.
       character(len=1024), intent(out) :: message
       type(criterion_type) :: criteria(criterion_count)
       type(source_limits_type) :: limits

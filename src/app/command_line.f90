@@ -19,7 +19,7 @@ module thud_command_line
    !> Exit code where the source does not conform and `--check` asks for it.
    integer, parameter :: not_conforming = 3
 
-   !> Most threads, and how that is said.
+   !> Maximum number of threads, and the allowed range as text.
    integer, parameter :: max_threads = 1024
    character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
 
@@ -57,10 +57,10 @@ contains
       call prepare_process()
       call parse_arguments(request, error)
       if (allocated(error)) then
-         call say(standard_error, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)
+         call write_line(standard_error, 'thud: '//error%message//newline//'Usage: '//usage(), exit_code)
          exit_code = bad_input
       else if (allocated(request%information)) then
-         call say(standard_output, request%information, exit_code)
+         call write_line(standard_output, request%information, exit_code)
       else
          if (.not. request%quiet) call begin_progress()
          if (request%sets == '') then
@@ -70,21 +70,21 @@ contains
          end if
          call end_progress()
          if (allocated(error)) then
-            call say(standard_error, 'thud: '//error%message, exit_code)
+            call write_line(standard_error, 'thud: '//error%message, exit_code)
             exit_code = error%code
             return
          end if
-         if (outcome%remark /= '') call say(standard_error, 'thud: '//outcome%remark, exit_code)
-         if (.not. request%quiet) call say(standard_output, outcome%table//'  Results: '//outcome%directory, exit_code)
+         if (outcome%remark /= '') call write_line(standard_error, 'thud: '//outcome%remark, exit_code)
+         if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: ' &
+            //outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming
       end if
    end subroutine execute
 
    !> Writes to the screen; a closed or full output is an error.
-   subroutine say(descriptor, text, exit_code)
+   subroutine write_line(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
-      !> The text.
       character(len=*), intent(in) :: text
       !> Becomes 1 where the text could not be written.
       integer, intent(inout) :: exit_code
@@ -95,11 +95,10 @@ contains
       exit_code = bad_input
       if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
          //get_system_message(status)//'); allowed: a screen, a pipe that is read, or a disk with space'//newline, status)
-   end subroutine say
+   end subroutine write_line
 
-   !> Turns the arguments into a request.
+   !> Makes a request of the arguments.
    subroutine parse_arguments(request, error)
-      !> What is asked for.
       type(request_type), intent(out) :: request
       !> An argument is unknown, missing or given twice.
       type(error_type), allocatable, intent(out) :: error
@@ -155,15 +154,13 @@ contains
       end if
    end subroutine parse_arguments
 
-   !> The value behind an option.
+   !> The value of an option.
    subroutine take_value(i, option, allowed, value, error)
       !> Number of the argument, of the option before and of its value after.
       integer, intent(inout) :: i
-      !> The option.
       character(len=*), intent(in) :: option
       !> What it takes.
       character(len=*), intent(in) :: allowed
-      !> The value.
       character(len=:), allocatable, intent(inout) :: value
       !> There is none.
       type(error_type), allocatable, intent(out) :: error
@@ -176,9 +173,7 @@ contains
 
    !> A number of threads.
    subroutine take_threads(text, threads, error)
-      !> The number as text.
       character(len=*), intent(in) :: text
-      !> The number.
       integer, intent(out) :: threads
       !> It is none.
       type(error_type), allocatable, intent(out) :: error
@@ -193,7 +188,6 @@ contains
    function get_argument(i) result(argument)
       !> Number of the argument.
       integer, intent(in) :: i
-      !> Its text.
       character(len=:), allocatable :: argument
       integer :: length
 
@@ -204,7 +198,6 @@ contains
 
    !> One line on how to call the program.
    pure function usage() result(text)
-      !> The line.
       character(len=:), allocatable :: text
 
       text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--check] [--quiet] | --keys | --schema | ' &

@@ -1,5 +1,4 @@
-!> Results by name: texts, numbers and arrays of any count, for callers that learn from the bundle itself what
-!> it holds.
+!> Results by name: texts, numbers and arrays of any count, self-describing for callers.
 module thud_bundle
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_intptr_t, c_loc, c_null_ptr, c_ptr
    use thud_error, only: error_type
@@ -12,7 +11,7 @@ module thud_bundle
 
    !> Numbers of one item.
    type :: item_type
-      !> They, in Fortran's order: [n].
+      !> The numbers, in Fortran's order: [n].
       real(wp), allocatable :: values(:)
    end type item_type
 
@@ -43,12 +42,8 @@ contains
 
    !> Adds a text.
    subroutine add_text(self, name, text)
-      !> The bundle.
       class(bundle_type), intent(inout) :: self
-      !> Name of the text.
-      character(len=*), intent(in) :: name
-      !> The text.
-      character(len=*), intent(in) :: text
+      character(len=*), intent(in) :: name, text
 
       call add_line(self, name, 't'//to_text(len(text)))
       if (.not. allocated(self%text)) self%text = ''
@@ -57,11 +52,8 @@ contains
 
    !> Adds a number.
    subroutine add_number(self, name, value)
-      !> The bundle.
       class(bundle_type), intent(inout) :: self
-      !> Name of the number.
       character(len=*), intent(in) :: name
-      !> The number.
       real(wp), intent(in) :: value
 
       call add_line(self, name, '')
@@ -70,13 +62,10 @@ contains
 
    !> Adds an array of any rank.
    subroutine add_array(self, name, extents, values)
-      !> The bundle.
       class(bundle_type), intent(inout) :: self
-      !> Name of the array.
       character(len=*), intent(in) :: name
       !> Its extents: [rank].
       integer, intent(in) :: extents(:)
-      !> Its elements.
       real(wp), intent(in) :: values(*)
       character(len=:), allocatable :: form
       integer :: i
@@ -91,12 +80,9 @@ contains
 
    !> Adds a line to the header.
    subroutine add_line(self, name, form)
-      !> The bundle.
       type(bundle_type), intent(inout) :: self
-      !> Name of the item.
-      character(len=*), intent(in) :: name
-      !> What it is.
-      character(len=*), intent(in) :: form
+      !> Name of the item; what it is.
+      character(len=*), intent(in) :: name, form
 
       if (.not. allocated(self%header)) self%header = ''
       self%header = self%header//trim(name)//tab//form//line_feed
@@ -104,11 +90,9 @@ contains
 
    !> Adds an array.
    subroutine add_item(self, n, values)
-      !> The bundle.
       type(bundle_type), intent(inout) :: self
       !> Number of elements.
       integer, intent(in) :: n
-      !> The elements.
       real(wp), intent(in) :: values(n)
       type(item_type), allocatable :: more(:)
       integer :: i
@@ -127,21 +111,16 @@ contains
 
    !> Number of all numbers.
    pure function count_values(self) result(n)
-      !> The bundle.
       class(bundle_type), intent(in) :: self
       !> Their number.
       integer :: n
       integer :: i
 
-      n = 0
-      do i = 1, self%n_item
-         n = n + size(self%items(i)%values)
-      end do
+      n = sum([(size(self%items(i)%values), i=1, self%n_item)])
    end function count_values
 
    !> All numbers in the order of the header.
    pure subroutine copy_values(self, values)
-      !> The bundle.
       class(bundle_type), intent(in) :: self
       !> The numbers: [count_values].
       real(wp), intent(out) :: values(:)
@@ -158,17 +137,15 @@ contains
 
    !> Leaves a bundle to be collected, of an error its sentence alone.
    subroutine leave(bundle, error, status, handle, n_byte, n_value)
-      !> The bundle.
       type(bundle_type), pointer, intent(inout) :: bundle
       !> What went wrong.
       type(error_type), allocatable, intent(in) :: error
       !> Code of the error, or 0.
       integer, intent(out) :: status
-      !> Handle of the bundle.
       integer(int64), intent(out) :: handle
       !> Size of its header and its texts.
       integer, intent(out) :: n_byte
-      !> Number of its numbers, at least 1: f2py knows no empty arrays.
+      !> Number of its numbers, at least 1: f2py has no empty arrays.
       integer, intent(out) :: n_value
 
       status = 0
@@ -185,11 +162,10 @@ contains
       n_value = max(1, bundle%count_values())
    end subroutine leave
 
-   !> The bundle behind a handle; who takes it frees it.
+   !> The bundle of a handle; the caller frees it.
    subroutine take(handle, bundle)
       !> Handle of a bundle that was left and not yet taken.
       integer(int64), intent(in) :: handle
-      !> The bundle.
       type(bundle_type), pointer, intent(out) :: bundle
       type(c_ptr) :: address
 

@@ -15,7 +15,7 @@ module thud_error
    !> The user has interrupted the work; also the exit code of the executable.
    integer, parameter :: interrupted = 130
 
-   !> What went wrong, in one sentence for the user.
+   !> An error, in one sentence for the user.
    type :: error_type
       !> `bad_input`, `numerical_failure` or `interrupted`.
       integer :: code = numerical_failure
@@ -29,13 +29,12 @@ contains
    pure function input_error(message) result(error)
       !> One sentence for the user.
       character(len=*), intent(in) :: message
-      !> The error.
       type(error_type) :: error
       character(len=len(message)) :: text
       integer :: i
 
       text = message
-      ! No screen shows these characters, and a zero byte would end the sentence; input may hold them.
+      ! Control characters do not print, and a zero byte would end the sentence; input may hold them.
       do i = 1, len(text)
          if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) text(i:i) = '?'
       end do
@@ -46,7 +45,6 @@ contains
    pure function numerical_error(message) result(error)
       !> One sentence for the user.
       character(len=*), intent(in) :: message
-      !> The error.
       type(error_type) :: error
 
       error = error_type(code=numerical_failure, message=message)

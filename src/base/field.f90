@@ -10,7 +10,7 @@ module thud_field
 
    public :: check_fields, field_type, key_length, list_type, name_length
 
-   !> Most entries of a list.
+   !> Maximum number of entries of a list.
    integer, parameter :: list_length = 64
 
    !> A list of numbers of any length up to `list_length`.
@@ -27,13 +27,13 @@ module thud_field
    !> Length of the name of a key or a group.
    integer, parameter :: key_length = 24
 
-   !> Most allowed texts of one key.
+   !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
 
-   !> What no entry of a list can be.
+   !> Value that no entry of a list can have.
    real(wp), parameter :: unset = -huge(1.0_wp)
 
-   !> Description of one key and a pointer to the variable behind it.
+   !> Description of one key and a pointer to its variable.
    type :: field_type
       !> Namelist group.
       character(len=key_length) :: group = ''
@@ -116,7 +116,6 @@ contains
       type(field_type), intent(in) :: fields(:)
       !> Number of the field.
       integer, intent(in) :: i
-      !> The range.
       type(interval_type) :: interval
       integer, allocatable :: group(:)
       integer :: j
@@ -129,9 +128,8 @@ contains
 
    !> Sets the variable from the text of a namelist assignment.
    subroutine set_from_text(self, text, error)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> What stood behind the equals sign.
+      !> Text after the equals sign.
       character(len=*), intent(in) :: text
       !> The text is not a value of the wanted type.
       type(error_type), allocatable, intent(out) :: error
@@ -184,13 +182,12 @@ contains
    end subroutine set_from_text
 
    !> Whether numbers are written in the usual way. A namelist may also hold null values (`1*`) and
-   !> exponents without a letter (`1+3` for 1000): nobody means them.
+   !> exponents without a letter (`1+3` for 1000): those are mistakes.
    pure function is_plain(text, repeats) result(plain)
-      !> What stood behind the equals sign.
+      !> Text after the equals sign.
       character(len=*), intent(in) :: text
       !> `3*0.1` is allowed.
       logical, intent(in) :: repeats
-      !> The text is plain.
       logical :: plain
       integer :: i
 
@@ -204,13 +201,12 @@ contains
    subroutine set_list(entries, list, status)
       !> The entries, those that were not given hold `unset`: [list_length + 1].
       real(wp), intent(in) :: entries(:)
-      !> The list.
       type(list_type), intent(inout) :: list
       !> Not 0 where there are too many entries or gaps between them.
       integer, intent(out) :: status
       logical :: given(size(entries))
 
-      ! Asked so that a NaN counts as given; the check of the range refuses it later.
+      ! Written so that a NaN counts as given; the check of the range refuses it later.
       given = .not. entries <= unset
       status = merge(0, 1, all(given(:count(given))) .and. count(given) <= list_length)
       if (status /= 0) return
@@ -220,7 +216,6 @@ contains
 
    !> Value as a number: of a choice its place among the choices, of a flag 0 or 1.
    function get_number(self) result(number)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The number; 0 for free text and lists.
       real(wp) :: number
@@ -234,9 +229,7 @@ contains
 
    !> Sets the variable from such a number.
    subroutine set_number(self, number, entry, error)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> The number.
       real(wp), intent(in) :: number
       !> Which entry of a list is set; 0 for keys that are no lists.
       integer, intent(in) :: entry
@@ -265,9 +258,7 @@ contains
 
    !> Kind of the value: `real`, `whole`, `flag`, `choice`, `text`, `list`.
    pure function get_kind(self) result(kind)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> The kind.
       character(len=6) :: kind
 
       kind = 'text'
@@ -280,15 +271,10 @@ contains
 
    !> Error that names group, key, value and allowed range.
    function get_error(self, value, what, interval) result(error)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> The value as text.
-      character(len=*), intent(in) :: value
-      !> What is wrong with it.
-      character(len=*), intent(in) :: what
-      !> Allowed range of numbers.
+      !> The value as text; what is wrong with it.
+      character(len=*), intent(in) :: value, what
       type(interval_type), intent(in) :: interval
-      !> The error.
       type(error_type) :: error
       character(len=:), allocatable :: allowed
 
@@ -299,7 +285,6 @@ contains
 
    !> The value as it stands in a namelist.
    subroutine get_text(self, text)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The value; text is in quotes.
       character(len=:), allocatable, intent(out) :: text
@@ -324,7 +309,6 @@ contains
 
    !> The allowed range in words: `0 < outer_radius <= 10 m`.
    subroutine get_allowed(self, text, interval)
-      !> The field.
       class(field_type), intent(in) :: self
       !> The range with its unit, or the list of allowed words.
       character(len=:), allocatable, intent(out) :: text
@@ -350,9 +334,7 @@ contains
 
    !> Whether the field is a list without entries, which a namelist cannot hold.
    pure function is_empty(self) result(empty)
-      !> The field.
       class(field_type), intent(in) :: self
-      !> It is one.
       logical :: empty
 
       empty = .false.

@@ -14,18 +14,12 @@ module thud_interval
 
    !> An interval of real numbers.
    type :: interval_type
-      !> Lower end.
-      real(wp) :: lower = -huge(1.0_wp)
-      !> Upper end.
-      real(wp) :: upper = huge(1.0_wp)
-      !> The lower end does not belong to it.
-      logical :: lower_open = .false.
-      !> The upper end does not belong to it.
-      logical :: upper_open = .false.
-      !> The lower end in terms of other keys; blank where it is a number.
-      character(len=expression_length) :: lower_expression = ''
-      !> The upper end in terms of other keys; blank where it is a number.
-      character(len=expression_length) :: upper_expression = ''
+      !> Its ends.
+      real(wp) :: lower = -huge(1.0_wp), upper = huge(1.0_wp)
+      !> The end does not belong to it.
+      logical :: lower_open = .false., upper_open = .false.
+      !> The ends in terms of other keys; blank where they are numbers.
+      character(len=expression_length) :: lower_expression = '', upper_expression = ''
    contains
       procedure :: contains => contains_value
       procedure :: resolve
@@ -37,7 +31,6 @@ contains
    pure function new_interval(text) result(interval)
       !> The ends between brackets, round ones where an end is left out; blank for all numbers.
       character(len=*), intent(in) :: text
-      !> The interval.
       type(interval_type) :: interval
       integer :: comma, last
 
@@ -52,7 +45,6 @@ contains
 
    !> One end of an interval.
    pure subroutine read_end(text, number, expression)
-      !> The end as written.
       character(len=*), intent(in) :: text
       !> Its value where it is a number.
       real(wp), intent(inout) :: number
@@ -71,7 +63,6 @@ contains
    pure function is_number(text) result(yes)
       !> The text, without blanks before it.
       character(len=*), intent(in) :: text
-      !> It does.
       logical :: yes
 
       yes = scan(text(1:1), '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
@@ -79,7 +70,6 @@ contains
 
    !> Sets the ends that depend on other keys.
    pure subroutine resolve(self, keys, values)
-      !> The interval.
       class(interval_type), intent(inout) :: self
       !> Names of the keys: [n_key].
       character(len=*), intent(in) :: keys(:)
@@ -98,11 +88,11 @@ contains
       character(len=*), intent(in) :: keys(:)
       !> Their values: [n_key].
       real(wp), intent(in) :: values(:)
-      !> The value.
       real(wp) :: value
       real(wp) :: operand
       integer :: start, length, place, status
       character(len=len(expression)) :: word
+      character(len=128) :: message
       character(len=1) :: operator
 
       value = 1.0_wp
@@ -115,7 +105,7 @@ contains
          if (place > 0) then
             operand = values(place)
          else
-            read (word, *, iostat=status) operand
+            read (word, *, iostat=status, iomsg=message) operand
             if (status /= 0) operand = ieee_value(operand, ieee_quiet_nan)
          end if
          if (operator == '*') value = value*operand
@@ -130,9 +120,7 @@ contains
    elemental function contains_value(self, value) result(inside)
       !> The interval, its ends resolved.
       class(interval_type), intent(in) :: self
-      !> The value.
       real(wp), intent(in) :: value
-      !> It does.
       logical :: inside
 
       inside = (value > self%lower .or. (.not. self%lower_open .and. value >= self%lower)) &
@@ -141,11 +129,8 @@ contains
 
    !> The interval around the name of a key: `0 < outer_radius <= 10`.
    subroutine get_range_text(interval, name, text)
-      !> The interval.
       type(interval_type), intent(in) :: interval
-      !> Name of the key.
       character(len=*), intent(in) :: name
-      !> The range.
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: lower, upper
 
@@ -157,11 +142,9 @@ contains
 
    !> One end as text: an expression with its value, where it is known.
    subroutine to_end_text(number, expression, text)
-      !> Its value.
       real(wp), intent(in) :: number
       !> The expression; blank where the end is a number.
       character(len=*), intent(in) :: expression
-      !> The text.
       character(len=:), allocatable, intent(out) :: text
 
       text = to_text(number)

@@ -1,5 +1,5 @@
 !> Descriptions of keys, one constructor per kind of value. Ranges are intervals such as `(0, 10]`, see
-!> `thud_interval`; `in_group` and `owned_by` say where the keys stand and who uses them.
+!> `thud_interval`; `in_group` and `owned_by` set their group and their user.
 module thud_new_field
    use thud_field, only: field_type, list_type, name_length
    use thud_kinds, only: wp
@@ -12,17 +12,10 @@ contains
 
    !> Describes a real key.
    function real_field(key, variable, unit, meaning, range) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
-      !> The variable behind the key.
       real(wp), intent(in), target :: variable
-      !> SI unit, empty for a pure number.
-      character(len=*), intent(in) :: unit
-      !> What the value is.
-      character(len=*), intent(in) :: meaning
-      !> Allowed range.
-      character(len=*), intent(in) :: range
-      !> The description.
+      !> SI unit, empty for a pure number; what the value is; allowed range.
+      character(len=*), intent(in) :: unit, meaning, range
       type(field_type) :: field
 
       field = field_type(key=key, unit=unit, meaning=meaning, range=range)
@@ -31,15 +24,10 @@ contains
 
    !> Describes an integer key.
    function integer_field(key, variable, meaning, range) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
-      !> The variable behind the key.
       integer, intent(in), target :: variable
-      !> What the value is.
-      character(len=*), intent(in) :: meaning
-      !> Allowed range.
-      character(len=*), intent(in) :: range
-      !> The description.
+      !> What the value is; allowed range.
+      character(len=*), intent(in) :: meaning, range
       type(field_type) :: field
 
       field = field_type(key=key, meaning=meaning, range=range)
@@ -48,13 +36,9 @@ contains
 
    !> Describes a key that is true or false.
    function logical_field(key, variable, meaning) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
-      !> The variable behind the key.
       logical, intent(in), target :: variable
-      !> What the value is.
       character(len=*), intent(in) :: meaning
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, meaning=meaning)
@@ -63,19 +47,12 @@ contains
 
    !> Describes a key with a list of numbers, each of which lies in one range.
    function list_field(key, variable, unit, meaning, range, whole) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
-      !> The variable behind the key.
       type(list_type), intent(in), target :: variable
-      !> SI unit, empty for pure numbers.
-      character(len=*), intent(in) :: unit
-      !> What the values are.
-      character(len=*), intent(in) :: meaning
-      !> Allowed range of each.
-      character(len=*), intent(in) :: range
+      !> SI unit, empty for pure numbers; what the values are; allowed range of each.
+      character(len=*), intent(in) :: unit, meaning, range
       !> They are whole numbers (default: not).
       logical, intent(in), optional :: whole
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, unit=unit, meaning=meaning, range=range)
@@ -85,13 +62,9 @@ contains
 
    !> Describes a key with free text.
    function text_field(key, variable, meaning) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
-      !> The variable behind the key.
       character(len=name_length), intent(in), target :: variable
-      !> What the value is.
       character(len=*), intent(in) :: meaning
-      !> The description.
       type(field_type) :: field
 
       field = field_type(key=key, meaning=meaning)
@@ -100,15 +73,11 @@ contains
 
    !> Describes a key that takes one of several words.
    function choice_field(key, variable, meaning, choices) result(field)
-      !> Name of the key.
       character(len=*), intent(in) :: key
-      !> The variable behind the key.
       character(len=name_length), intent(in), target :: variable
-      !> What the value is.
       character(len=*), intent(in) :: meaning
       !> The allowed words: [n_choice].
       character(len=*), intent(in) :: choices(:)
-      !> The description.
       type(field_type) :: field
 
       field = text_field(key, variable, meaning)
@@ -116,9 +85,8 @@ contains
       field%choices(:size(choices)) = choices
    end function choice_field
 
-   !> Puts keys into a namelist group, unless they stand in one already.
+   !> Puts keys into a namelist group, unless they have one already.
    function in_group(group, fields) result(placed)
-      !> Name of the group.
       character(len=*), intent(in) :: group
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
@@ -129,7 +97,7 @@ contains
       where (placed%group == '') placed%group = group
    end function in_group
 
-   !> Says what uses keys.
+   !> Sets the user of keys.
    function owned_by(owner, fields) result(owned)
       !> A source model or `modes`.
       character(len=*), intent(in) :: owner

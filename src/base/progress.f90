@@ -1,4 +1,4 @@
-!> Reports on long work. The library only tells how far it is; who runs it may show that.
+!> Progress of long work: the library reports it, its caller may show it.
 module thud_progress
    !$ use omp_lib, only: omp_in_parallel
    use thud_kinds, only: wp
@@ -14,39 +14,37 @@ module thud_progress
          implicit none (type, external)
          !> How much has been computed.
          real(wp), intent(in) :: done
-         !> How much there is to compute at most; 0 where nobody knows.
+         !> Upper bound of the whole; 0 where unknown.
          real(wp), intent(in) :: whole
-         !> What is counted.
          character(len=*), intent(in) :: unit
       end subroutine handler
    end interface
 
-   !> Who shows it; nobody unless the executable or the driver asks for it.
+   !> Procedure that shows it; none unless the executable or the driver sets one.
    procedure(handler), pointer :: show => null()
 
 contains
 
-   !> Says who shows the progress from now on.
+   !> Sets the procedure that shows the progress.
    subroutine set_progress_handler(new_handler)
-      !> The procedure; without it, nobody.
+      !> The procedure; absent for none.
       procedure(handler), optional :: new_handler
 
       show => null()
       if (present(new_handler)) show => new_handler
    end subroutine set_progress_handler
 
-   !> Tells how far the work is.
+   !> Reports how far the work is.
    subroutine report_progress(done, whole, unit)
       !> How much has been computed.
       real(wp), intent(in) :: done
-      !> How much there is to compute at most; 0 where nobody knows.
+      !> Upper bound of the whole; 0 where unknown.
       real(wp), intent(in) :: whole
-      !> What is counted.
       character(len=*), intent(in) :: unit
 
       procedure(handler), pointer :: current
 
-      ! Of many drops that are computed at once none tells how far it is.
+      ! Drops that are computed in parallel do not report.
       !$ if (omp_in_parallel()) return
       ! Another thread may change it meanwhile.
       current => show

@@ -8,12 +8,12 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, join_quoted, lower_case, newline, quoted, split, to_text
+   public :: fixed, join_quoted, lower_case, newline, quoted, replaced, split, to_text
 
    !> Line feed, the line end of every file that thud writes.
    character(len=*), parameter :: newline = new_line('a')
 
-   !> Room for any number.
+   !> Length that fits any number.
    integer, parameter :: number_length = 40
 
    !> Shortest text that reads back as the same value.
@@ -27,9 +27,7 @@ contains
 
    !> Integer without blanks.
    pure function integer_to_text(value) result(text)
-      !> The number.
       integer, intent(in) :: value
-      !> Its digits.
       character(len=len_trim(format_integer(value))) :: text
 
       text = format_integer(value)
@@ -37,7 +35,6 @@ contains
 
    !> Logical as a namelist holds it.
    pure function logical_to_text(value) result(text)
-      !> The truth value.
       logical, intent(in) :: value
       !> `.true.` or `.false.`.
       character(len=merge(6, 7, value)) :: text
@@ -47,7 +44,6 @@ contains
 
    !> Shortest decimal text that reads back as exactly the same number.
    pure function real_to_text(value) result(text)
-      !> The number.
       real(wp), intent(in) :: value
       !> Decimal notation from 1e-4 to 1e7, else with an exponent.
       character(len=len_trim(format_real(value))) :: text
@@ -57,9 +53,7 @@ contains
 
    !> Number with a fixed count of decimals, for tables: `fixed(20.4261_wp, 2)` is `20.43`.
    pure function fixed(value, decimals) result(text)
-      !> The number.
       real(wp), intent(in) :: value
-      !> Digits behind the point.
       integer, intent(in) :: decimals
       !> The rounded number, with a leading zero.
       character(len=len_trim(format_fixed(value, decimals))) :: text
@@ -67,23 +61,18 @@ contains
       text = format_fixed(value, decimals)
    end function fixed
 
-   !> Integer with blanks behind it.
+   !> Integer, padded with blanks.
    pure function format_integer(value) result(buffer)
-      !> The number.
       integer, intent(in) :: value
-      !> Its digits.
       character(len=number_length) :: buffer
 
       write (buffer, '(i0)') value
    end function format_integer
 
-   !> Number with a fixed count of decimals and blanks behind it.
+   !> Number with a fixed count of decimals, padded with blanks.
    pure function format_fixed(value, decimals) result(buffer)
-      !> The number.
       real(wp), intent(in) :: value
-      !> Digits behind the point.
       integer, intent(in) :: decimals
-      !> The rounded number.
       character(len=number_length) :: buffer
       character(len=12) :: form
 
@@ -93,11 +82,9 @@ contains
       if (decimals == 0) buffer(len_trim(buffer):) = ''
    end function format_fixed
 
-   !> Shortest decimal text of a number with blanks behind it.
+   !> Shortest decimal text of a number, padded with blanks.
    pure function format_real(value) result(buffer)
-      !> The number.
       real(wp), intent(in) :: value
-      !> Its text.
       character(len=number_length) :: buffer
       character(len=12) :: form
       real(wp) :: read_back
@@ -112,7 +99,7 @@ contains
             write (form, '(a,i0,a)') '(es40.', digits, 'e3)'
             write (buffer, form) value
             read (buffer, form) read_back
-            ! "not different" says what is meant where == on reals is a mistake.
+            ! == on reals would be refused by compilers.
             if (.not. abs(read_back - value) > 0.0_wp) exit
          end do
          buffer = tidy_exponent(adjustl(buffer))
@@ -152,9 +139,7 @@ contains
 
    !> ASCII letters in lower case; everything else unchanged.
    pure function lower_case(text) result(lower)
-      !> Any text.
       character(len=*), intent(in) :: text
-      !> The text in lower case.
       character(len=len(text)) :: lower
       integer :: i
 
@@ -163,6 +148,21 @@ contains
          if (text(i:i) >= 'A' .and. text(i:i) <= 'Z') lower(i:i) = achar(iachar(text(i:i)) + 32)
       end do
    end function lower_case
+
+   !> A text with all characters of a set replaced by another one.
+   pure function replaced(text, set, new) result(changed)
+      !> The text; characters to be replaced.
+      character(len=*), intent(in) :: text, set
+      !> The character in their place.
+      character(len=1), intent(in) :: new
+      character(len=len(text)) :: changed
+      integer :: i
+
+      changed = text
+      do i = 1, len(text)
+         if (scan(text(i:i), set) > 0) changed(i:i) = new
+      end do
+   end function replaced
 
    !> Text as a namelist character constant: quotes inside are doubled.
    pure function quoted(text) result(constant)
@@ -186,7 +186,6 @@ contains
 
    !> Length of a text as a namelist character constant.
    pure function quoted_length(text) result(length)
-      !> Any text.
       character(len=*), intent(in) :: text
       !> Characters with quotes around and quotes inside doubled.
       integer :: length
@@ -226,9 +225,7 @@ contains
 
    !> Words of a list with commas between.
    pure function split(list, n_word) result(words)
-      !> The list.
       character(len=*), intent(in) :: list
-      !> Number of words.
       integer, intent(in) :: n_word
       !> The words: [n_word].
       character(len=32) :: words(n_word)

@@ -27,15 +27,12 @@ module thud_case
       logical :: has_modes = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
-      !> The ball.
       type(ball_type) :: ball
-      !> The drop.
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
       character(len=name_length) :: model = model_names(1)
       !> Every model with its options; those of the chosen one count: [n_model].
       type(model_slot_type), allocatable :: models(:)
-      !> Sampling of the record.
       type(sampling_type) :: sampling
       !> Method of the levels.
       character(len=name_length) :: level_method = 'exact'
@@ -51,7 +48,6 @@ contains
 
    !> The default case.
    subroutine new_case(case)
-      !> The case.
       type(case_type), intent(out) :: case
 
       call new_models(case%models)
@@ -59,7 +55,6 @@ contains
 
    !> Number of the chosen model.
    pure function get_model_number(case) result(number)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Its place among the models; 0 where there is no such model.
       integer :: number
@@ -67,7 +62,7 @@ contains
       number = findloc(model_names == case%model, .true., dim=1)
    end function get_model_number
 
-   !> Every key of the input, in the order of the written file; keys of two owners stand there twice.
+   !> Every key of the input, in the order of the written file; keys of two owners occur twice.
    function get_fields(case) result(fields)
       !> The case that the fields read and set.
       type(case_type), intent(in), target :: case
@@ -96,11 +91,8 @@ contains
 
    !> Whether a key does something: for the impact, its model, or the free modes.
    pure elemental function is_used(case, field) result(used)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> The key.
       type(field_type), intent(in) :: field
-      !> It does.
       logical :: used
 
       if (field%owner == 'modes') then
@@ -126,7 +118,6 @@ contains
 
    !> Refuses a case whose values lie outside their ranges or do not fit each other.
    subroutine check_case(case, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
@@ -144,9 +135,7 @@ contains
 
    !> Refuses a name that cannot name a directory.
    subroutine check_name(name, error)
-      !> Name of the case.
       character(len=*), intent(in) :: name
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       logical :: usable
       integer :: i

@@ -1,4 +1,4 @@
-!> What a case comes to: free modes, the force history of its model, levels and verdict. No file is known here.
+!> Computes a case: free modes, the force history of its model, levels and verdict. It knows no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, get_model_number
@@ -12,7 +12,7 @@ module thud_compute
    implicit none (type, external)
    private
 
-   public :: compute_case, get_judged_force, get_loss_factors, is_conforming, judge_case, results_type
+   public :: compute_case, get_judged_force, is_conforming, judge_case, results_type
    public :: verdict_type
 
    !> Levels and criteria of an impact.
@@ -27,7 +27,7 @@ module thud_compute
       type(criterion_type) :: criteria(criterion_count, force_count)
    end type verdict_type
 
-   !> What a case gives.
+   !> Results of a case.
    type :: results_type
       !> The force, where an impact is asked for.
       type(force_history_type) :: history
@@ -39,11 +39,10 @@ module thud_compute
 
 contains
 
-   !> Computes what a case asks for, but for levels and verdict.
+   !> Computes what a case asks for, without levels and verdict.
    subroutine compute_case(case, results, error)
       !> The case, checked.
       type(case_type), intent(in) :: case
-      !> The results.
       type(results_type), intent(out) :: results
       !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
@@ -55,27 +54,9 @@ contains
       end associate
    end subroutine compute_case
 
-   !> Loss factor of the material of a case against frequency.
-   subroutine get_loss_factors(case, frequency, loss_factor, error)
-      !> The case.
-      type(case_type), intent(in) :: case
-      !> Frequencies, Hz: [n].
-      real(wp), intent(in) :: frequency(:)
-      !> Loss factors: [n].
-      real(wp), intent(out) :: loss_factor(:)
-      !> The model has no material, or it cannot be made.
-      type(error_type), allocatable, intent(out) :: error
-
-      associate (model => case%models(get_model_number(case))%model)
-         call model%get_loss_factors(case%ball, frequency, loss_factor, error)
-      end associate
-   end subroutine get_loss_factors
-
    !> Levels and criteria of the force history of a case.
    subroutine judge_case(case, history, verdict, error)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
       !> Levels and criteria of both forces.
       type(verdict_type), intent(out) :: verdict
@@ -87,7 +68,7 @@ contains
       call judge_force(case, history, history%elastic_force, verdict%bands, verdict%level(:, 1), verdict%criteria(:, 1), &
          error)
       if (allocated(error)) return
-      ! Of most models both are the same.
+      ! Most models have the same force twice.
       if (any(abs(history%floor_force - history%elastic_force) > 0.0_wp)) then
          call judge_force(case, history, history%floor_force, verdict%bands, verdict%level(:, 2), verdict%criteria(:, 2), &
             error)
@@ -99,9 +80,7 @@ contains
 
    !> Levels and criteria of one force.
    subroutine judge_force(case, history, force, bands, level, criteria, error)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
       !> The force, N: [n_sample].
       real(wp), intent(in) :: force(:)
@@ -125,7 +104,6 @@ contains
 
    !> Number of the force that the verdict is on.
    pure function get_judged_force(case) result(number)
-      !> The case.
       type(case_type), intent(in) :: case
       !> Its place in `force_names`.
       integer :: number
@@ -135,9 +113,7 @@ contains
 
    !> Whether the source of a case conforms.
    pure function is_conforming(case, verdict) result(yes)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its verdict.
       type(verdict_type), intent(in) :: verdict
       !> All criteria of the judged force are met.
       logical :: yes

@@ -14,9 +14,8 @@ module thud_many
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: get_sample_count
-   use thud_set_status, only: set_is_fine
    use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
-   use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_source_limits, source_limits_type
+   use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_text, only: join_quoted, quoted
    implicit none (type, external)
    private
@@ -24,9 +23,10 @@ module thud_many
    public :: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
 
    !> Groups in whose keys drops may not differ: names, and what a run writes.
-   character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: 'case', 'model', 'modes', 'output']
+   character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: &
+      'case', 'model', 'modes', 'output']
 
-   !> About the time that one drop takes in a batch, s.
+   !> Approximate time of one drop in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-5_wp
 
    !> A key in whose values drops differ.
@@ -49,7 +49,7 @@ module thud_many
       type(band_type), allocatable :: bands(:)
       !> Number of the first band that the case asks for.
       integer :: first_band = 1
-      !> About the time that one drop takes on one core, s.
+      !> Approximate time of one drop on one core, s.
       real(wp) :: cost = 0.0_wp
       !> Levels and verdicts are wanted.
       logical :: judged = .true.
@@ -73,14 +73,13 @@ module thud_many
       real(wp), allocatable :: force(:, :, :)
    end type many_type
 
-   !> What an earlier call has prepared for the next one; threads take it in turns.
+   !> What an earlier call has prepared for the next one; one thread at a time owns it.
    type(many_type), allocatable :: kept
 
 contains
 
    !> Keys by their names, entries of lists as `frequency(2)`.
    subroutine find_columns(case, names, columns, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> The names: [n_column].
       character(len=*), intent(in) :: names(:)
@@ -91,7 +90,7 @@ contains
       type(field_type), allocatable :: fields(:)
       type(list_type), pointer :: list
       logical, allocatable :: possible(:)
-      character(len=len(names)) :: key
+      character(len=:), allocatable :: key
       logical :: known
       integer :: i, j
 
@@ -123,10 +122,8 @@ contains
 
    !> Key and entry of a name such as `frequency(2)`.
    pure subroutine split_name(name, key, entry, valid)
-      !> The name.
       character(len=*), intent(in) :: name
-      !> The key.
-      character(len=*), intent(out) :: key
+      character(len=:), allocatable, intent(out) :: key
       !> The entry; 0 where none is named.
       integer, intent(out) :: entry
       !> The name is a key, or a key with a number in brackets.
@@ -147,23 +144,23 @@ contains
 
    !> Prepares for many drops of a case.
    subroutine new_many(case, judged, many)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Levels and verdicts are wanted.
       logical, intent(in) :: judged
       !> What is kept from an earlier call serves again where it fits.
       type(many_type), intent(inout) :: many
       type(projections_type) :: wanted
+      type(column_type) :: no_columns(0)
 
       call get_level_bands(case%bands, many%bands, many%first_band)
       many%judged = judged
       many%cost = case%models(get_model_number(case))%model%get_cost()
-      if (suits_batch(case, [column_type ::])) many%cost = batch_cost
+      if (suits_batch(case, no_columns)) many%cost = batch_cost
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
    end subroutine new_many
 
-   !> Takes what an earlier call has left, or begins anew.
+   !> Takes what an earlier call has left, or starts afresh.
    subroutine take_many(many)
       !> The results of an earlier call, or none.
       type(many_type), allocatable, intent(out) :: many
@@ -174,7 +171,7 @@ contains
       if (.not. allocated(many)) allocate (many)
    end subroutine take_many
 
-   !> Leaves what the next call can use.
+   !> Keeps what the next call can use.
    subroutine leave_many(many)
       !> The results, which are given up.
       type(many_type), allocatable, intent(inout) :: many
@@ -193,11 +190,9 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Their values, as `get_number` of the keys gives them: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Forces are wanted too.
       logical, intent(in) :: forces
-      !> The results.
       type(many_type), intent(inout) :: many
       !> A key of all drops has a value out of range, forces are wanted of records of different length, or there is no
       !> space in memory.
@@ -221,7 +216,7 @@ contains
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, many, error)
          if (allocated(error)) return
-         ! The single solver has the sentences.
+         ! The single solver gives the reasons.
          left = pack(left, many%status /= 0)
       end if
       !$omp parallel num_threads(threads) if (size(left) > 1)
@@ -249,9 +244,7 @@ contains
 
    !> Space for the results of a number of drops.
    subroutine set_size(many, n_drop, n_sample)
-      !> The results.
       type(many_type), intent(inout) :: many
-      !> Number of drops.
       integer, intent(in) :: n_drop
       !> Samples of the forces that are wanted.
       integer, intent(in) :: n_sample
@@ -277,9 +270,7 @@ contains
       type(column_type), intent(in) :: columns(:)
       !> Values of this one: [n_column].
       real(wp), intent(in) :: values(:)
-      !> Number of the drop.
       integer, intent(in) :: drop
-      !> Gets its results.
       type(many_type), intent(inout) :: many
       type(results_type) :: results
       type(error_type), allocatable :: error
@@ -310,36 +301,35 @@ contains
       if (.not. many%judged) return
       many%level(:, :, drop) = results%verdict%level
       many%conforms(:, drop) = all(conforms(results%verdict%criteria), dim=1)
-      call judge(case, results%verdict%criteria(:octave_count, get_judged_force(case)), drop, many)
+      call judge(case, drop, many)
    end subroutine solve_one
 
    !> Verdict by the judged force.
-   subroutine judge(case, octaves, drop, many)
+   subroutine judge(case, drop, many)
       !> The case of the drop.
       type(case_type), intent(in) :: case
-      !> Criteria of the octaves: [octave_count].
-      type(criterion_type), intent(in) :: octaves(:)
       !> Number of the drop, whose levels are known.
       integer, intent(in) :: drop
       !> Gets margin and verdict.
       type(many_type), intent(inout) :: many
+      type(source_limits_type) :: limits
+      type(error_type), allocatable :: error
       integer :: force
 
       force = get_judged_force(case)
+      call get_source_limits(case%source, limits, error)
       many%verdict(drop) = many%conforms(force, drop)
       associate (level => many%level(:octave_count, force, drop))
-         many%margin(drop) = minval(min(level - octaves%lower, octaves%upper - level))
+         many%margin(drop) = minval(min(level - limits%lower_level, limits%upper_level - level))
       end associate
    end subroutine judge
 
    !> Whether drops can be computed in batches: by the shell model, with exact levels, if they differ in nothing
    !> but ball, drop and the options of the model.
    function suits_batch(case, columns) result(suits)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> In what the drops differ: [n_column].
       type(column_type), intent(in) :: columns(:)
-      !> They can.
       logical :: suits
       type(field_type), allocatable :: fields(:)
       integer :: i
@@ -356,40 +346,31 @@ contains
 
    !> Drops of the shell model in batches.
    subroutine solve_batch(case, columns, values, threads, many, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> In what the drops differ: [n_column].
       type(column_type), intent(in) :: columns(:)
       !> Their values: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
-      !> Number of threads.
       integer, intent(in) :: threads
-      !> Gets the results.
       type(many_type), intent(inout) :: many
       !> There is no space in memory.
       type(error_type), allocatable, intent(out) :: error
       type(set_type), allocatable :: sets(:)
       type(set_outcome_type), allocatable :: outcomes(:)
-      type(source_limits_type) :: limits
-      type(criterion_type) :: criteria(criterion_count)
-      real(wp) :: nothing(octave_count)
       integer :: i
 
       allocate (sets(size(values, 2)), outcomes(size(values, 2)))
       call fill_sets(case, columns, values, sets)
       call solve_ensemble(sets, case%sampling, trim(case%source), threads, many%judged, many%projections, outcomes, &
          many%level, many%conforms, many%force, error)
-      if (.not. allocated(error)) call get_source_limits(case%source, limits, error)
       if (allocated(error)) return
-      nothing = 0.0_wp
-      criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
       do i = 1, size(sets)
          associate (found => outcomes(i))
-            many%status(i) = merge(0, 1, found%status == set_is_fine)
+            many%status(i) = merge(0, 1, found%computed)
             many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_floor_force, found%max_deflection, &
                found%restitution, found%impulse]
          end associate
-         if (many%judged .and. many%status(i) == 0) call judge(case, criteria(:octave_count), i, many)
+         if (many%judged .and. many%status(i) == 0) call judge(case, i, many)
       end do
    end subroutine solve_batch
 
@@ -412,7 +393,7 @@ contains
       set%drop = case%drop
       allocate (fields, source=get_active_fields(case))
       allocate (set_fields, source=get_set_fields(set))
-      ! What is not a number of ball or drop is the choice of the flux term.
+      ! The only other key is the choice of the flux term.
       place = [(findloc(set_fields%key == fields(columns(j)%place)%key, .true., dim=1), j=1, size(columns))]
       select type (model => case%models(get_model_number(case))%model)
       type is (hollow_sphere_type)
@@ -424,7 +405,7 @@ contains
                set_fields(place(j))%real_value = values(j, i)
             else
                set%flux = nint(values(j, i))
-               ! What is no whole number chooses nothing.
+               ! A number that is not whole chooses nothing.
                if (abs(values(j, i) - set%flux) > 0.0_wp) set%flux = 0
             end if
          end do

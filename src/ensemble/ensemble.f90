@@ -4,18 +4,17 @@
 !> Every number of a set comes from its own lane of matrices and vectors of fixed shape: it does not
 !> depend on the number of threads, on the other sets or on the place among them.
 module thud_ensemble
-   use thud_cache_line, only: get_aligned_start, line_length
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
       new_band_projection
+   use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: reference_force, reference_time
-   use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_error, only: error_type, input_error, numerical_error
    use thud_force_history, only: force_count
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
-   use thud_set_status, only: set_is_fine
+   use thud_shell_sets, only: block_size, get_blocks, set_outcome_type, set_type, solve_block
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    use thud_text, only: to_text
@@ -36,9 +35,9 @@ module thud_ensemble
 
    !> Arrays of one thread.
    type :: workspace_type
-      !> Room for the forces: [2 block_size n_row + line_length].
+      !> Forces, with space for their alignment: [2 block_size n_row + line_length].
       real(wp), allocatable :: force(:)
-      !> Room for folded forces: [2 block_size n_row].
+      !> Folded forces: [2 block_size n_row].
       real(wp), allocatable :: folded(:)
       !> Number of the last sample that is not zero.
       integer :: last_sample = 0
@@ -54,11 +53,11 @@ contains
    pure function new_projections(sample_rate, bands, n_sample) result(projections)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> The bands besides the octaves: [n_more].
+      !> The bands other than the octaves: [n_more].
       type(band_type), intent(in) :: bands(:)
       !> Samples of the longest record.
       integer, intent(in) :: n_sample
-      !> Room for them.
+      !> All windows, still empty.
       type(projections_type) :: projections
 
       projections%sample_rate = sample_rate
@@ -70,11 +69,9 @@ contains
 
    !> Whether matrices of one serve for the other: same rate, bands and longest window.
    pure function are_alike(one, other) result(alike)
-      !> The one.
       type(projections_type), intent(in) :: one
       !> The other, which may be empty.
       type(projections_type), intent(in) :: other
-      !> They do.
       logical :: alike
 
       alike = .false.
@@ -88,11 +85,9 @@ contains
    subroutine solve_ensemble(sets, sampling, source, threads, judged, projections, outcomes, levels, met, forces, error)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> Sampling of all.
       type(sampling_type), intent(in) :: sampling
       !> Source whose limits apply.
       character(len=*), intent(in) :: source
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Levels and verdicts are wanted; without them they are NaN and not conforming.
       logical, intent(in) :: judged
@@ -106,7 +101,7 @@ contains
       logical, intent(out) :: met(:, :)
       !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
-      !> The sampling cannot be used, its records have no room in memory, or the source is not known.
+      !> The sampling cannot be used, its records do not fit into memory, or the source is not known.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
@@ -117,7 +112,7 @@ contains
       call check_sampling(sampling, error)
       if (.not. allocated(error)) call get_source_limits(source, limits, error)
       if (allocated(error)) return
-      call get_blocks(sets, outcomes%status, order, first)
+      call get_blocks(sets, outcomes%computed, order, first)
       !$omp parallel num_threads(threads)
       call run_blocks()
       !$omp end parallel
@@ -142,7 +137,6 @@ contains
 
       !> One block, from its sets to its verdicts.
       subroutine run_block(workspace, members)
-         !> Arrays of the thread.
          type(workspace_type), intent(inout) :: workspace
          !> Numbers of the sets: [n_member].
          integer, intent(in) :: members(:)
@@ -156,42 +150,37 @@ contains
             outcomes(members(i)) = found(i)
             levels(:, :, members(i)) = found_levels(:, :, i)
             met(:, members(i)) = found_met(:, i)
-            if (size(forces) > 0 .and. found(i)%status == set_is_fine) call copy_forces(workspace, i, forces(:, :, members(i)))
+            if (size(forces) > 0 .and. found(i)%computed) call copy_forces(workspace, i, forces(:, :, members(i)))
          end do
       end subroutine run_block
 
    end subroutine solve_ensemble
 
-   !> Arrays of a thread. Memory that no contact comes to is never touched.
+   !> Arrays of a thread. Memory beyond the longest contact is never touched.
    subroutine set_workspace(workspace, sampling, limits, n_row)
       !> The arrays, or an error where there is no memory for them.
       type(workspace_type), intent(out) :: workspace
       !> The sampling, for the error.
       type(sampling_type), intent(in) :: sampling
-      !> Limits of the source.
       type(source_limits_type), intent(in) :: limits
       !> Samples of the longest window.
       integer, intent(in) :: n_row
       character(len=128) :: message
-      real(wp) :: nothing(octave_count)
       integer :: status
 
       allocate (workspace%force(force_count*block_size*n_row + line_length), stat=status, errmsg=message)
       if (status == 0) allocate (workspace%folded(force_count*block_size*n_row), stat=status, errmsg=message)
       if (status /= 0) workspace%error = input_error('&sampling: duration = '//to_text(sampling%duration) &
          //' s at sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the forces of '//to_text(block_size) &
-         //' sets no room in memory; allowed: shorter records, or fewer threads')
-      nothing = 0.0_wp
-      workspace%criteria = get_criteria(limits, nothing, 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
+         //' sets no space in memory; allowed: shorter records, or fewer threads')
+      workspace%criteria = get_criteria(limits, spread(0.0_wp, 1, octave_count), 0.0_wp, 0.0_wp, 1, 0.0_wp, 0.0_wp)
    end subroutine set_workspace
 
    !> Outcomes, levels and verdicts of one block.
    subroutine solve_workspace(workspace, sets, sampling, judged, projections, outcomes, levels, met)
-      !> Arrays of the thread.
       type(workspace_type), intent(inout), target :: workspace
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Levels and verdicts are wanted.
       logical, intent(in) :: judged
@@ -216,7 +205,7 @@ contains
       if (.not. judged) return
       class = 0
       do i = 1, size(sets)
-         if (outcomes(i)%status /= set_is_fine) cycle
+         if (.not. outcomes(i)%computed) cycle
          class(i) = get_window_class(min(int(outcomes(i)%contact_time*sampling%sample_rate) + 1, size(force, 2)))
       end do
       force(:, last_sample + 1:get_class_window(max(1, maxval(class)))) = 0.0_wp
@@ -225,23 +214,23 @@ contains
          if (.not. any(class == window)) cycle
          call require_window(projections, window, workspace%error)
          if (allocated(workspace%error)) return
-         call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, square_sum)
+         call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, &
+            square_sum)
          do i = 1, size(sets)
             if (class(i) /= window) cycle
             do j = 1, force_count
                row = i + (j - 1)*block_size
                levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
                   /(reference_force**2*reference_time))
-               met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), row, &
-                  sampling)
+               met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), &
+                  row, sampling)
             end do
          end do
       end do
    end subroutine solve_workspace
 
-   !> The forces of the block in a room: [force_count block_size, n_row].
+   !> The forces of the block in a workspace: [force_count block_size, n_row].
    function get_force(workspace) result(force)
-      !> Arrays of the thread.
       type(workspace_type), intent(in), target :: workspace
       !> Elastic forces, then floor forces, N.
       real(wp), pointer, contiguous :: force(:, :)
@@ -254,9 +243,7 @@ contains
 
    !> Makes the matrices of a window unless they are there.
    subroutine require_window(projections, window, error)
-      !> The matrices.
       type(projections_type), intent(inout) :: projections
-      !> Number of the window.
       integer, intent(in) :: window
       !> They cannot be made.
       type(error_type), allocatable, intent(inout) :: error
@@ -275,9 +262,7 @@ contains
    function is_conforming(criteria, set, outcome, levels, force, row, sampling) result(met)
       !> The criteria; their values are overwritten: [criterion_count].
       type(criterion_type), intent(inout) :: criteria(:)
-      !> The set.
       type(set_type), intent(in) :: set
-      !> Its outcome.
       type(set_outcome_type), intent(in) :: outcome
       !> Levels, dB, octaves first: [n_band].
       real(wp), intent(in) :: levels(:)
@@ -285,9 +270,7 @@ contains
       real(wp), intent(in) :: force(:, :)
       !> Row of the force of this set.
       integer, intent(in) :: row
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
-      !> They are met.
       logical :: met
       real(wp) :: record(get_sample_count(sampling))
 
@@ -303,7 +286,6 @@ contains
 
    !> Copies the forces of one set.
    subroutine copy_forces(workspace, i, forces)
-      !> Arrays of the thread.
       type(workspace_type), intent(in), target :: workspace
       !> Number of the set in the block.
       integer, intent(in) :: i

@@ -24,13 +24,11 @@ contains
 
    !> The gas of a ball.
    pure function new_cavity(ball, r, z) result(cavity)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Distances of the nodes of the inner surface from the axis, undeformed, m: [0:n].
       real(wp), intent(in) :: r(0:)
       !> Their heights, m: [0:n].
       real(wp), intent(in) :: z(0:)
-      !> The gas.
       type(cavity_type) :: cavity
 
       cavity%volume = get_volume(r, z)
@@ -55,7 +53,6 @@ contains
 
    !> Overpressure of the gas.
    pure function get_gas_pressure(cavity, volume) result(pressure)
-      !> The gas.
       type(cavity_type), intent(in) :: cavity
       !> Volume, above 0, m3.
       real(wp), intent(in) :: volume
@@ -67,7 +64,6 @@ contains
 
    !> Work that takes the gas from its first volume to another, against the air around the ball.
    pure function get_gas_energy(cavity, volume) result(energy)
-      !> The gas.
       type(cavity_type), intent(in) :: cavity
       !> Volume, above 0, m3.
       real(wp), intent(in) :: volume

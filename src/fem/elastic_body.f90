@@ -23,9 +23,7 @@ module thud_elastic_body
       type(mesh_type) :: mesh
       !> Its rings of elements: [n_radial].
       type(element_row_type), allocatable :: row(:)
-      !> Material.
       type(material_type) :: material
-      !> Gas.
       type(cavity_type) :: cavity
       !> Masses of the nodes, kg.
       real(wp), allocatable :: mass(:, :)
@@ -43,7 +41,7 @@ module thud_elastic_body
       real(wp) :: gas_energy = 0.0_wp
       !> Overpressure of the gas, Pa.
       real(wp) :: gas_pressure = 0.0_wp
-      !> Smallest local ratio of volumes J.
+      !> Minimum local ratio of volumes J.
       real(wp) :: min_jacobian = 1.0_wp
       !> `no_failure`, or why there are no forces.
       integer :: failure = no_failure
@@ -53,13 +51,10 @@ contains
 
    !> The ball at rest.
    pure function new_elastic_body(ball, mesh, material) result(body)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh of order 1.
       type(mesh_type), intent(in) :: mesh
-      !> The material.
       type(material_type), intent(in) :: material
-      !> The body.
       type(elastic_body_type) :: body
       integer :: i, n
 

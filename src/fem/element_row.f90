@@ -40,11 +40,9 @@ contains
    !> Elements between the rings i and i + 1 of a mesh of order 1. Nodes 1 and 2 lie on the polar
    !> line nearer to the lowest point, 1 and 3 on the inner ring.
    pure function new_element_row(mesh, i) result(row)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
       !> Number of the inner ring, from 0.
       integer, intent(in) :: i
-      !> The elements.
       type(element_row_type) :: row
       real(wp) :: point(2), weight(2), value(4), slope(4, 2), jacobian(2, 2), inverse(2, 2), r(4), z(4)
       real(wp) :: determinant, radius
@@ -78,7 +76,6 @@ contains
    !> Gradients of a vector field at all Gauss points: of positions the deformation gradient F, of
    !> velocities its rate.
    pure subroutine get_gradients(row, n, r, z, gradient)
-      !> The elements.
       type(element_row_type), intent(in) :: row
       !> Number of elements.
       integer, intent(in) :: n
@@ -111,7 +108,6 @@ contains
 
    !> Takes the nodal forces of first Piola-Kirchhoff stresses off the forces of two rings of nodes.
    pure subroutine add_nodal_forces(row, n, stress, r, z)
-      !> The elements.
       type(element_row_type), intent(in) :: row
       !> Number of elements.
       integer, intent(in) :: n

@@ -25,13 +25,13 @@ module thud_finite_element
 
    public :: finite_element_type
 
-   !> Part of it at which a running computation is stopped as unstable.
+   !> Residual of the energy at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
-   !> Most steps of elements in a run; they take about half an hour.
+   !> Maximum number of steps of elements in a run; they take about half an hour.
    real(wp), parameter :: max_work = 2.0e10_wp
 
-   !> Time between two looks at the step, s: the ball deforms little meanwhile.
+   !> Time between two checks of the step, s: the ball deforms little in it.
    real(wp), parameter :: look_interval = 0.25e-3_wp
 
    !> The contacts of a run.
@@ -56,22 +56,19 @@ module thud_finite_element
 
 contains
 
-   !> About the time that one drop takes on one core, s.
+   !> Approximate time of one drop on one core, s.
    function get_cost(options) result(cost)
-      !> The options.
       class(finite_element_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
 
-      ! Elements, and steps that are as short as the elements are small.
+      ! The number of elements, and of steps, which grows as they shrink.
       cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
    end function get_cost
 
    !> Loss factor of the material in shear against frequency.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The options.
       class(finite_element_type), intent(in) :: options
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)
@@ -90,13 +87,11 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Mesh, material, contact.
       class(finite_element_type), intent(in) :: options
-      !> Sampling rate, length of the record, least number of steps in a sampling interval.
+      !> Sampling rate, length of the record, minimum number of steps in a sampling interval.
       type(sampling_type), intent(in) :: sampling
       !> Force and motion, with the energies in the channels, and snapshots of the deformed ball.
       type(force_history_type), intent(out) :: history
@@ -127,15 +122,12 @@ contains
 
    !> Marches until the ball has left for good.
    subroutine march(run, start, contacts, options, sampling, history, error)
-      !> The ball.
       type(impact_run_type), intent(inout) :: run
       !> Height of its centre of mass at first touch, m.
       real(wp), intent(in) :: start
-      !> Its contacts.
       type(contacts_type), intent(inout) :: contacts
       !> Bounces, flight, step.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Gets its samples, its snapshots, and contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
@@ -157,7 +149,7 @@ contains
          if (allocated(error)) return
          do k = 0, n_step - 1
             time = (i - 1)*interval + k*(interval/n_step)
-            ! The next contact is not asked for.
+            ! No further contact is wanted.
             if (contacts%n_over >= options%bounces .and. will_touch(run, interval/n_step)) exit samples
             call kick(run, interval/n_step)
             if (i + k == 1) first_energy = get_energy(run)
@@ -189,13 +181,11 @@ contains
 
    !> Chooses the number of steps in the next sampling intervals. Refuses a run that takes too long.
    subroutine look_at_step(run, time, options, sampling, n_sample, n_step, error)
-      !> The ball.
       type(impact_run_type), intent(inout) :: run
       !> Time since the record began, s.
       real(wp), intent(in) :: time
       !> Safety of the step.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Samples of the record.
       integer, intent(in) :: n_sample
@@ -218,10 +208,8 @@ contains
 
    !> Adds the impulse of the floor in one step to the record, as part of the means around two samples.
    pure subroutine add_impulse(impulse, interval, i, share, history)
-      !> The impulse, N s.
-      real(wp), intent(in) :: impulse
-      !> Sampling interval, s.
-      real(wp), intent(in) :: interval
+      !> The impulse, N s; sampling interval, s.
+      real(wp), intent(in) :: impulse, interval
       !> Number of the sample before it.
       integer, intent(in) :: i
       !> Part of the step that lies nearer to the next sample.
@@ -238,11 +226,9 @@ contains
 
    !> Whether a node may reach the floor in the next step.
    pure function will_touch(run, step) result(touches)
-      !> The ball.
       type(impact_run_type), intent(in) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: step
-      !> It may.
       logical :: touches
 
       associate (last => ubound(run%position, 2))
@@ -250,11 +236,10 @@ contains
       end associate
    end function will_touch
 
-   !> Beginning of a sentence on what happened when.
+   !> Beginning of a sentence with the time of an event.
    function place(time) result(text)
       !> Time since the record began, s.
       real(wp), intent(in) :: time
-      !> The beginning.
       character(len=64) :: text
 
       text = '&finite_element: '//to_text(1.0e3_wp*time)//' ms after the start'
@@ -262,14 +247,10 @@ contains
 
    !> Follows the contacts: when they begin and end, and what they leave of the velocity.
    subroutine follow_contact(run, contacts, time, step, history)
-      !> The ball.
       type(impact_run_type), intent(in) :: run
-      !> Its contacts.
       type(contacts_type), intent(inout) :: contacts
-      !> Time since the record began, s.
-      real(wp), intent(in) :: time
-      !> Length of the step, s.
-      real(wp), intent(in) :: step
+      !> Time since the record began, s; length of the step, s.
+      real(wp), intent(in) :: time, step
       !> Gets contact time and restitution of the first contact.
       type(force_history_type), intent(inout) :: history
       real(wp) :: speed
@@ -289,15 +270,12 @@ contains
       end if
    end subroutine follow_contact
 
-   !> Complains about a ball that cannot be computed any further.
+   !> Refuses a ball that cannot be computed any further.
    subroutine check_run(run, time, first_energy, history, error)
-      !> The ball.
       type(impact_run_type), intent(in) :: run
-      !> Time since the record began, s.
-      real(wp), intent(in) :: time
-      !> Energy of the first sample, J.
-      real(wp), intent(in) :: first_energy
-      !> Gets the largest residual of the energy, relative to the energy of motion at first touch.
+      !> Time since the record began, s; energy of the first sample, J.
+      real(wp), intent(in) :: time, first_energy
+      !> Gets the maximum residual of the energy, relative to the energy of motion at first touch.
       type(force_history_type), intent(inout) :: history
       !> What happened, when and why.
       type(error_type), allocatable, intent(out) :: error

@@ -16,13 +16,13 @@ module thud_finite_element_options
 
    public :: finite_element_options_type, get_frame_count, get_stride
 
-   !> Most memory for snapshots, bytes.
+   !> Maximum memory for snapshots, bytes.
    real(wp), parameter :: max_motion_bytes = 4.0e8_wp
 
-   !> Least sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
+   !> Minimum sampling rate, Hz: the mean over an interval then takes 0.03 dB off the highest octave.
    real(wp), parameter :: min_rate = 16000.0_wp
 
-   !> Least number of elements through the wall that bend as the wall does.
+   !> Minimum number of elements through the wall that bend as the wall does.
    integer, parameter :: min_radial = 2
 
    !> Options of the model.
@@ -37,11 +37,8 @@ module thud_finite_element_options
       real(wp) :: step_safety = 0.85_wp
       !> Time between snapshots of the deformed ball, s; 0 for none.
       real(wp) :: snapshot_interval = 1.0e-3_wp
-      !> Mesh.
       type(mesh_options_type) :: mesh
-      !> Material.
       type(material_options_type) :: material
-      !> Contact.
       type(contact_options_type) :: contact
    contains
       procedure, pass(options) :: get_fields
@@ -51,7 +48,7 @@ module thud_finite_element_options
 
 contains
 
-   !> Keys and allowed ranges; some stand in groups of their own.
+   !> Keys and allowed ranges; some belong to groups of their own.
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(finite_element_options_type), intent(in), target :: options
@@ -74,13 +71,10 @@ contains
 
    !> Refuses options that do not fit each other, the ball or the memory.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: bytes
 
@@ -105,9 +99,7 @@ contains
 
    !> Size of the snapshots.
    function get_snapshot_shape(options, sampling) result(extents)
-      !> The options.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer :: extents(3)
@@ -115,13 +107,10 @@ contains
       extents = [options%mesh%polar_elements + 1, options%mesh%radial_elements + 1, get_frame_count(options, sampling)]
    end function get_snapshot_shape
 
-   !> Most snapshots of a run.
+   !> Maximum number of snapshots of a run.
    pure function get_frame_count(options, sampling) result(n_frame)
-      !> The options.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
-      !> The number.
       integer :: n_frame
 
       n_frame = 0
@@ -132,7 +121,6 @@ contains
    pure function get_stride(options, sampling) result(stride)
       !> The options, with snapshots.
       class(finite_element_options_type), intent(in) :: options
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> The number, at least 1.
       integer :: stride

@@ -52,13 +52,10 @@ contains
 
    !> The contact of a ball.
    pure function new_floor_contact(options, mesh, material) result(contact)
-      !> The options.
       type(contact_options_type), intent(in) :: options
       !> Mesh of order 1, undeformed.
       type(mesh_type), intent(in) :: mesh
-      !> The material.
       type(material_type), intent(in) :: material
-      !> The contact.
       type(floor_contact_type) :: contact
       real(wp) :: modulus
 
@@ -73,7 +70,6 @@ contains
 
    !> Forces of the penalty.
    pure subroutine get_penalty_forces(contact, height, force, energy)
-      !> The contact.
       type(floor_contact_type), intent(in) :: contact
       !> Heights of the nodes of the outer surface over the floor, m: [0:n_polar].
       real(wp), intent(in) :: height(0:)
@@ -91,7 +87,6 @@ contains
 
    !> Stops the nodes that would pass the floor in the next step.
    pure subroutine stop_at_floor(contact, mass, height, interval, velocity, impulse)
-      !> The contact.
       type(floor_contact_type), intent(in) :: contact
       !> Masses of the nodes, kg: [0:n_polar].
       real(wp), intent(in) :: mass(0:)

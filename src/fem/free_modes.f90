@@ -20,10 +20,10 @@ module thud_free_modes
    !> Relative error of the eigenvalues that ends the iteration, far below that of the mesh.
    real(wp), parameter :: eigenvalue_tolerance = 1.0e-11_wp
 
-   !> Most restarts of the Lanczos method; a few are needed.
+   !> Maximum number of restarts of the Lanczos method; a few are needed.
    integer, parameter :: max_restarts = 300
 
-   !> Stands for a failure of the operator where ARPACK tells its own.
+   !> Marks a failure of the operator among ARPACK's own.
    integer, parameter :: volume_lost = -1000
 
    !> Highest harmonic that a mode is looked for in.
@@ -33,11 +33,10 @@ module thud_free_modes
    type :: modes_options_type
       !> Number of elastic modes; 0 where none are asked for.
       integer :: count = 6
-      !> Numbers of elements.
       type(mesh_options_type) :: mesh
    end type modes_options_type
 
-   !> The elastic modes in ascending order; the rigid motion is told apart.
+   !> The elastic modes in ascending order; the rigid motion is kept separately.
    type :: free_modes_type
       !> Mesh of order 2 that the shapes belong to.
       type(mesh_type) :: mesh
@@ -48,7 +47,7 @@ module thud_free_modes
       !> Mass of the ball times the squared vertical amplitude of the lowest point at unit modal mass,
       !> 1 for the rigid motion: how strongly a contact there drives the mode: [n_mode].
       real(wp), allocatable :: participation(:)
-      !> Displacements in r and z, the largest of length 1, the lowest point moving upwards:
+      !> Displacements in r and z, the maximum of length 1, the lowest point moving upwards:
       !> [2, 0:n_line, 0:n_ring, n_mode].
       real(wp), allocatable :: shape(:, :, :, :)
       !> Frequency that the rigid motion along the axis came out with, Hz; exactly it is 0.
@@ -72,24 +71,20 @@ contains
    subroutine check_modes(options, error)
       !> Number of modes, and the mesh.
       type(modes_options_type), intent(in) :: options
-      !> Names the count and the most that is allowed.
+      !> Names the count and its maximum.
       type(error_type), allocatable, intent(out) :: error
-      integer :: most
+      integer :: max_count
 
-      most = options%mesh%polar_elements*options%mesh%radial_elements/4
-      if (options%count > most) error = input_error('&modes: count = '//to_text(options%count) &
-         //' is not allowed with so few elements; allowed: 1 to '//to_text(most)//', a quarter of their number')
+      max_count = options%mesh%polar_elements*options%mesh%radial_elements/4
+      if (options%count > max_count) error = input_error('&modes: count = '//to_text(options%count) &
+         //' is not allowed with so few elements; allowed: 1 to '//to_text(max_count)//', a quarter of their number')
    end subroutine check_modes
 
    !> The lowest elastic modes of a ball.
    subroutine get_free_modes(ball, mesh_options, count, modes, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> Numbers of elements.
       type(mesh_options_type), intent(in) :: mesh_options
-      !> Number of modes.
       integer, intent(in) :: count
-      !> The modes.
       type(free_modes_type), intent(out) :: modes
       !> The modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
@@ -115,7 +110,6 @@ contains
 
    !> Lowest eigenpairs, by the shift-invert Lanczos method.
    subroutine find_eigenpairs(matrices, count, eigenvalue, vector, error)
-      !> Matrices of the ball.
       type(mode_matrices_type), intent(in) :: matrices
       !> Number of pairs.
       integer, intent(in) :: count
@@ -145,7 +139,7 @@ contains
       failed = .false.
       ! ARPACK keeps its state in static memory: one thread at a time.
       !$omp critical (arpack)
-      turns: do
+      iterations: do
          call dsaupd(ido, 'G', n, 'LM', count, eigenvalue_tolerance, resid, ncv, basis, n, iparam, ipntr, workd, workl, &
             size(workl), info)
          associate (x => workd(ipntr(1):ipntr(1) + n - 1), y => workd(ipntr(2):ipntr(2) + n - 1))
@@ -160,11 +154,11 @@ contains
                call apply_mass(matrices, x, product)
                y = product
             case default
-               exit turns
+               exit iterations
             end select
          end associate
-         if (failed) exit turns
-      end do turns
+         if (failed) exit iterations
+      end do iterations
       if (failed) info = volume_lost
       allocate (vector(n, count))
       if (info == 0) call dseupd(.true., 'A', select, eigenvalue, vector, n, matrices%shift, 'G', n, 'LM', count, &
@@ -176,15 +170,12 @@ contains
 
    !> Shape, harmonic and participation of one mode.
    subroutine describe(ball, matrices, vector, mesh, shape, harmonic, participation)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> Matrices of the ball.
       type(mode_matrices_type), intent(in) :: matrices
       !> Displacements at unit modal mass: [n].
       real(wp), intent(in) :: vector(:)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
-      !> Displacements, the largest of length 1: [2, 0:n_line, 0:n_ring].
+      !> Displacements, the maximum of length 1: [2, 0:n_line, 0:n_ring].
       real(wp), intent(out) :: shape(:, 0:, 0:)
       !> Order of the Legendre polynomial that dominates.
       integer, intent(out) :: harmonic
@@ -216,9 +207,8 @@ contains
       real(wp), intent(in) :: normal(:)
       !> Cosine of the angle at these points: [n].
       real(wp), intent(in) :: cosine(:)
-      !> The order.
       integer :: harmonic
-      ! Higher orders look like lower ones on so few points.
+      ! Higher orders would alias on so few points.
       real(wp), dimension(0:min(max_harmonic, (size(normal) - 1)/2)) :: value, first, second, coefficient
       integer :: i
 

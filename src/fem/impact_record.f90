@@ -15,27 +15,25 @@ module thud_impact_record
 
    public :: continue_flight, finish_record, new_impact_record, record_sample
 
-   !> Part of the energy at first touch by which the balance may miss.
+   !> Maximum error of the balance of energy, over the energy at first touch.
    real(wp), parameter :: max_energy_residual = 0.005_wp
 
-   !> Part of the change of momentum by which the impulse of the record may miss.
+   !> Maximum error of the impulse of the record, over the change of momentum.
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
    !> Part of the wall that the surface may sink into the floor.
    real(wp), parameter :: max_sink = 0.01_wp
 
-   !> Columns of the channels that are told apart here.
+   !> Columns of the channels.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
 
 contains
 
    !> A record without force.
    pure function new_impact_record(sampling, impact_velocity) result(history)
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> The record.
       type(force_history_type) :: history
 
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
@@ -54,7 +52,6 @@ contains
       integer, intent(in) :: i
       !> Height of the centre of mass at first touch, m.
       real(wp), intent(in) :: start
-      !> The history.
       type(force_history_type), intent(inout) :: history
 
       history%deflection(i) = start - get_mean_height(run)
@@ -75,7 +72,6 @@ contains
       integer, intent(in) :: last
       !> Height of the centre of mass at first touch, m.
       real(wp), intent(in) :: start
-      !> The history.
       type(force_history_type), intent(inout) :: history
       real(wp) :: mass, speed, rise, time
       integer :: i
@@ -83,7 +79,7 @@ contains
       mass = sum(run%mass(:, :, 2))
       do i = last + 1, size(history%deflection)
          associate (first => -history%deflection(last), upwards => -history%velocity(last))
-            ! Where the flight meets the height of first touch, it ends.
+            ! The flight ends at the height of first touch.
             time = (upwards + sqrt(upwards**2 + 2*run%gravity*max(first, 0.0_wp)))/run%gravity
             time = min(time, (i - last)/history%sample_rate)
             speed = upwards - run%gravity*time
@@ -99,11 +95,8 @@ contains
 
    !> Peaks of the impact, and the checks of the balances.
    subroutine finish_record(ball, run, sampling, speed, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The run.
       type(impact_run_type), intent(in) :: run
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Velocity downwards at the start, m/s.
       real(wp), intent(in) :: speed
@@ -116,7 +109,7 @@ contains
 
       history%part(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
-      ! Nodes that meet the floor one by one make spikes as high as the steps are short.
+      ! Nodes that touch one by one make spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
       history%peak_floor_force = history%peak_force

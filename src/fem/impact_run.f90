@@ -16,17 +16,15 @@ module thud_impact_run
    public :: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, max_steps
    public :: new_impact_run
 
-   !> Turns of the power iteration at the start, and in each later look at the step.
-   integer, parameter :: first_turns = 80, next_turns = 3
+   !> Steps of the power iteration at the start, and at each later check of the step.
+   integer, parameter :: first_iterations = 80, next_iterations = 3
 
-   !> Most steps in a sampling interval.
+   !> Maximum number of steps in a sampling interval.
    integer, parameter :: max_steps = 100000
 
    !> What is known between steps; arrays over nodes are [0:n_polar, 0:n_radial, 2].
    type :: impact_run_type
-      !> The ball.
       type(elastic_body_type) :: body
-      !> Its contact.
       type(floor_contact_type) :: contact
       !> Gravity, m/s2.
       real(wp) :: gravity = 0.0_wp
@@ -66,19 +64,12 @@ contains
 
    !> A ball above the floor, falling.
    pure function new_impact_run(ball, options, material, gravity, gap, speed) result(run)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh and contact.
       class(finite_element_options_type), intent(in) :: options
-      !> The material.
       type(material_type), intent(in) :: material
-      !> Gravity, m/s2.
-      real(wp), intent(in) :: gravity
-      !> Height of the lowest point, m.
-      real(wp), intent(in) :: gap
-      !> Velocity downwards, m/s.
-      real(wp), intent(in) :: speed
-      !> The run.
+      !> Gravity, m/s2; height of the lowest point, m; velocity downwards, m/s.
+      real(wp), intent(in) :: gravity, gap, speed
       type(impact_run_type) :: run
 
       run%body = new_elastic_body(ball, new_mesh(ball, options%mesh, 1), material)
@@ -97,41 +88,38 @@ contains
    end function new_impact_run
 
    !> Number of steps in a sampling interval that keeps the run stable.
-   pure subroutine choose_step(run, interval, safety, least, n_step)
-      !> The run.
+   pure subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
-      !> Sampling interval, s.
-      real(wp), intent(in) :: interval
-      !> Part of the limit of stability to be used.
-      real(wp), intent(in) :: safety
-      !> Least number of steps.
-      integer, intent(in) :: least
+      !> Sampling interval, s; part of the limit of stability to be used.
+      real(wp), intent(in) :: interval, safety
+      integer, intent(in) :: min_steps
       !> The number so far, 0 at the start; the number to go on with, `max_steps` or more where there
       !> would have to be too many.
       integer, intent(inout) :: n_step
       real(wp) :: growth, ratio, wave, width
-      integer :: n_turn, turn
+      integer :: n_iteration, iteration
 
-      n_turn = next_turns
+      n_iteration = next_iterations
       if (n_step == 0) then
-         n_turn = first_turns
+         n_iteration = first_iterations
          associate (material => run%body%material, mesh => run%body%mesh)
             wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
             associate (inner => mesh%r(mesh%n_polar/2, 0), next => mesh%r(mesh%n_polar/2, 1))
                width = min(next - inner, pi/real(mesh%n_polar, wp)*inner)
             end associate
          end associate
-         n_step = max(least, ceiling(min(interval*wave/width, 2.0_wp*max_steps)))
+         n_step = max(min_steps, ceiling(min(interval*wave/width, 2.0_wp*max_steps)))
       end if
-      do turn = 1, 20
+      do iteration = 1, 20
          if (n_step > max_steps) exit
-         call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_turn, run%direction, growth)
-         ! The next step will tell why there are no forces.
+         call find_growth(run%body, run%contact, run%position, run%velocity, interval/n_step, n_iteration, &
+            run%direction, growth)
+         ! The next step reports why there are no forces.
          if (growth >= huge(growth)) exit
          ratio = growth/(safety*max_growth)
-         ! Growth rises with the first to the second power of the step: take the worse.
+         ! Growth rises with the first to the second power of the step: take the higher.
          if (ratio <= 1.0_wp) then
-            n_step = max(least, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
+            n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit
          end if
          n_step = ceiling(n_step*min(ratio, 2.0_wp))
@@ -140,7 +128,6 @@ contains
 
    !> First half of a step: forces and energies where the ball is, and velocities half a step on.
    pure subroutine kick(run, interval)
-      !> The run.
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -176,7 +163,6 @@ contains
 
    !> Second half of a step: positions a step on.
    pure subroutine drift(run, interval)
-      !> The run.
       type(impact_run_type), intent(inout) :: run
       !> Length of the step, s.
       real(wp), intent(in) :: interval
@@ -188,7 +174,6 @@ contains
 
    !> Energy of the latest step, with all that was lost; it should not change.
    pure function get_energy(run) result(energy)
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> The energy, J.
       real(wp) :: energy
@@ -199,7 +184,6 @@ contains
 
    !> Height of the centre of mass.
    pure function get_mean_height(run) result(height)
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> The height, m.
       real(wp) :: height
@@ -209,7 +193,6 @@ contains
 
    !> Velocity of the centre of mass.
    pure function get_mean_velocity(run) result(velocity)
-      !> The run.
       type(impact_run_type), intent(in) :: run
       !> The velocity upwards, m/s.
       real(wp) :: velocity

@@ -15,7 +15,7 @@ module thud_material
    public :: check_material, get_material_fields, get_material_loss_factor, material_options_type, material_type, &
       max_branches, new_material
 
-   !> Most Maxwell branches.
+   !> Maximum number of Maxwell branches.
    integer, parameter :: max_branches = 16
 
    !> What the group asks for.
@@ -24,7 +24,7 @@ module thud_material
       character(len=name_length) :: law = 'neo_hookean'
       !> Part of the shear modulus that goes with the second invariant of a Mooney-Rivlin solid.
       real(wp) :: mooney_share = 0.2_wp
-      !> Most bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
+      !> Maximum bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
       real(wp) :: bulk_ratio = 200.0_wp
       !> Law of viscosity: `none`, `kelvin_voigt`, `constant_loss` or `prony`.
       character(len=name_length) :: viscosity = 'kelvin_voigt'
@@ -50,10 +50,8 @@ module thud_material
       real(wp) :: bulk_modulus = 0.0_wp
       !> Viscosity of Kelvin and Voigt, Pa s.
       real(wp) :: viscosity = 0.0_wp
-      !> Shear moduli of the Maxwell branches, Pa: [n_branch].
-      real(wp), allocatable :: branch_modulus(:)
-      !> Their relaxation times, s: [n_branch].
-      real(wp), allocatable :: branch_time(:)
+      !> Shear moduli, Pa, and relaxation times, s, of the Maxwell branches: [n_branch].
+      real(wp), allocatable :: branch_modulus(:), branch_time(:)
    end type material_type
 
 contains
@@ -71,7 +69,7 @@ contains
          real_field('mooney_share', options%mooney_share, '', &
          'part of the shear modulus with the second invariant, of mooney_rivlin', '[0, 1]'), &
          real_field('bulk_ratio', options%bulk_ratio, '', &
-         "most bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
+         "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'constant_loss', 'prony']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt; ' &
@@ -84,13 +82,11 @@ contains
          '(0, 1000]')]
    end function get_material_fields
 
-   !> Complains about options that do not fit each other, and about balls that the model cannot take.
+   !> Refuses options that do not fit each other, and balls that the model cannot take.
    subroutine check_material(options, ball, error)
       !> The options, each inside its own range.
       type(material_options_type), intent(in) :: options
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       integer :: n_share, n_time
 
@@ -115,9 +111,7 @@ contains
    subroutine new_material(options, ball, material, error)
       !> The options, checked.
       type(material_options_type), intent(in) :: options
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The material.
       type(material_type), intent(out) :: material
       !> No Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
@@ -150,7 +144,6 @@ contains
 
    !> Loss factor of the material in shear.
    pure elemental function get_material_loss_factor(material, frequency) result(loss_factor)
-      !> The material.
       type(material_type), intent(in) :: material
       !> Frequency, Hz.
       real(wp), intent(in) :: frequency

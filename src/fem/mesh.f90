@@ -50,13 +50,11 @@ contains
 
    !> Mesh of the undeformed ball around the origin.
    pure function new_mesh(ball, options, order) result(mesh)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Numbers of elements.
       type(mesh_options_type), intent(in) :: options
       !> Order of the elements, 1 or 2.
       integer, intent(in) :: order
-      !> The mesh.
       type(mesh_type) :: mesh
       real(wp) :: radius, angle
       integer :: i, j, n_ring, n_line

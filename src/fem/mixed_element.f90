@@ -29,10 +29,8 @@ contains
       real(wp), intent(in) :: r(n_node)
       !> Heights of the nodes, m: [9].
       real(wp), intent(in) :: z(n_node)
-      !> Shear modulus, Pa.
-      real(wp), intent(in) :: shear_modulus
-      !> Density, kg/m3.
-      real(wp), intent(in) :: density
+      !> Shear modulus, Pa; density, kg/m3.
+      real(wp), intent(in) :: shear_modulus, density
       !> Stiffness against distortion at constant volume, N/m, lower triangle: [18, 18].
       real(wp), intent(out) :: distortion(2*n_node, 2*n_node)
       !> Mean dilatations by displacements; bulk_modulus*transpose(dilatation)*dilatation is the
@@ -65,7 +63,7 @@ contains
             divergence(2::2) = gradient(:, 2)
             strain(4*k - 3:4*k, :) = get_distortion(sqrt(2*shear_modulus*volume), gradient, hoop, divergence)
             shape(k, :) = sqrt(density*volume)*value
-            ! Coordinates of the size of the element keep the functions of the pressure apart.
+            ! Coordinates scaled by the element keep the functions of the pressure well conditioned.
             basis = [1.0_wp, (radius - r(5))/(maxval(r) - minval(r)), &
                (dot_product(value, z) - z(5))/(maxval(z) - minval(z))]
             pressure = pressure + volume*spread(basis, 1, 3)*spread(basis, 2, 3)

@@ -2,7 +2,7 @@
 !>
 !> Below Poisson's ratio 1/2 the pressure is condensed in each element. At 1/2 every solution has to
 !> keep the mean dilatations at zero: an augmented Lagrangian does that with one factorisation
-!> of a positive definite matrix; each turn makes the dilatations some 1e-4 of what they were.
+!> of a positive definite matrix; each iteration reduces the dilatations by about 1e-4.
 module thud_mode_matrices
    use thud_ball, only: ball_type, get_density
    use thud_error, only: error_type, numerical_error
@@ -23,8 +23,8 @@ module thud_mode_matrices
    !> frequencies are off by less than 1e-8.
    real(wp), parameter :: constraint_tolerance = 1.0e-3_wp
 
-   !> Most turns of the augmented Lagrangian; two are needed.
-   integer, parameter :: max_turns = 30
+   !> Maximum number of iterations of the augmented Lagrangian; two are needed.
+   integer, parameter :: max_iterations = 30
 
    !> Matrices over the free displacements.
    type :: mode_matrices_type
@@ -52,11 +52,9 @@ contains
 
    !> Matrices of a ball, factored.
    subroutine new_mode_matrices(ball, mesh, matrices, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mesh of order 2.
       type(mesh_type), intent(in) :: mesh
-      !> The matrices.
       type(mode_matrices_type), intent(out) :: matrices
       !> The matrix is not positive definite.
       type(error_type), allocatable, intent(out) :: error
@@ -82,7 +80,6 @@ contains
 
    !> Numbers the displacements ring by ring along each polar line, which keeps the band narrow.
    pure subroutine number_unknowns(mesh, matrices)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
       !> Gets its unknowns.
       type(mode_matrices_type), intent(inout) :: matrices
@@ -117,12 +114,9 @@ contains
 
    !> Adds up the matrices of all elements.
    pure subroutine assemble(mesh, shear_modulus, density, matrices)
-      !> The mesh.
       type(mesh_type), intent(in) :: mesh
-      !> Shear modulus, Pa.
-      real(wp), intent(in) :: shear_modulus
-      !> Density, kg/m3.
-      real(wp), intent(in) :: density
+      !> Shear modulus, Pa; density, kg/m3.
+      real(wp), intent(in) :: shear_modulus, density
       !> Gets stiffness - shift*mass, mass and dilatations.
       type(mode_matrices_type), intent(inout) :: matrices
       real(wp) :: volume
@@ -160,7 +154,6 @@ contains
 
    !> Mass times displacements.
    pure subroutine apply_mass(matrices, x, y)
-      !> The matrices.
       type(mode_matrices_type), intent(in) :: matrices
       !> Displacements, m: [n].
       real(wp), intent(in) :: x(:)
@@ -172,7 +165,6 @@ contains
 
    !> Displacements under forces on the shifted system, without change of volume at Poisson's ratio 1/2.
    subroutine apply_inverse(matrices, force, x, failed)
-      !> The matrices.
       type(mode_matrices_type), intent(in) :: matrices
       !> Forces, N: [n].
       real(wp), intent(in) :: force(:)
@@ -182,14 +174,14 @@ contains
       logical, intent(out) :: failed
       real(wp) :: pressure(n_dilatation, size(matrices%place, 2)), change(n_dilatation, size(matrices%place, 2))
       real(wp) :: padded(matrices%n + 1)
-      integer :: turn, element, info
+      integer :: iteration, element, info
 
       failed = .false.
       x = force
       call dpbtrs('L', matrices%n, matrices%n_band, 1, matrices%factor, matrices%n_band + 1, x, matrices%n, info)
       if (.not. matrices%incompressible) return
       pressure = 0.0_wp
-      do turn = 1, max_turns
+      do iteration = 1, max_iterations
          padded(:matrices%n) = x
          padded(matrices%n + 1) = 0.0_wp
          do element = 1, size(matrices%place, 2)

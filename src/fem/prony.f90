@@ -31,7 +31,6 @@ contains
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
-      !> The ratio.
       real(wp) :: ratio
 
       ratio = 1 + sum(share*(omega*time)**2/(1 + (omega*time)**2))
@@ -45,7 +44,6 @@ contains
       real(wp), intent(in) :: time(:)
       !> Angular frequency, rad/s.
       real(wp), intent(in) :: omega
-      !> The loss factor.
       real(wp) :: loss_factor
 
       loss_factor = sum(share*omega*time/(1 + (omega*time)**2))/get_storage_ratio(share, time, omega)
@@ -56,7 +54,6 @@ contains
    !> Loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least
    !> squares over frequencies at equal steps of their logarithm.
    subroutine fit_constant_loss(loss_factor, share, time, error)
-      !> The loss factor.
       real(wp), intent(in) :: loss_factor
       !> Moduli of the branches over the long-term modulus: [n_branch].
       real(wp), allocatable, intent(out) :: share(:)
@@ -73,7 +70,7 @@ contains
       do i = 1, n_frequency
          omega = 2*pi*lowest*(highest/lowest)**((i - 1)/real(n_frequency - 1, wp))
          turn = omega*time
-         ! Each line over the storage modulus that a constant loss factor has, so that all count alike.
+         ! Each line over the storage modulus that a constant loss factor has, so that all weigh the same.
          matrix(i, :) = (turn - loss_factor*turn**2)/(1 + turn**2)
          right(i) = loss_factor
          matrix(i, :) = matrix(i, :)*omega**(-2/pi*atan(loss_factor))

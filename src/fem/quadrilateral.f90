@@ -29,10 +29,8 @@ contains
    pure subroutine get_shape(order, x, y, value, gradient)
       !> Order of the element, 1 or 2.
       integer, intent(in) :: order
-      !> First coordinate, -1 to 1.
-      real(wp), intent(in) :: x
-      !> Second coordinate, -1 to 1.
-      real(wp), intent(in) :: y
+      !> Coordinates, -1 to 1.
+      real(wp), intent(in) :: x, y
       !> Values: [(order + 1)**2].
       real(wp), intent(out) :: value(:)
       !> Derivatives by x and y: [(order + 1)**2, 2].

@@ -17,11 +17,11 @@ module thud_rubber
 
    public :: add_branch_stress, add_viscous_stress, get_elastic_stress, get_inverse_cube_root, get_volume_ratios
 
-   !> Range in which the polynomial starts the iteration for the cube root well enough: two turns
+   !> Range in which the polynomial starts the iteration for the cube root well enough: two iterations
    !> give all digits.
    real(wp), parameter :: start_from = 0.4_wp, start_to = 2.5_wp
 
-   !> Steps over the relaxation time beyond which a branch has no memory left.
+   !> Steps over the relaxation time beyond which a branch has lost its memory.
    real(wp), parameter :: max_steps_over_time = 100.0_wp
 
 contains
@@ -60,17 +60,17 @@ contains
       !> Their roots: [n].
       real(wp), intent(out) :: root(n)
       real(wp) :: rest
-      integer :: j, turn
+      integer :: j, iteration
 
       if (minval(x) < start_from .or. maxval(x) > start_to) then
          root = x**(-1.0_wp/3.0_wp)
          return
       end if
-      ! Least squares over the range, off by 4 % at most; each turn raises the error to its fourth power.
+      ! Least squares over the range, off by 4 % at most; each iteration raises the error to its fourth power.
       !$omp simd private(rest)
       do j = 1, n
          root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
-         do turn = 1, 2
+         do iteration = 1, 2
             rest = 1 - x(j)*root(j)**3
             root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
          end do
@@ -82,12 +82,8 @@ contains
       stress, energy)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Shear modulus, Pa.
-      real(wp), intent(in) :: shear_modulus
-      !> Part of it with the second invariant.
-      real(wp), intent(in) :: mooney_share
-      !> Bulk modulus, Pa.
-      real(wp), intent(in) :: bulk_modulus
+      !> Shear modulus, Pa; part of it with the second invariant; bulk modulus, Pa.
+      real(wp), intent(in) :: shear_modulus, mooney_share, bulk_modulus
       !> Volumes of the points, undeformed, m3: [n, point].
       real(wp), intent(in) :: weight(n, n_point)
       !> Volumes of the elements, undeformed, m3: [n].
@@ -225,12 +221,8 @@ contains
       power)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Shear modulus of the branch, Pa.
-      real(wp), intent(in) :: modulus
-      !> Relaxation time, s.
-      real(wp), intent(in) :: time
-      !> Length of the step, s.
-      real(wp), intent(in) :: interval
+      !> Shear modulus of the branch, Pa; relaxation time, s; length of the step, s.
+      real(wp), intent(in) :: modulus, time, interval
       !> The flow is taken to the end of the step; otherwise it stays, to try forces only.
       logical, intent(in) :: keep
       !> Volumes of the points, undeformed, m3: [n, point].
@@ -245,10 +237,8 @@ contains
       real(wp), intent(inout) :: flow(n, n_symmetric, n_point)
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(inout) :: stress(n, n_component, n_point)
-      !> Gets the energy of the branch added, J.
-      real(wp), intent(inout) :: energy
-      !> Gets the power dissipated added, W.
-      real(wp), intent(inout) :: power
+      !> Gets the energy of the branch added, J; gets the power dissipated added, W.
+      real(wp), intent(inout) :: energy, power
       real(wp), dimension(n) :: excess, root, shrink
       real(wp), dimension(n, n_symmetric) :: c, inverse, next
       real(wp) :: ratio
@@ -310,7 +300,7 @@ contains
 
       determinant = (tensor(:, 1)*tensor(:, 2) - tensor(:, 4)**2)*tensor(:, 3)
       call get_inverse_cube_root(n, determinant, root)
-      ! Adjugate over determinant, with the norm of the tensor taken out.
+      ! Adjugate over determinant, with the norm of the tensor removed.
       !$omp simd private(scale)
       do j = 1, n
          scale = 1/(root(j)*determinant(j))
@@ -326,10 +316,8 @@ contains
       power, excess)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Shear modulus, Pa.
-      real(wp), intent(in) :: modulus
-      !> Relaxation time, s.
-      real(wp), intent(in) :: time
+      !> Shear modulus, Pa; relaxation time, s.
+      real(wp), intent(in) :: modulus, time
       !> Volumes of the points, undeformed, m3: [n].
       real(wp), intent(in) :: weight(n)
       !> Deformation gradients: [n, component].
@@ -346,10 +334,8 @@ contains
       real(wp), intent(in) :: inverse(n, n_symmetric)
       !> Stresses, Pa: [n, component].
       real(wp), intent(inout) :: stress(n, n_component)
-      !> Gets the energy added, J.
-      real(wp), intent(inout) :: energy
-      !> Gets the power dissipated added, W.
-      real(wp), intent(inout) :: power
+      !> Gets the energy added, J; gets the power dissipated added, W.
+      real(wp), intent(inout) :: energy, power
       !> tr(Cbar Cv^-1)/3 - 1: [n].
       real(wp), intent(out) :: excess(n)
       real(wp) :: trace, square, coupling, factor

@@ -1,9 +1,9 @@
 !> The limit of stability of the central differences, found on the equations of motion themselves.
 !>
 !> With velocities half a step behind, the step dt is stable while dt**2 K + 2 dt C <= 4 M for the
-!> tangents K and C of elasticity and viscosity: the largest eigenvalue of the left side over M, here
-!> the growth, may reach 4. Power iteration finds it; each turn takes one evaluation of the
-!> forces. The direction is kept between calls, so that a few turns follow the deforming ball.
+!> tangents K and C of elasticity and viscosity: the maximum eigenvalue of the left side over M, here
+!> the growth, may reach 4. Power iteration finds it; each iteration takes one evaluation of the
+!> forces. The direction is kept between calls, so that a few iterations follow the deforming ball.
 module thud_stable_step
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
    use thud_floor_contact, only: floor_contact_type
@@ -16,14 +16,13 @@ module thud_stable_step
    !> Growth at the limit of stability.
    real(wp), parameter :: max_growth = 4.0_wp
 
-   !> Largest displacement that the forces are tried with, over the thickness of an element.
+   !> Maximum displacement that the forces are evaluated with, over the thickness of an element.
    real(wp), parameter :: trial = 1.0e-6_wp
 
 contains
 
    !> A direction that every motion has a part of, the fastest ones most.
    pure function get_first_direction(body) result(direction)
-      !> The body.
       type(elastic_body_type), intent(in) :: body
       !> The direction: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: direction(:, :, :)
@@ -41,11 +40,10 @@ contains
       direction(body%mesh%n_polar, :, 1) = 0.0_wp
    end function get_first_direction
 
-   !> Growth of a step, by some turns of the power iteration.
-   pure subroutine find_growth(body, contact, position, velocity, interval, n_turn, direction, growth)
+   !> Growth of a step, by some iterations of the power iteration.
+   pure subroutine find_growth(body, contact, position, velocity, interval, n_iteration, direction, growth)
       !> The body; it stays as it is.
       type(elastic_body_type), intent(inout) :: body
-      !> The contact.
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in), contiguous :: position(0:, 0:, :)
@@ -53,18 +51,17 @@ contains
       real(wp), intent(in), contiguous :: velocity(0:, 0:, :)
       !> Length of the step, s.
       real(wp), intent(in) :: interval
-      !> Number of turns.
-      integer, intent(in) :: n_turn
+      integer, intent(in) :: n_iteration
       !> Direction of the fastest motion, better after each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
-      !> The growth; of the body from below, close after tens of turns; of the springs of the floor from
+      !> The growth; of the body from below, close after tens of iterations; of the springs of the floor from
       !> above. Huge where there are no forces.
       real(wp), intent(out) :: growth
       real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
       real(wp) :: step, thickness
       real(wp) :: mass(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2)
       type(body_state_type) :: state
-      integer :: last, turn
+      integer :: last, iteration
 
       last = body%mesh%n_radial
       mass = spread(body%mass, 3, 2)
@@ -72,7 +69,7 @@ contains
       growth = huge(growth)
       call get_internal_forces(body, position, velocity, interval, .false., here, state)
       if (state%failure /= no_failure) return
-      do turn = 1, n_turn
+      do iteration = 1, n_iteration
          direction = direction/sqrt(sum(mass*direction**2))
          step = trial*thickness/maxval(abs(direction))
          call get_internal_forces(body, position + step*direction, velocity + 2*step/interval*direction, interval, .false., &
@@ -85,7 +82,7 @@ contains
          growth = sum(direction*product)
          direction = product/mass
       end do
-      ! The springs of the floor, by their largest part: some node is always about to touch it.
+      ! The springs of the floor, by their maximum: some node may touch it at any time.
       if (.not. contact%stops) growth = growth + interval**2*maxval(contact%stiffness/body%mass(:, last))
    end subroutine find_growth
 

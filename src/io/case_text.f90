@@ -18,11 +18,9 @@ contains
 
    !> Case from the text of a namelist file, complete and inside all ranges.
    subroutine read_case(text, default_name, case, error, unchecked)
-      !> Text of the file.
       character(len=*), intent(in) :: text
       !> Name of the case where the text gives none.
       character(len=*), intent(in) :: default_name
-      !> The case.
       type(case_type), target, intent(out) :: case
       !> What is wrong, with group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
@@ -60,7 +58,6 @@ contains
    subroutine check_use(groups, case, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Names the group and its line.
       type(error_type), allocatable, intent(out) :: error
@@ -88,7 +85,6 @@ contains
       type(field_type), intent(in) :: fields(:)
       !> Groups that have to be there: [n].
       character(len=*), intent(in) :: required_groups(:)
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       integer :: i, j
 
@@ -115,7 +111,6 @@ contains
 
    !> Sets the variables of one group.
    subroutine assign_group(group, fields, error)
-      !> The group.
       type(group_type), intent(in) :: group
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
@@ -139,7 +134,7 @@ contains
                error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
                   //' has no value; allowed: '//allowed)
             else
-               ! A key of two owners sets both.
+               ! A key of two owners sets both variables.
                do j = 1, size(fields)
                   if (is_meant(j) .and. .not. allocated(error)) call fields(j)%set_from_text(given%value, error)
                end do
@@ -179,9 +174,7 @@ contains
 
    !> The complete input as a namelist file; reading it gives the same case.
    subroutine get_case_text(case, text)
-      !> The case.
       type(case_type), intent(in), target :: case
-      !> Text of the file.
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: value
       type(field_type), allocatable :: fields(:)
@@ -201,7 +194,7 @@ contains
    end subroutine get_case_text
 
    !> Every key with its default, allowed range and meaning, as a commented namelist file. Groups
-   !> that the default model does not use stand behind `!`.
+   !> that the default model does not use follow a `!`.
    subroutine describe_keys(text)
       !> The description; a valid input file.
       character(len=:), allocatable, intent(out) :: text

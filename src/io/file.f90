@@ -9,8 +9,8 @@ module thud_file
 
    public :: get_file_stem, read_text_file, text_file_type
 
-   !> Size of the largest input file that is read, bytes.
-   integer(int64), parameter :: largest_input = 65536_int64
+   !> Maximum size of an input file, bytes.
+   integer(int64), parameter :: max_input_size = 65536_int64
 
    !> A file to be written.
    type :: text_file_type
@@ -24,9 +24,7 @@ contains
 
    !> The text of a file.
    subroutine read_text_file(path, text, error)
-      !> Path of the file.
       character(len=*), intent(in) :: path
-      !> Its text.
       character(len=:), allocatable, intent(out) :: text
       !> The file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
@@ -43,10 +41,10 @@ contains
          error = input_error('this is a directory; allowed: the path of a namelist file')
       else
          inquire (file=path, size=bytes)
-         if (bytes > largest_input .or. bytes < 1) then
-            ! Pipes and devices have no size; to open one could take for ever.
+         if (bytes > max_input_size .or. bytes < 1) then
+            ! Pipes and devices have no size; opening one could block.
             error = input_error('the file is '//trim(merge('empty or not a regular file', 'too large                  ', &
-               bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(largest_input))//' bytes')
+               bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(max_input_size))//' bytes')
             return
          end if
          open (newunit=unit, file=path, status='old', action='read', access='stream', form='unformatted', &
@@ -65,7 +63,6 @@ contains
 
    !> Name of a file without directory and ending.
    pure function get_file_stem(path) result(stem)
-      !> Path of the file.
       character(len=*), intent(in) :: path
       !> Its stem: `inputs/ball.nml` gives `ball`.
       character(len=:), allocatable :: stem

@@ -17,7 +17,7 @@ contains
 
    !> Puts the set of a workspace in the place of the one before.
    subroutine replace_set(workspace, place, names, same, exchangeable, error)
-      !> The workspace; what it holds afterwards is to be cleared.
+      !> The workspace; its remaining files are to be cleared.
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
       character(len=*), intent(in) :: place
@@ -46,10 +46,7 @@ contains
 
    !> Exchanges workspace and directory; nothing has changed where that is impossible.
    subroutine exchange(workspace, place, found, replaced, names, done)
-      !> The workspace.
-      character(len=*), intent(in) :: workspace
-      !> The directory.
-      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: workspace, place
       !> Names in it: [n_found].
       character(len=*), intent(in) :: found(:)
       !> Names of files that are not carried over: [n_replaced].
@@ -69,7 +66,7 @@ contains
          call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
          if (.not. done) return
       end do
-      ! Without a manifest the old files would pass for the user's.
+      ! Without a manifest the old files would count as the user's.
       if (.not. any(found == manifest)) call add_names(place, names, error)
       done = .not. allocated(error)
       if (done) call exchange_directories(workspace, place, done)
@@ -82,12 +79,9 @@ contains
       end do
    end subroutine exchange
 
-   !> Moves the files of the workspace into the directory, so that those of two inputs never stand together.
+   !> Moves the files of the workspace into the directory, so that those of two inputs are never mixed.
    subroutine move_files(workspace, place, names, listed, same, error)
-      !> The workspace.
-      character(len=*), intent(in) :: workspace
-      !> The directory.
-      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: workspace, place
       !> Names of the files, the last of which says whose they are: [n_file].
       character(len=*), intent(in) :: names(:)
       !> Names of the files before: [n_listed].
@@ -100,7 +94,7 @@ contains
       integer :: i
       logical :: done
 
-      ! Who is killed from here on leaves files that are listed, and nothing that says whose they are.
+      ! A writer killed from here on leaves files that are listed, but no marker.
       call add_names(place, names, error)
       if (allocated(error)) return
       order = [character(len=name_length) :: names(size(names)), listed, names]
@@ -119,10 +113,8 @@ contains
 
    !> Empties a workspace. Files that its manifest does not list are the user's, left by a writer that was killed.
    subroutine clear_workspace(workspace, place)
-      !> The workspace, under its lock.
-      character(len=*), intent(in) :: workspace
-      !> The directory.
-      character(len=*), intent(in) :: place
+      !> The workspace, under its lock; the directory.
+      character(len=*), intent(in) :: workspace, place
       character(len=name_length), allocatable :: found(:), listed(:)
       logical :: done
       integer :: i
@@ -139,7 +131,6 @@ contains
 
    !> Names in the manifest of a directory.
    subroutine read_names(path, names)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The names, none without a manifest: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
@@ -165,7 +156,6 @@ contains
 
    !> Adds names to the manifest of a directory.
    subroutine add_names(path, names, error)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The names: [n_name].
       character(len=*), intent(in) :: names(:)

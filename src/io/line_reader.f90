@@ -19,9 +19,8 @@ module thud_line_reader
    !> An open text.
    type :: line_reader_type
       private
-      !> Its descriptor.
       integer :: descriptor = -1
-      !> What was read last.
+      !> The bytes read last.
       character(len=buffer_length) :: buffer = ''
       !> Bytes in it, and those that were given out.
       integer :: filled = 0, taken = 0
@@ -33,9 +32,7 @@ contains
 
    !> Opens a text.
    subroutine open_lines(path, reader, done)
-      !> Path of the file.
       character(len=*), intent(in) :: path
-      !> The text.
       type(line_reader_type), intent(out) :: reader
       !> It can be read.
       logical, intent(out) :: done
@@ -54,7 +51,6 @@ contains
 
    !> The next line, without its end.
    subroutine read_line(reader, line, length)
-      !> The text.
       type(line_reader_type), intent(inout) :: reader
       !> The line, as far as it fits.
       character(len=line_length), intent(out) :: line
@@ -77,7 +73,7 @@ contains
          length = min(length + n, line_length + 1)
          reader%taken = reader%taken + n + min(stop, 1)
          if (stop > 0) exit
-         ! A comment may be longer, but nobody writes endless ones.
+         ! Only comments may be longer.
          if (length > line_length .and. line(1:1) /= '#') exit
       end do
       if (length < 0) return
@@ -100,7 +96,6 @@ contains
 
    !> Closes a text; one that is closed stays so.
    subroutine close_lines(reader)
-      !> The text.
       type(line_reader_type), intent(inout) :: reader
 
       call close_descriptor(reader%descriptor)

@@ -21,7 +21,6 @@ contains
 
    !> Table and shapes of free modes.
    subroutine get_modes_files(modes, files)
-      !> The modes.
       type(free_modes_type), intent(in) :: modes
       !> The files: [2].
       type(text_file_type), intent(out) :: files(:)
@@ -48,7 +47,6 @@ contains
    pure function get_frame_name(i) result(name)
       !> Number of the snapshot.
       integer, intent(in) :: i
-      !> The name.
       character(len=16) :: name
 
       write (name, '("motion_", i5.5, ".vtu")') i
@@ -58,7 +56,6 @@ contains
    pure function estimate_motion_bytes(extents) result(bytes)
       !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer, intent(in) :: extents(3)
-      !> The bytes.
       real(wp) :: bytes
 
       ! Three vectors and two scalars a node; four corners, an offset and a type an element; in base 64.
@@ -69,7 +66,6 @@ contains
 
    !> Snapshots, their list, and the pressures on the floor.
    subroutine get_motion_files(motion, files)
-      !> The snapshots.
       type(motion_type), intent(in) :: motion
       !> The files: [n_frame + 2].
       type(text_file_type), intent(out) :: files(:)
@@ -97,7 +93,6 @@ contains
 
    !> Pressures on the floor, one line for each snapshot and node that touches it.
    subroutine get_pressure_csv(motion, text)
-      !> The snapshots.
       type(motion_type), intent(in) :: motion
       !> Text of `pressure.csv`.
       character(len=:), allocatable, intent(out) :: text
@@ -128,11 +123,8 @@ contains
 
    !> Nodes of the elements, around each of them as VTK has them.
    pure function get_cells(n_polar, n_radial, order) result(cell)
-      !> Elements from pole to pole.
-      integer, intent(in) :: n_polar
-      !> Elements through the wall.
-      integer, intent(in) :: n_radial
-      !> Order of the elements.
+      !> Elements from pole to pole; elements through the wall.
+      integer, intent(in) :: n_polar, n_radial
       integer, intent(in) :: order
       !> Numbers of the nodes: [4 or 9, n_element].
       integer :: cell((order + 1)**2, n_polar*n_radial)

@@ -3,7 +3,7 @@
 !> which key holds a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
-   use thud_text, only: lower_case, newline, to_text
+   use thud_text, only: lower_case, newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -25,14 +25,14 @@ module thud_namelist_text
       character(len=:), allocatable :: name
       !> Line of the `&`.
       integer :: line = 0
-      !> What stands in it, in order: [n_assignment].
+      !> Its assignments, in order: [n_assignment].
       type(assignment_type), allocatable :: assignments(:)
    end type group_type
 
    !> Letters, digits and the underscore make a name.
    character(len=*), parameter :: name_characters = 'abcdefghijklmnopqrstuvwxyz0123456789_'
 
-   !> What may stand between the parts.
+   !> Separators of the parts.
    character(len=*), parameter :: blanks = ' '//achar(9)//achar(10)//achar(13)
 
 contains
@@ -146,14 +146,10 @@ contains
 
    !> Splits the inside of a group at its equals signs.
    subroutine split_group(clean, structure, start, finish, group, error)
-      !> Text without comments.
-      character(len=*), intent(in) :: clean
-      !> The same without quoted text.
-      character(len=*), intent(in) :: structure
-      !> First place behind the group's name.
-      integer, intent(in) :: start
-      !> Last place before the group's end.
-      integer, intent(in) :: finish
+      !> Text without comments; the same without quoted text.
+      character(len=*), intent(in) :: clean, structure
+      !> First place after the name of the group; last place before its end.
+      integer, intent(in) :: start, finish
       !> The group, to which the assignments are added.
       type(group_type), intent(inout) :: group
       !> Something is not `key = value`.
@@ -187,18 +183,14 @@ contains
       end do
    end subroutine split_group
 
-   !> The next key and its equals sign; all behind the end where there is none.
+   !> The next key and its equals sign; all past the end where there is none.
    pure subroutine find_key(structure, from, first, last, equals)
       !> Text without comments and quoted text, up to the group's end.
       character(len=*), intent(in) :: structure
       !> Place to search from.
       integer, intent(in) :: from
-      !> First character of the key.
-      integer, intent(out) :: first
-      !> Last character of the key.
-      integer, intent(out) :: last
-      !> Place of the equals sign.
-      integer, intent(out) :: equals
+      !> First character of the key; last character of the key; place of the equals sign.
+      integer, intent(out) :: first, last, equals
 
       first = len(structure) + 1
       last = first
@@ -213,22 +205,17 @@ contains
    pure subroutine get_value(text, value)
       !> Text between an equals sign and the next key.
       character(len=*), intent(in) :: text
-      !> The value.
       character(len=:), allocatable, intent(out) :: value
-      integer :: first, last, i
+      integer :: first, last
 
       first = verify(text, blanks)
       last = verify(text, blanks//',', back=.true.)
       value = ''
-      if (first > 0 .and. last >= first) value = text(first:last)
-      do i = 1, len(value)
-         if (scan(value(i:i), blanks) > 0) value(i:i) = ' '
-      end do
+      if (first > 0 .and. last >= first) value = replaced(text(first:last), blanks, ' ')
    end subroutine get_value
 
    !> Number of the line that a place is in.
    pure function line_of(text, place) result(line)
-      !> The whole text.
       character(len=*), intent(in) :: text
       !> Place of a character.
       integer, intent(in) :: place

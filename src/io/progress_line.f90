@@ -42,9 +42,8 @@ contains
    subroutine print_line(done, whole, unit)
       !> How much has been computed.
       real(wp), intent(in) :: done
-      !> How much there is to compute at most; 0 where nobody knows.
+      !> Upper bound of the whole; 0 where unknown.
       real(wp), intent(in) :: whole
-      !> What is counted.
       character(len=*), intent(in) :: unit
       integer(int64) :: now
       integer :: status

@@ -20,7 +20,6 @@ contains
 
    !> Force and motion against time, one line per sample, 17 digits.
    function get_force_csv(history) result(text)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> Text of `force.csv`.
       character(len=:), allocatable :: text
@@ -43,7 +42,7 @@ contains
          write (row, csv_form) real(i - 1, wp)/history%sample_rate
          values = [history%deflection(i), history%velocity(i), history%part(i, :), history%elastic_force(i), &
             history%floor_force(i)]
-         ! Formatting takes most of a run's time, and most rows stand after the release.
+         ! Formatting takes most of a run's time, and most rows are after the release.
          if (i == 1 .or. any(abs(values) > 0.0_wp) .or. .not. at_rest) write (rest, csv_form) values
          at_rest = .not. any(abs(values) > 0.0_wp)
          row(25:) = ','//rest
@@ -53,7 +52,7 @@ contains
       end do
    end function get_force_csv
 
-   !> What else the model has to tell against time, 17 digits.
+   !> Channels of the model against time, 17 digits.
    function get_channels_csv(history) result(text)
       !> The history, with channels.
       type(force_history_type), intent(in) :: history
@@ -68,7 +67,7 @@ contains
          header = header//','//trim(history%channel_name(i))
       end do
       header = header//newline
-      ! One piece: text that grows line by line would be copied for each of them.
+      ! Allocated once: text that grows line by line would be copied for each line.
       allocate (character(len=len(header) + size(history%channel, 1)*len(row)) :: text)
       text(:len(header)) = header
       at = len(header)
@@ -82,9 +81,7 @@ contains
 
    !> Levels, limits and verdict per band.
    function get_levels_csv(case, verdict) result(text)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
       !> Text of `levels.csv`.
       character(len=:), allocatable :: text
@@ -95,7 +92,7 @@ contains
          text = text//','//trim(force_names(j))//'_level_dB'
       end do
       text = text//',lower_limit_dB,upper_limit_dB,verdict_'//trim(case%level_force)//newline
-      ! The octaves serve the verdict also where only others are asked for.
+      ! The octaves serve the verdict even where only other bands are asked for.
       do i = verdict%first_band, size(verdict%bands)
          associate (band => verdict%bands(i))
             text = text//trim(band%set)
@@ -118,11 +115,8 @@ contains
 
    !> The scalars of a run as a namelist file.
    function get_summary(case, history, verdict) result(text)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
-      !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
       !> Text of `summary.nml`.
       character(len=:), allocatable :: text
@@ -152,7 +146,6 @@ contains
 
    !> Numbers that the model chose or found as a namelist group.
    function fact_group(history) result(text)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> The group; empty where there are none.
       character(len=:), allocatable :: text
@@ -169,9 +162,7 @@ contains
 
    !> Where a value lies: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)
-      !> The criterion.
       type(criterion_type), intent(in) :: criterion
-      !> The verdict.
       character(len=:), allocatable :: word
 
       if (conforms(criterion)) then
@@ -183,12 +174,9 @@ contains
 
    !> One line of a namelist group.
    pure function line(key, value, note) result(text)
-      !> The key.
       character(len=*), intent(in) :: key
-      !> Its value as text.
-      character(len=*), intent(in) :: value
-      !> Unit or remark, may be empty.
-      character(len=*), intent(in) :: note
+      !> Its value as text; unit or remark, may be empty.
+      character(len=*), intent(in) :: value, note
       !> The line with its end.
       character(len=:), allocatable :: text
 
@@ -201,7 +189,6 @@ contains
    pure function joined(values) result(text)
       !> The numbers: [n].
       real(wp), intent(in) :: values(:)
-      !> The list.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -215,7 +202,6 @@ contains
    pure function joined_logicals(values) result(text)
       !> The truth values: [n].
       logical, intent(in) :: values(:)
-      !> The list.
       character(len=:), allocatable :: text
       integer :: i
 

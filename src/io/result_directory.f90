@@ -2,7 +2,7 @@
 !>
 !> A writer works in a workspace `.<name>.part` beside the directory `<name>`, or in the directory itself where the two
 !> cannot be exchanged, as with the working directory or a mount. The lock on the workspace makes writers wait for each
-!> other; what a dead one has left there is removed. The lock on the directory is for the moments of its check and of the
+!> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
    use thud_error, only: error_type, input_error, interrupted
@@ -21,7 +21,7 @@ module thud_result_directory
    character(len=*), parameter :: inner_workspace = '.thud.part'
 
    !> Whose results a directory holds: it is free, or they are of the same case with the same or another input.
-   integer, parameter :: nobody = 0, same_input = 1, other_input = 2
+   integer, parameter :: no_owner = 0, same_input = 1, other_input = 2
 
    !> A directory while its results are written.
    type :: result_directory_type
@@ -42,9 +42,8 @@ module thud_result_directory
 
 contains
 
-   !> Refuses a directory that holds anything else than results of the same case.
+   !> Refuses a directory that holds anything but results of the same case.
    subroutine check_owner(path, marker, differs, error)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.
       type(text_file_type), intent(in) :: marker
@@ -110,9 +109,8 @@ contains
       call add_names(directory%workspace, directory%names, error)
    end subroutine open_results
 
-   !> Ends the writing: all files stand in the directory, or none.
+   !> Ends the writing: all files are in the directory, or none.
    subroutine close_results(directory, differs, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
@@ -125,7 +123,7 @@ contains
       call end_file(directory, error)
       call write_file(directory, directory%marker, error)
       if (.not. allocated(error)) call publish(directory, differs, moved, error)
-      ! Where the workspace has moved, another one of its name is somebody else's.
+      ! Where the workspace has moved, another one of its name belongs to another writer.
       if (directory%workspace_lock >= 0 .and. .not. moved) then
          call clear_workspace(directory%workspace, directory%place)
          call remove_file(directory%workspace)
@@ -138,7 +136,6 @@ contains
 
    !> Begins a file.
    subroutine begin_file(directory, name, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> Name of the file, one of those given before.
       character(len=*), intent(in) :: name
@@ -155,9 +152,7 @@ contains
 
    !> Adds to the file that was begun last.
    subroutine add_text(directory, text, error)
-      !> The directory.
       type(result_directory_type), intent(in) :: directory
-      !> The text.
       character(len=*), intent(in) :: text
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
@@ -170,7 +165,6 @@ contains
 
    !> Ends the file that was begun last.
    subroutine end_file(directory, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
@@ -183,9 +177,7 @@ contains
 
    !> Writes a whole file.
    subroutine write_file(directory, file, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
-      !> The file.
       type(text_file_type), intent(in) :: file
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
@@ -198,7 +190,6 @@ contains
 
    !> Refuses to go on where a file was not written.
    subroutine require_written(directory, status, error)
-      !> The directory.
       type(result_directory_type), intent(in) :: directory
       !> 0, the number of the system's error, or negative after an interrupt.
       integer, intent(in) :: status
@@ -214,13 +205,12 @@ contains
       end if
    end subroutine require_written
 
-   !> Finds out whose results a directory holds.
+   !> Whose results a directory holds.
    subroutine find_owner(path, marker, owner, error)
-      !> The directory.
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.
       type(text_file_type), intent(in) :: marker
-      !> `nobody`, `same_input` or `other_input`.
+      !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
       !> It belongs to something else, or is no directory.
       type(error_type), allocatable, intent(out) :: error
@@ -229,7 +219,7 @@ contains
       character(len=:), allocatable :: text
       logical :: there
 
-      owner = nobody
+      owner = no_owner
       if (.not. directory_exists(path)) then
          inquire (file=path, exist=there)
          if (there) error = making_error(path)
@@ -241,9 +231,9 @@ contains
       if (.not. allocated(unreadable)) then
          if (index(text, marker%content(:index(marker%content, newline))) == 1) owner = merge(same_input, other_input, &
             text == marker%content)
-         if (owner /= nobody) return
+         if (owner /= no_owner) return
       else if (.not. any(found == marker%name)) then
-         ! Whoever was killed while files were moved one by one has left the manifest without the marker.
+         ! A writer killed while it moved files one by one has left the manifest without the marker.
          call read_names(path, listed)
          if (any(listed == marker%name)) return
       end if
@@ -253,7 +243,6 @@ contains
 
    !> Takes the workspace of a directory. Interrupts are kept from then on.
    subroutine take_workspace(directory, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> It cannot be made.
       type(error_type), allocatable, intent(out) :: error
@@ -289,11 +278,10 @@ contains
       call close_descriptor(directory%workspace_lock)
    end subroutine take_workspace
 
-   !> Locks a directory that is there, and finds out whose results it holds.
+   !> Locks a directory that is there, and finds whose results it holds.
    subroutine lock_place(directory, owner, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
-      !> `nobody`, `same_input` or `other_input`.
+      !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
       !> It belongs to something else, or cannot be written.
       type(error_type), allocatable, intent(out) :: error
@@ -306,7 +294,6 @@ contains
 
    !> Puts the files of the workspace in the place of those before.
    subroutine publish(directory, differs, moved, error)
-      !> The directory.
       type(result_directory_type), intent(inout) :: directory
       !> The files replace results of the same case with another input.
       logical, intent(out) :: differs
@@ -334,9 +321,7 @@ contains
 
    !> Error of a directory that cannot be made or written.
    pure function making_error(path) result(error)
-      !> The directory.
       character(len=*), intent(in) :: path
-      !> The error.
       type(error_type) :: error
 
       error = input_error('--output '//path//' cannot be made; allowed: a directory that you may write to')

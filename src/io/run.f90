@@ -13,7 +13,7 @@ module thud_run
    use thud_result_directory, only: check_owner, write_results
    use thud_system, only: get_free_bytes
    use thud_table, only: get_modes_table, get_table
-   use thud_text, only: fixed, newline, to_text
+   use thud_text, only: fixed, newline
    implicit none (type, external)
    private
 
@@ -22,10 +22,10 @@ module thud_run
    !> Files of an impact.
    character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
 
-   !> File of models that have more to tell.
+   !> File of models with channels.
    character(len=*), parameter :: channel_file = 'channels.csv'
 
-   !> The full input, which tells whose results a directory holds.
+   !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
 
    !> What a run leaves for its caller.
@@ -44,13 +44,10 @@ contains
 
    !> Runs a namelist file and writes its results.
    subroutine run_case(path, output, case, results, outcome, error)
-      !> Path of the namelist file.
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> The case.
       type(case_type), target, intent(out) :: case
-      !> Its results.
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -69,11 +66,9 @@ contains
 
    !> Computes a case and writes its results.
    subroutine store_case(case, output, results, outcome, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
-      !> The results.
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -101,9 +96,7 @@ contains
 
    !> Refuses snapshots that would fill the disk.
    subroutine check_space(case, directory, error)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Directory for the results.
       character(len=*), intent(in) :: directory
       !> Names the bytes that are wanted and those that are free.
       type(error_type), allocatable, intent(out) :: error
@@ -121,9 +114,7 @@ contains
 
    !> Table, verdict and files of results.
    subroutine describe(case, results, files, outcome)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its results.
       type(results_type), intent(in) :: results
       !> The files: [n_file].
       type(text_file_type), allocatable, intent(out) :: files(:)
@@ -161,11 +152,8 @@ contains
 
    !> Number of files of results.
    pure function count_files(case, results) result(n_file)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its results.
       type(results_type), intent(in) :: results
-      !> The number.
       integer :: n_file
 
       n_file = 0
@@ -178,9 +166,7 @@ contains
 
    !> Reads a case from a namelist file.
    subroutine load_case(path, case, error, unchecked)
-      !> Path of the file.
       character(len=*), intent(in) :: path
-      !> The case.
       type(case_type), intent(out) :: case
       !> Names file, group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error

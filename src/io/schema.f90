@@ -48,7 +48,6 @@ contains
 
    !> One key.
    subroutine describe(field, text)
-      !> The key.
       type(field_type), intent(in) :: field
       !> A JSON object.
       character(len=:), allocatable, intent(out) :: text
@@ -83,11 +82,9 @@ contains
 
    !> One end of a range: a number, or an expression in quotes.
    function end_value(number, expression) result(value)
-      !> The number.
       real(wp), intent(in) :: number
       !> The expression, blank where the end is a number.
       character(len=*), intent(in) :: expression
-      !> A JSON value.
       character(len=:), allocatable :: value
 
       value = to_text(number)
@@ -96,9 +93,8 @@ contains
 
    !> Text as a JSON value.
    pure function text_value(text) result(value)
-      !> The text; blanks behind it are dropped.
+      !> The text; trailing blanks are dropped.
       character(len=*), intent(in) :: text
-      !> It in quotes.
       character(len=:), allocatable :: value
       integer :: i
 
@@ -114,7 +110,6 @@ contains
    pure function list_of(words) result(list)
       !> The words: [n_word].
       character(len=*), intent(in) :: words(:)
-      !> The list.
       character(len=:), allocatable :: list
       integer :: i
 

@@ -5,7 +5,7 @@ module thud_set_report
    use thud_kinds, only: wp
    use thud_many, only: many_type
    use thud_set_table, only: set_table_type
-   use thud_text, only: newline, to_text
+   use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -15,11 +15,9 @@ contains
 
    !> First line of the results.
    subroutine get_set_header(table, many, text)
-      !> The table.
       type(set_table_type), intent(in) :: table
       !> The results, whose bands are known.
       type(many_type), intent(in) :: many
-      !> The line.
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
@@ -29,7 +27,7 @@ contains
       end do
       do i = 1, outcome_count
          text = text//','//trim(scalar_fields(i)%name)
-         if (scalar_fields(i)%unit /= '') text = text//'_'//underscored(trim(scalar_fields(i)%unit))
+         if (scalar_fields(i)%unit /= '') text = text//'_'//replaced(trim(scalar_fields(i)%unit), ' ', '_')
       end do
       do j = 1, force_count
          do i = many%first_band, size(many%bands)
@@ -44,19 +42,14 @@ contains
 
    !> Lines of the results, 17 digits; what could not be computed is left out.
    subroutine get_set_rows(table, before, values, first, last, many, text)
-      !> The table.
       type(set_table_type), intent(in) :: table
       !> Number of drops before the first of `values`.
       integer, intent(in) :: before
       !> The drops: [n_column, n_drop].
       real(wp), intent(in) :: values(:, :)
-      !> The first of them to be written.
-      integer, intent(in) :: first
-      !> The last of them to be written.
-      integer, intent(in) :: last
-      !> Their results.
+      !> The first and the last of them to be written.
+      integer, intent(in) :: first, last
       type(many_type), intent(in) :: many
-      !> The lines.
       character(len=:), allocatable, intent(out) :: text
       !> Width of a number with its comma, and of all that is none.
       integer, parameter :: number_width = 26, rest_width = 1024
@@ -97,23 +90,8 @@ contains
       text = text(:end_of_text)
    end subroutine get_set_rows
 
-   !> A unit as part of a name.
-   pure function underscored(unit) result(name)
-      !> The unit.
-      character(len=*), intent(in) :: unit
-      !> It without blanks.
-      character(len=len(unit)) :: name
-      integer :: i
-
-      name = unit
-      do i = 1, len(unit)
-         if (unit(i:i) == ' ') name(i:i) = '_'
-      end do
-   end function underscored
-
    !> A sentence as a cell.
    pure function in_quotes(sentence) result(cell)
-      !> The sentence.
       character(len=*), intent(in) :: sentence
       !> It in quotes, as far as there is space; quotes inside are doubled.
       character(len=2*len(sentence) + 2) :: cell

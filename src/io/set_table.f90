@@ -1,24 +1,21 @@
 !> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
-!> commas or blanks stand between the values, decimal commas beside tabs and semicolons; empty lines and what
+!> commas or blanks separate the values, decimal commas are allowed with tabs and semicolons; empty lines and what
 !> follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, key_length
+   use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_many, only: column_type, find_columns
-   use thud_system, only: directory_exists
-   use thud_text, only: join_quoted, lower_case, quoted, to_text
+   use thud_system, only: directory_exists, path_length
+   use thud_text, only: join_quoted, lower_case, quoted, replaced, to_text
    implicit none (type, external)
    private
 
    public :: open_set_table, read_sets, set_table_type
 
-   !> Longest path of a file.
-   integer, parameter :: path_length = 4096
-
-   !> Most columns.
+   !> Maximum number of columns.
    integer, parameter :: max_columns = 256
 
    !> Length of a name or value.
@@ -26,7 +23,6 @@ module thud_set_table
 
    !> An open table.
    type :: set_table_type
-      !> Path of the file.
       character(len=path_length) :: path = ''
       !> Its lines.
       type(line_reader_type) :: reader
@@ -42,11 +38,9 @@ contains
 
    !> Opens a table and reads its first line.
    subroutine open_set_table(path, case, table, error)
-      !> Path of the file.
       character(len=*), intent(in) :: path
       !> The case, which has the keys.
       type(case_type), intent(in), target :: case
-      !> The table.
       type(set_table_type), intent(out) :: table
       !> The file cannot be read, or a key is not known or given twice.
       type(error_type), allocatable, intent(out) :: error
@@ -82,9 +76,8 @@ contains
 
    !> The next drops.
    subroutine read_sets(table, values, n_set, error)
-      !> The table.
       type(set_table_type), intent(inout) :: table
-      !> Their values: [n_column, n_room].
+      !> Their values: [n_column, n_max].
       real(wp), intent(out) :: values(:, :)
       !> Number of drops that were read; fewer than fit at the end of the table.
       integer, intent(out) :: n_set
@@ -141,16 +134,15 @@ contains
       if (.not. there) call close_lines(table%reader)
    end subroutine next_line
 
-   !> Cells of a line: the first of tab, semicolon and comma that it holds stands between them, else blanks do.
+   !> Cells of a line: the first of tab, semicolon and comma that it holds separates them, else blanks.
    pure subroutine split_line(line, cells)
-      !> The line.
       character(len=*), intent(in) :: line
       !> The cells, without blanks and quotes around them: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
       character(len=1), parameter :: tab = achar(9)
       character(len=len(line)) :: rest
       character(len=1) :: separator
-      integer :: i, n, at, length, last, place
+      integer :: i, n, at, length, last
 
       separator = ' '
       if (index(line, ',') > 0) separator = ','
@@ -174,18 +166,15 @@ contains
       do i = 1, n
          length = len_trim(cells(i))
          if (length > 1 .and. scan(cells(i)(1:1), '''"') == 1) cells(i) = cells(i)(2:length - 1)
-         place = index(cells(i), ',')
-         if (place > 0) cells(i)(place:place) = '.'
+         cells(i) = replaced(cells(i), ',', '.')
       end do
    end subroutine split_line
 
    !> One value of a drop.
    subroutine read_value(table, column, word, value, error)
-      !> The table.
       type(set_table_type), intent(in) :: table
-      !> Number of its column.
       integer, intent(in) :: column
-      !> The value as it stands in the table.
+      !> The value as written in the table.
       character(len=*), intent(in) :: word
       !> The value; of a choice its number, of a flag 0 or 1.
       real(wp), intent(out) :: value
@@ -205,8 +194,15 @@ contains
             status = merge(0, 1, value > 0.0_wp)
          case ('flag')
             wanted = 'allowed; allowed: true, false'
-            status = merge(0, 1, any(lower_case(word) == [character(len=7) :: 'true', 'false', '.true.', '.false.', '1', '0']))
-            if (any(lower_case(word) == [character(len=7) :: 'true', '.true.', '1'])) value = 1.0_wp
+            select case (lower_case(word))
+            case ('true', '.true.', '1')
+               value = 1.0_wp
+               status = 0
+            case ('false', '.false.', '0')
+               status = 0
+            case default
+               continue
+            end select
          case default
             wanted = 'a number; allowed: a number in SI units'
             if (is_number(word)) read (word, *, iostat=status, iomsg=message) value
@@ -232,7 +228,6 @@ contains
 
    !> Error of a line.
    function line_error(table, message) result(error)
-      !> The table.
       type(set_table_type), intent(in) :: table
       !> What is wrong with the line.
       character(len=*), intent(in) :: message

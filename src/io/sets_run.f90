@@ -24,13 +24,13 @@ module thud_sets_run
    !> Files of the results.
    character(len=*), parameter :: result_file = 'sets.csv', input_file = 'sets.nml'
 
-   !> What many sets came to.
+   !> Summary of many sets.
    type :: tally_type
       !> Sets, those that were computed, and those that conform by the force of the case.
       integer :: sets = 0, computed = 0, conforming = 0
       !> Why the first of those failed that did.
       character(len=1024) :: failure = ''
-      !> Smallest and largest contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
+      !> Minimum and maximum contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
 
@@ -40,9 +40,7 @@ contains
    subroutine run_sets(path, table_path, threads, output, outcome, error)
       !> Path of the namelist file, which gives what the table does not.
       character(len=*), intent(in) :: path
-      !> Path of the table.
       character(len=*), intent(in) :: table_path
-      !> Number of threads.
       integer, intent(in) :: threads
       !> Directory for the results; empty for `outputs/<name of the case>_sets`.
       character(len=*), intent(in) :: output
@@ -61,7 +59,8 @@ contains
       if (allocated(error)) return
       ! Free modes are the same for all.
       case%has_modes = .false.
-      if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case with a source model')
+      if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case ' &
+         //'with a source model')
       if (allocated(error)) return
       call open_set_table(table_path, case, table, error)
       if (allocated(error)) return
@@ -89,15 +88,11 @@ contains
 
    !> Computes and writes chunk after chunk.
    subroutine write_sets(case, table, threads, results, tally, error)
-      !> The case.
       type(case_type), intent(in), target :: case
       !> The table, open.
       type(set_table_type), intent(inout) :: table
-      !> Number of threads.
       integer, intent(in) :: threads
-      !> Directory of the results.
       type(result_directory_type), intent(inout) :: results
-      !> What the sets came to.
       type(tally_type), intent(out) :: tally
       !> What went wrong before; or a value is none, the sampling cannot be used, the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
@@ -117,7 +112,7 @@ contains
          if (allocated(error) .or. n == 0) exit
          call solve_many(case, table%columns, values(:, :n), threads, .false., many, error)
          if (allocated(error)) exit
-         ! To write numbers takes longer than to compute them.
+         ! Writing numbers takes longer than computing them.
          !$omp parallel do num_threads(threads)
          do i = 1, threads
             call get_set_rows(table, tally%sets, values(:, :n), (i - 1)*n/threads + 1, i*n/threads, many, parts(i)%content)
@@ -137,9 +132,7 @@ contains
    pure function get_chunk_size(cost, threads) result(chunk_size)
       !> Time that one takes, s.
       real(wp), intent(in) :: cost
-      !> Number of threads.
       integer, intent(in) :: threads
-      !> Number of sets.
       integer :: chunk_size
 
       chunk_size = threads*max(1, min(16384/threads, nint(0.5_wp/cost)))
@@ -147,9 +140,7 @@ contains
 
    !> Adds sets to a tally.
    pure subroutine add(tally, many, force)
-      !> The tally.
       type(tally_type), intent(inout) :: tally
-      !> The results.
       type(many_type), intent(in) :: many
       !> Number of the force that the verdict is on.
       integer, intent(in) :: force
@@ -172,11 +163,8 @@ contains
 
    !> What the screen shows.
    subroutine describe(case, tally, text)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> What the sets came to.
       type(tally_type), intent(in) :: tally
-      !> The table.
       character(len=:), allocatable, intent(out) :: text
       type(band_type) :: octaves(octave_count)
       integer :: i

@@ -8,7 +8,7 @@ module thud_table
    use thud_kinds, only: wp
    use thud_report, only: get_word
    use thud_source_limits, only: conforms, criterion_type
-   use thud_text, only: fixed, newline, to_text
+   use thud_text, only: fixed, newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -18,13 +18,9 @@ contains
 
    !> The table that a run shows on the screen.
    function get_table(case, history, verdict) result(text)
-      !> The case.
       type(case_type), intent(in) :: case
-      !> Its force history.
       type(force_history_type), intent(in) :: history
-      !> Its levels and criteria.
       type(verdict_type), intent(in) :: verdict
-      !> The table.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -44,7 +40,7 @@ contains
             //scalar_row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp) &
             //scalar_row('peak elastic force', history%peak_force, 1, 'N') &
             //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
-            //scalar_row('largest deflection', history%max_deflection*1000, 3, 'mm') &
+            //scalar_row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
             //scalar_row('impulse', history%impulse, 3, 'N s') &
             //facts(history)//newline &
             //'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
@@ -54,9 +50,7 @@ contains
 
    !> The free modes on the screen.
    function get_modes_table(modes) result(text)
-      !> The modes.
       type(free_modes_type), intent(in) :: modes
-      !> The table.
       character(len=:), allocatable :: text
       integer :: i
 
@@ -71,11 +65,9 @@ contains
 
    !> One scalar of the table, with its limits where there are any.
    function scalar_row(name, value, decimals, unit, criterion, scale) result(row)
-      !> Name of the quantity.
       character(len=*), intent(in) :: name
       !> Its value in the shown unit.
       real(wp), intent(in) :: value
-      !> Digits behind the point.
       integer, intent(in) :: decimals
       !> The shown unit.
       character(len=*), intent(in) :: unit
@@ -83,7 +75,6 @@ contains
       type(criterion_type), intent(in), optional :: criterion
       !> Shown unit over SI unit.
       real(wp), intent(in), optional :: scale
-      !> The row.
       character(len=:), allocatable :: row
 
       row = '  '//padded(name, 20)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
@@ -96,38 +87,20 @@ contains
 
    !> Numbers that the model chose or found, as rows.
    function facts(history) result(rows)
-      !> The history.
       type(force_history_type), intent(in) :: history
-      !> One row each.
       character(len=:), allocatable :: rows
       integer :: i
 
       rows = ''
       do i = 1, size(history%fact_name)
-         rows = rows//'  '//padded(spaced(history%fact_name(i)), 20)//right(short_scientific(history%fact(i)), 10)//' ' &
-            //trim(history%fact_unit(i))//newline
+         rows = rows//'  '//padded(replaced(history%fact_name(i), '_', ' '), 20) &
+            //right(short_scientific(history%fact(i)), 10)//' '//trim(history%fact_unit(i))//newline
       end do
    end function facts
 
-   !> A name with blanks for its underscores.
-   pure function spaced(name) result(text)
-      !> The name.
-      character(len=*), intent(in) :: name
-      !> The text.
-      character(len=len(name)) :: text
-      integer :: i
-
-      text = name
-      do i = 1, len(name)
-         if (name(i:i) == '_') text(i:i) = ' '
-      end do
-   end function spaced
-
    !> A number with four digits.
    function short_scientific(value) result(text)
-      !> The number.
       real(wp), intent(in) :: value
-      !> Its text.
       character(len=:), allocatable :: text
       character(len=10) :: buffer
 
@@ -135,11 +108,9 @@ contains
       text = trim(adjustl(buffer))
    end function short_scientific
 
-   !> A limit with up to three decimals and no idle zeros.
+   !> A limit with up to three decimals and no trailing zeros.
    pure function short(value) result(text)
-      !> The limit.
       real(wp), intent(in) :: value
-      !> Its text.
       character(len=:), allocatable :: text
 
       text = fixed(value, 3)
@@ -147,25 +118,21 @@ contains
       if (text(len(text):) == '.') text = text(:len(text) - 1)
    end function short
 
-   !> Text with blanks behind it.
+   !> Left-justified text.
    pure function padded(text, width) result(cell)
-      !> The text.
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.
       integer, intent(in) :: width
-      !> The cell.
       character(len=:), allocatable :: cell
 
       cell = trim(text)//repeat(' ', max(width - len_trim(text), 0))
    end function padded
 
-   !> Text with blanks before it.
+   !> Right-justified text.
    pure function right(text, width) result(cell)
-      !> The text.
       character(len=*), intent(in) :: text
       !> Width of the cell; longer text keeps its length.
       integer, intent(in) :: width
-      !> The cell.
       character(len=:), allocatable :: cell
 
       cell = repeat(' ', max(width - len(text), 0))//text

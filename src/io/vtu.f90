@@ -20,7 +20,6 @@ contains
       real(wp), intent(in) :: point(:, :)
       !> Points of each cell, from 1: [n_corner, n_cell].
       integer, intent(in) :: cell(:, :)
-      !> Type of all cells.
       integer, intent(in) :: cell_type
       !> Names of the vectors: [n_vector].
       character(len=*), intent(in) :: vector_name(:)
@@ -30,7 +29,6 @@ contains
       character(len=*), intent(in) :: scalar_name(:)
       !> The scalars: [n_point, n_scalar].
       real(wp), intent(in) :: scalar(:, :)
-      !> Content of the file.
       character(len=:), allocatable, intent(out) :: text
       integer :: i, n_cell
 
@@ -56,18 +54,14 @@ contains
 
    !> Adds an array.
    subroutine add_array(name, type, n_component, bytes, text)
-      !> Name of the array.
-      character(len=*), intent(in) :: name
-      !> Type of its numbers.
-      character(len=*), intent(in) :: type
+      character(len=*), intent(in) :: name, type
       !> Numbers of each point or cell.
       integer, intent(in) :: n_component
       !> The numbers: [n_byte].
       integer(c_int8_t), intent(in) :: bytes(:)
-      !> Content of the file.
       character(len=:), allocatable, intent(inout) :: text
 
-      ! The length of the data stands before them.
+      ! The data follow their length.
       text = text//'<DataArray type="'//type//'" Name="'//name//'" NumberOfComponents="'//to_text(n_component) &
          //'" format="binary">'//encode([transfer(size(bytes, kind=c_int64_t), [0_c_int8_t]), bytes]) &
          //'</DataArray>'//newline
@@ -125,7 +119,6 @@ contains
       character(len=*), intent(in) :: name(:)
       !> Their times, s: [n].
       real(wp), intent(in) :: time(:)
-      !> Content of the file.
       character(len=:), allocatable, intent(out) :: text
       integer :: i
 

@@ -11,14 +11,11 @@ module thud_band
 
    !> Adjacent bands of one width.
    type :: band_set_type
-      !> Name of the set.
       character(len=24) :: name
       !> Width in tenths of a decade: 3 for octaves, 1 for third octaves.
       integer :: width
-      !> Mid frequency of the lowest band: its distance from 1 kHz in tenths of a decade.
-      integer :: first
-      !> Mid frequency of the highest band, likewise.
-      integer :: last
+      !> Mid frequencies of the lowest and highest band: distances from 1 kHz in tenths of a decade.
+      integer :: first, last
    end type band_set_type
 
    !> All sets; verdicts use the first, the octaves from 31.5 to 500 Hz.
@@ -43,10 +40,8 @@ module thud_band
       real(wp) :: nominal = 0.0_wp
       !> Exact mid frequency, Hz.
       real(wp) :: centre = 0.0_wp
-      !> Lower band edge, Hz.
-      real(wp) :: lower = 0.0_wp
-      !> Upper band edge, Hz.
-      real(wp) :: upper = 0.0_wp
+      !> Band edges, Hz.
+      real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type band_type
 
    !> Rounded mid frequencies in a decade, the series R10 of ISO 3.
@@ -76,7 +71,6 @@ contains
 
    !> Bands of a set; none where there is no set of that name.
    pure function get_bands(name) result(bands)
-      !> Name of the set.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable :: bands(:)
@@ -86,7 +80,6 @@ contains
 
    !> Bands of a set that must be known.
    subroutine find_bands(name, bands, error)
-      !> Name of the set.
       character(len=*), intent(in) :: name
       !> The bands, ascending: [n_band].
       type(band_type), allocatable, intent(out) :: bands(:)
@@ -98,7 +91,7 @@ contains
          //join_quoted(band_set_names))
    end subroutine find_bands
 
-   !> Bands of the levels of a case: the octaves, which verdicts use, and what is asked for besides.
+   !> Bands of the levels of a case: the octaves, which verdicts use, then the other bands asked for.
    pure subroutine get_level_bands(choice, bands, first)
       !> One of `band_choices`.
       character(len=*), intent(in) :: choice
@@ -114,9 +107,7 @@ contains
 
    !> Nominal frequency of a band as text: `31.5`, `63`.
    pure function get_band_name(band) result(name)
-      !> The band.
       type(band_type), intent(in) :: band
-      !> Its name.
       character(len=len(fixed(band%nominal, get_decimals(band)))) :: name
 
       name = fixed(band%nominal, get_decimals(band))
@@ -124,7 +115,6 @@ contains
 
    !> Decimals of a nominal frequency.
    pure function get_decimals(band) result(decimals)
-      !> The band.
       type(band_type), intent(in) :: band
       !> 0 or 1.
       integer :: decimals

@@ -25,13 +25,13 @@ module thud_band_projection
    !> Energy of the sequences that are left out, all bands together, over that of white noise in them.
    real(wp), parameter :: dropped = 1.0e-22_wp
 
-   !> Error of a quadrature over a band, relative to the largest value of its integrand.
+   !> Error of a quadrature over a band, relative to the maximum of its integrand.
    real(wp), parameter :: quadrature_error = 1.0e-17_wp
 
    !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
    integer, parameter :: margin = 32
 
-   !> Window lengths per doubling: a window is at most 1/11 longer than the record needs.
+   !> Window lengths per doubling: a window is at most 1/11 longer than needed.
    integer, parameter :: windows_per_octave = 8
 
    !> Shortest window, samples.
@@ -55,7 +55,7 @@ module thud_band_projection
 
 contains
 
-   !> Number of the shortest window that holds so many samples.
+   !> Number of the shortest window that holds the samples.
    elemental function get_window_class(n_sample) result(window)
       !> Samples of the record.
       integer, intent(in) :: n_sample
@@ -65,7 +65,7 @@ contains
       window = 1
       if (n_sample <= shortest_window) return
       window = floor(windows_per_octave*log(real(n_sample, wp)/shortest_window)/log(2.0_wp)) + 1
-      ! Lengths are rounded: the next one may be it.
+      ! Lengths are rounded: the next window may be the one.
       if (get_class_window(window) < n_sample) window = window + 1
    end function get_window_class
 
@@ -114,7 +114,6 @@ contains
 
    !> The sequences: eigenvectors of Slepian's tridiagonal matrix.
    subroutine set_sequences(projection, half_width, failed)
-      !> The projection.
       type(band_projection_type), intent(inout) :: projection
       !> W over the sampling rate.
       real(wp), intent(in) :: half_width
@@ -135,7 +134,7 @@ contains
          support, work, size(work), whole_work, size(whole_work), status)
       failed = status /= 0 .or. found /= rank
       if (failed) return
-      ! The largest value belongs to the first, symmetric sequence; then they take turns.
+      ! The maximum belongs to the first, symmetric sequence; then they alternate.
       vectors = vectors(:, rank:1:-1)
       projection%even = (vectors(:n/2, 1::2) + vectors(n:n/2 + 1:-1, 1::2))/2
       projection%odd = (vectors(:n/2, 2::2) - vectors(n:n/2 + 1:-1, 2::2))/2
@@ -173,9 +172,8 @@ contains
    !> sum of such functions. The remainder with N nodes is at most a**(2N) 2**(2N + 1) (N!)**4
    !> / ((2N + 1) ((2N)!)**3).
    elemental function get_node_count(a) result(count)
-      !> Largest angle a.
+      !> Maximum angle a.
       real(wp), intent(in) :: a
-      !> N.
       integer :: count
       real(wp) :: logarithm
 
@@ -206,7 +204,7 @@ contains
       end do
    end subroutine get_spectra
 
-   !> Leaves out the last sequences, as far as they hold no energy in the bands.
+   !> Leaves out the last sequences, which hold no energy in the bands.
    subroutine drop_sequences(sequences, spectra)
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), allocatable, intent(inout) :: sequences(:, :)
@@ -225,7 +223,6 @@ contains
    subroutine get_band_energies(projection, n_record, record, folded, energy, square_sum)
       !> Matrices for the length of the records.
       type(band_projection_type), intent(in) :: projection
-      !> Number of records.
       integer, intent(in) :: n_record
       !> The records, N: [n_record, n_sample].
       real(wp), intent(in) :: record(n_record, projection%n_sample)
@@ -270,7 +267,6 @@ contains
 
    !> Spectra of folded records.
    subroutine project(n_record, folded, sequences, spectra, spectrum)
-      !> Number of records.
       integer, intent(in) :: n_record
       !> Halves of the sequences: [n_half, n_sequence].
       real(wp), intent(in) :: sequences(:, :)

@@ -2,8 +2,8 @@
 !> (JIS A 1418-2, ISO 10140-5 annex F).
 !>
 !> The energy, 2 * integral of |F(f)|**2 df, is taken from the autocorrelation r of the record, without
-!> padding or window. With the angles m and h that the middle and the half width of the band turn
-!> through per sample it is 2/(pi f_s) * (h r(0) + 2 sum over the lags k of r(k) g(k) cos(m k) sin(h k)),
+!> padding or window. With the angles m and h that the middle and the half width of the band advance
+!> per sample it is 2/(pi f_s) * (h r(0) + 2 sum over the lags k of r(k) g(k) cos(m k) sin(h k)),
 !> g(k) = 1/k. For the sum over the bins of a zero-padded transform of N samples instead of the integral
 !> g(k) = d/sin(d k), d = pi/N, and the band reaches from half a bin below its first bin to half a bin
 !> above its last one.
@@ -26,11 +26,11 @@ module thud_force_exposure
    !> Maximum number of samples of a record: its transform still fits into memory and its length into an integer.
    integer, parameter :: max_samples = 100000000
 
-   !> Sum of squares below which a record is taken for zero, N^2: its rounding would underflow.
+   !> Sum of squares below which a record counts as zero, N^2: its rounding would underflow.
    real(wp), parameter :: min_energy = 1.0e-280_wp
 
-   !> Highest sampling rate, Hz: one second of it still fits into memory.
-   real(wp), parameter :: highest_rate = 1.0e7_wp
+   !> Maximum sampling rate, Hz: one second of it still fits into memory.
+   real(wp), parameter :: max_rate = 1.0e7_wp
 
 contains
 
@@ -66,7 +66,7 @@ contains
          error = input_error('the level method '//quoted(method)//' is not known; allowed: '//join_quoted(level_methods))
          return
       end select
-      ! Rounding blurs a band by about this part of the whole energy: no less can be resolved.
+      ! Rounding errors of a band are about this part of the whole energy, which limits the resolution.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
    end subroutine get_force_exposure_levels
@@ -79,14 +79,13 @@ contains
       real(wp), intent(in) :: sample_rate
       !> The bands: [n_band].
       type(band_type), intent(in) :: bands(:)
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: lowest_rate
+      real(wp) :: min_rate
 
-      lowest_rate = 2*maxval(bands%upper)
-      if (.not. (sample_rate >= lowest_rate .and. sample_rate <= highest_rate)) then
+      min_rate = 2*maxval(bands%upper)
+      if (.not. (sample_rate >= min_rate .and. sample_rate <= max_rate)) then
          error = input_error('sample_rate = '//to_text(sample_rate)//' Hz is not allowed; allowed: from ' &
-            //to_text(lowest_rate)//' Hz, twice the highest band edge, to '//to_text(highest_rate)//' Hz')
+            //to_text(min_rate)//' Hz, twice the highest band edge, to '//to_text(max_rate)//' Hz')
       else if (size(force) == 0 .or. size(force) > max_samples) then
          error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
       else if (.not. all(ieee_is_finite(force))) then
@@ -121,7 +120,7 @@ contains
       spacing = sample_rate/length
       first = ceiling(bands%lower/spacing)
       last = floor(bands%upper/spacing)
-      ! The transform of the window takes longer than the autocorrelation of a record far shorter.
+      ! For short records the autocorrelation is faster than the transform of the window.
       if (3*size(force) < length) then
          energy = get_energy(force, sample_rate, (first - 0.5_wp)*spacing, (last + 0.5_wp)*spacing, spacing)
       else
@@ -136,10 +135,8 @@ contains
       real(wp), intent(in) :: force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Lower edges, Hz: [n_band].
-      real(wp), intent(in) :: lower(:)
-      !> Upper edges, Hz: [n_band].
-      real(wp), intent(in) :: upper(:)
+      !> Edges, Hz: [n_band].
+      real(wp), intent(in) :: lower(:), upper(:)
       !> Distance of the bins, Hz; 0 for the integral.
       real(wp), intent(in) :: spacing
       !> Energy of each band, N^2 s: [n_band].
@@ -172,11 +169,8 @@ contains
    pure function get_wave_sum(x, m, h) result(total)
       !> Samples: [n].
       real(wp), intent(in), contiguous :: x(:)
-      !> Angle per sample of the cosine.
-      real(wp), intent(in) :: m
-      !> Angle per sample of the sine.
-      real(wp), intent(in) :: h
-      !> The sum.
+      !> Angles per sample of cosine and sine.
+      real(wp), intent(in) :: m, h
       real(wp) :: total
       integer, parameter :: block = 32
       real(wp) :: part(block, 4), start_wave(4), angle(2)
@@ -198,14 +192,13 @@ contains
       end do
    end function get_wave_sum
 
-   !> Angle from -pi to pi after so many samples. An angle rounded before its turns are taken off would err
-   !> the more the longer the record, and by the same in a whole block.
+   !> Angle from -pi to pi after so many samples. Without removing whole turns first, the rounding error would
+   !> grow with the length of the record.
    elemental function get_angle(per_sample, count) result(angle)
       !> Angle per sample.
       real(wp), intent(in) :: per_sample
       !> Number of samples, up to `max_samples`.
       integer, intent(in) :: count
-      !> The angle.
       real(wp) :: angle
       real(wp), parameter :: scale = 2.0_wp**24
       real(wp) :: turns, high

@@ -5,7 +5,7 @@ module thud_source_limits
    use thud_constants, only: recorded_band
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_text, only: join_quoted, quoted
+   use thud_text, only: join_quoted, quoted, replaced
    use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
@@ -25,10 +25,8 @@ module thud_source_limits
    type :: source_limits_type
       !> Name of the source.
       character(len=24) :: name
-      !> Minimum force exposure levels of the octaves 31.5 to 500 Hz, dB.
-      real(wp) :: lower_level(octave_count)
-      !> Maximum force exposure levels of the octaves 31.5 to 500 Hz, dB.
-      real(wp) :: upper_level(octave_count)
+      !> Minimum and maximum force exposure levels of the octaves 31.5 to 500 Hz, dB.
+      real(wp) :: lower_level(octave_count), upper_level(octave_count)
       !> Contact time, s.
       real(wp) :: contact_time(2) = [18.0e-3_wp, 22.0e-3_wp]
       !> Coefficient of restitution.
@@ -58,16 +56,13 @@ module thud_source_limits
 
    !> One quantity, the range that it must lie in, and whether it does.
    type :: criterion_type
-      !> Name of the quantity.
       character(len=24) :: name = ''
       !> SI unit or dB; empty for pure numbers.
       character(len=8) :: unit = ''
       !> Value of the source under test.
       real(wp) :: value = 0.0_wp
-      !> Minimum conforming value.
-      real(wp) :: lower = 0.0_wp
-      !> Maximum conforming value.
-      real(wp) :: upper = 0.0_wp
+      !> Minimum and maximum conforming value.
+      real(wp) :: lower = 0.0_wp, upper = 0.0_wp
    end type criterion_type
 
 contains
@@ -76,11 +71,9 @@ contains
    subroutine get_source_limits(source, limits, error)
       !> One of `source_names`.
       character(len=*), intent(in) :: source
-      !> Its limits.
       type(source_limits_type), intent(out) :: limits
       !> The source is not known.
       type(error_type), allocatable, intent(out) :: error
-
       integer :: at
 
       at = findloc(source_names == source, .true., dim=1)
@@ -94,20 +87,14 @@ contains
    !> All criteria for a source, in a fixed order.
    pure function get_criteria(limits, levels, contact_time, restitution, peak_count, mass, drop_height) &
       result(criteria)
-      !> Limits of the standards.
       type(source_limits_type), intent(in) :: limits
       !> Force exposure levels of the octaves 31.5 to 500 Hz, dB: [octave_count].
       real(wp), intent(in) :: levels(:)
-      !> Contact time, s.
-      real(wp), intent(in) :: contact_time
-      !> Coefficient of restitution.
-      real(wp), intent(in) :: restitution
-      !> Peaks of the force.
+      !> Contact time, s; coefficient of restitution.
+      real(wp), intent(in) :: contact_time, restitution
       integer, intent(in) :: peak_count
-      !> Mass of the source, kg.
-      real(wp), intent(in) :: mass
-      !> Height of drop, m.
-      real(wp), intent(in) :: drop_height
+      !> Mass of the source, kg; height of drop, m.
+      real(wp), intent(in) :: mass, drop_height
       !> The criteria: [criterion_count].
       type(criterion_type) :: criteria(criterion_count)
       type(band_type) :: octaves(octave_count)
@@ -129,28 +116,19 @@ contains
 
    !> Name of the level of a band: `octave_31_5`.
    pure function get_level_name(band) result(name)
-      !> The band.
       type(band_type), intent(in) :: band
-      !> Its level's name.
       character(len=24) :: name
-      integer :: at
 
-      name = trim(band%set)//'_'//get_band_name(band)
-      at = index(name, '.')
-      if (at > 0) name(at:at) = '_'
+      name = replaced(trim(band%set)//'_'//get_band_name(band), '.', '_')
    end function get_level_name
 
    !> Criterion of a value within a range.
    pure function between(name, unit, value, range) result(criterion)
-      !> Name of the quantity.
-      character(len=*), intent(in) :: name
-      !> Its unit.
-      character(len=*), intent(in) :: unit
+      character(len=*), intent(in) :: name, unit
       !> Value of the source under test.
       real(wp), intent(in) :: value
       !> Minimum and maximum conforming value: [2].
       real(wp), intent(in) :: range(2)
-      !> The criterion.
       type(criterion_type) :: criterion
 
       criterion = criterion_type(name, unit, value, range(1), range(2))
@@ -158,7 +136,6 @@ contains
 
    !> Whether a criterion is met; a value that is not a number never conforms.
    elemental function conforms(criterion) result(met)
-      !> The criterion.
       type(criterion_type), intent(in) :: criterion
       !> The value lies in the range, its ends included.
       logical :: met
@@ -173,7 +150,6 @@ contains
       real(wp), intent(in) :: whole_force(:)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Peaks.
       integer :: peak_count
       real(wp) :: extreme, threshold
       real(wp) :: force(size(whole_force))

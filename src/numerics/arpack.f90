@@ -7,7 +7,7 @@ module thud_arpack
    public :: dsaupd, dseupd
 
    interface
-      !> One turn of the implicitly restarted Lanczos method.
+      !> One iteration of the implicitly restarted Lanczos method.
       subroutine dsaupd(ido, bmat, n, which, nev, tol, resid, ncv, v, ldv, iparam, ipntr, workd, workl, lworkl, info)
          import :: wp
          implicit none (type, external)
@@ -20,7 +20,7 @@ module thud_arpack
          real(wp), intent(inout) :: resid(n), v(ldv, ncv), workd(3*n), workl(lworkl)
       end subroutine dsaupd
 
-      !> Eigenvalues and eigenvectors after the last turn.
+      !> Eigenvalues and eigenvectors after the last iteration.
       subroutine dseupd(rvec, howmny, select, d, z, ldz, sigma, bmat, n, which, nev, tol, resid, ncv, v, ldv, iparam, &
          ipntr, workd, workl, lworkl, info)
          import :: wp

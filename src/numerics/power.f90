@@ -53,7 +53,7 @@ module thud_power
    !> The same for whole numbers of either sign, and rounding to them.
    real(wp), parameter :: rounder = 1.5_wp*2.0_wp**mantissa
 
-   !> The power of what is not positive.
+   !> The power of a number that is not positive.
    real(wp), parameter :: not_a_number = transfer(int(z'7FF8000000000000', int64), 1.0_wp)
 
 contains
@@ -95,11 +95,8 @@ contains
 
    !> Bound of the relative error of `raise`, see above.
    elemental function power_error(base, exponent) result(bound)
-      !> The base.
-      real(wp), intent(in) :: base
-      !> The exponent.
-      real(wp), intent(in) :: exponent
-      !> Largest relative error.
+      real(wp), intent(in) :: base, exponent
+      !> Maximum relative error.
       real(wp) :: bound
 
       bound = (5.2_wp*abs(exponent*log(base))/ln2 + 3)*epsilon(1.0_wp)/2

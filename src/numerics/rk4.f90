@@ -18,7 +18,6 @@ module thud_rk4
       pure subroutine derivative_interface(self, time, state, rate, valid)
          import :: ode_type, wp
          implicit none (type, external)
-         !> The system.
          class(ode_type), intent(in) :: self
          !> Independent variable.
          real(wp), intent(in) :: time
@@ -36,7 +35,6 @@ contains
    !> One step; also for part of a step, which makes it its own dense output: the result as a
    !> function of `step` follows the solution with a local error of order step**5.
    pure subroutine rk4_step(ode, time, state, step, new_state, valid)
-      !> The system.
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
       real(wp), intent(in) :: time
@@ -68,17 +66,14 @@ contains
    !> step. Root of the dense output by the Illinois form of regula falsi, safeguarded by
    !> bisection.
    pure function locate_zero(ode, time, state, step, component) result(length)
-      !> The system.
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
       real(wp), intent(in) :: time
       !> State at the beginning: [n_state].
       real(wp), intent(in) :: state(:)
-      !> Length of the full step.
       real(wp), intent(in) :: step
       !> Component that becomes zero.
       integer, intent(in) :: component
-      !> Length of the step that ends at the zero.
       real(wp) :: length
       integer, parameter :: max_iterations = 200
       real(wp) :: left, right, left_value, right_value, value
@@ -117,7 +112,6 @@ contains
       pure function component_after(part) result(component_value)
          !> Length of the part.
          real(wp), intent(in) :: part
-         !> Value of the component.
          real(wp) :: component_value
          real(wp) :: new_state(size(state))
          logical :: valid
@@ -130,7 +124,6 @@ contains
 
    !> Longest step that stays in the domain of the equations, to rounding, by bisection.
    pure function longest_valid(ode, time, state, step) result(length)
-      !> The system.
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
       real(wp), intent(in) :: time

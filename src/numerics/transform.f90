@@ -11,13 +11,13 @@ module thud_transform
 
    include 'fftw3.f03'
 
-   !> Lengths whose plans are kept; more only while more threads than that transform.
+   !> Lengths whose plans are kept, more only while more threads use them.
    integer, parameter :: kept_count = 16
 
-   !> Longest transform whose plans are kept: those of longer ones hold much memory.
-   integer, parameter :: longest_kept = 2**18
+   !> Maximum length of a transform whose plans are kept: longer ones take much memory.
+   integer, parameter :: max_kept_length = 2**18
 
-   !> Plans for one length. They fit all arrays that the compiler allocates: FFTW wants 16 bytes aligned.
+   !> Plans for one length. They fit all arrays that the compiler allocates: FFTW needs alignment to 16 bytes.
    type :: plans_type
       !> Samples, 0 without plans.
       integer :: length = 0
@@ -25,16 +25,12 @@ module thud_transform
       integer :: users = 0
       !> Number of the last use, ascending.
       integer(c_int64_t) :: last_use = 0
-      !> From a record to its transform.
-      type(c_ptr) :: forward = c_null_ptr
-      !> From a transform to the record, times the length.
-      type(c_ptr) :: back = c_null_ptr
+      !> From a record to its transform, and back to the record times the length.
+      type(c_ptr) :: forward = c_null_ptr, back = c_null_ptr
    end type plans_type
 
-   !> The plans that are kept; only to be touched in the critical section `thud_fftw_planner`.
+   !> The plans that are kept, and the number of the latest use; only for the critical section `thud_fftw_planner`.
    type(plans_type), allocatable :: kept(:)
-
-   !> Number of the latest use.
    integer(c_int64_t) :: use_count = 0
 
 contains
@@ -65,10 +61,8 @@ contains
    subroutine get_low_pass(record, sample_rate, edge, low)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
-      !> Samples per second, Hz.
-      real(wp), intent(in) :: sample_rate
-      !> The frequency, Hz.
-      real(wp), intent(in) :: edge
+      !> Samples per second, Hz; the frequency, Hz.
+      real(wp), intent(in) :: sample_rate, edge
       !> Samples of the part: [n].
       real(wp), intent(out) :: low(:)
       real(wp), allocatable :: signal(:)
@@ -77,7 +71,7 @@ contains
       integer :: length
 
       if (size(record) == 0) return
-      ! Zeros on both sides, so that what swings before the record does not come back behind it.
+      ! Zeros on both sides, so that oscillations before the record do not wrap around its end.
       length = 2*size(record)
       call transform_padded(record, length, signal, spectrum, plans)
       spectrum(int(min(length*(edge/sample_rate), length/2.0_wp)) + 2:) = (0.0_wp, 0.0_wp)
@@ -102,7 +96,7 @@ contains
       power = real(spectrum)**2 + aimag(spectrum)**2
    end subroutine get_power_spectrum
 
-   !> Transform of a record with zeros behind it.
+   !> Transform of a zero-padded record.
    subroutine transform_padded(record, length, signal, spectrum, plans)
       !> Samples: [n].
       real(wp), intent(in) :: record(:)
@@ -135,13 +129,12 @@ contains
       call give_back(plans)
    end subroutine transform_back
 
-   !> Plans for arrays, kept or new ones. Planning is the one part of FFTW that threads must not share.
+   !> Plans for arrays, kept or new ones. FFTW's planner is not thread-safe.
    subroutine take_plans(signal, spectrum, plans)
       !> Array of the record: [n].
       real(wp), intent(inout) :: signal(:)
       !> Array of its transform: [n/2 + 1].
       complex(wp), intent(inout) :: spectrum(:)
-      !> Its plans.
       type(plans_type), intent(out) :: plans
       integer :: at
 
@@ -168,14 +161,13 @@ contains
 
    !> Ends the use of plans.
    subroutine give_back(plans)
-      !> The plans.
       type(plans_type), intent(in) :: plans
       integer :: at
 
       !$omp critical (thud_fftw_planner)
       at = findloc(kept%length, plans%length, dim=1)
       kept(at)%users = kept(at)%users - 1
-      if (kept(at)%users == 0 .and. plans%length > longest_kept) call destroy(kept(at))
+      if (kept(at)%users == 0 .and. plans%length > max_kept_length) call destroy(kept(at))
       !$omp end critical (thud_fftw_planner)
    end subroutine give_back
 

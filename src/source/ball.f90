@@ -19,7 +19,6 @@ module thud_ball
       real(wp) :: mass = 2.5_wp
       !> Modulus of elasticity E, Pa.
       real(wp) :: youngs_modulus = 1.6e6_wp
-      !> Poisson's ratio.
       real(wp) :: poisson_ratio = 0.5_wp
       !> Overpressure of the gas in the undeformed ball, Pa; 0 for a ball with a hole.
       real(wp) :: gauge_pressure = 0.0_wp
@@ -59,7 +58,6 @@ contains
 
    !> Density of the wall, kg/m3.
    pure function get_density(ball) result(density)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Mass over the volume of the wall, kg/m3.
       real(wp) :: density

@@ -34,7 +34,6 @@ contains
 
    !> Velocity at first touch, m/s (paper eq. 4).
    pure function get_impact_velocity(drop) result(velocity)
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Velocity towards the floor, m/s.
       real(wp) :: velocity

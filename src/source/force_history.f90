@@ -30,7 +30,7 @@ module thud_force_history
       real(wp), allocatable :: deflection(:)
       !> Rate of the deflection, m/s: [n_sample].
       real(wp), allocatable :: velocity(:)
-      !> Names of the parts that the model can tell apart: [n_part].
+      !> Names of the parts of the force: [n_part].
       character(len=part_name_length), allocatable :: part_name(:)
       !> Parts of the force, N: [n_sample, n_part].
       real(wp), allocatable :: part(:, :)
@@ -38,7 +38,7 @@ module thud_force_history
       real(wp), allocatable :: elastic_force(:)
       !> Whole force on the floor, N: [n_sample].
       real(wp), allocatable :: floor_force(:)
-      !> Names, with units, of whatever else the model has to tell: [n_channel].
+      !> Names, with units, of further quantities against time: [n_channel].
       character(len=part_name_length), allocatable :: channel_name(:)
       !> Its values: [n_sample, n_channel].
       real(wp), allocatable :: channel(:, :)
@@ -58,11 +58,11 @@ module thud_force_history
       real(wp) :: contact_time = 0.0_wp
       !> The same between steps, of models that find it in whole steps, s; 0 where `contact_time` is exact.
       real(wp) :: exact_contact_time = 0.0_wp
-      !> Largest elastic force, N; of models whose spikes no force plate records, of the part that it does.
+      !> Maximum elastic force, N; of models whose spikes no force plate records, of the part that it does.
       real(wp) :: peak_force = 0.0_wp
-      !> Largest force on the floor, N, likewise.
+      !> Maximum force on the floor, N, likewise.
       real(wp) :: peak_floor_force = 0.0_wp
-      !> Largest deflection, m.
+      !> Maximum deflection, m.
       real(wp) :: max_deflection = 0.0_wp
       !> Velocity at release over velocity at first touch.
       real(wp) :: restitution = 0.0_wp
@@ -88,11 +88,11 @@ module thud_force_history
    integer, parameter :: outcome_count = 6
 
    !> The numbers that describe an impact, in the order of `get_scalars`.
-   type(scalar_field_type), parameter :: scalar_fields(12) = [ &
+   type(scalar_field_type), parameter :: scalar_fields(*) = [ &
       scalar_field_type('contact_time', 's', 'contact time'), &
-      scalar_field_type('peak_force', 'N', 'largest elastic force'), &
-      scalar_field_type('peak_floor_force', 'N', 'largest force on the floor'), &
-      scalar_field_type('max_deflection', 'm', 'largest deflection'), &
+      scalar_field_type('peak_force', 'N', 'maximum elastic force'), &
+      scalar_field_type('peak_floor_force', 'N', 'maximum force on the floor'), &
+      scalar_field_type('max_deflection', 'm', 'maximum deflection'), &
       scalar_field_type('restitution', '', 'coefficient of restitution'), &
       scalar_field_type('impulse', 'N s', 'time integral of the force on the floor'), &
       scalar_field_type('impact_velocity', 'm/s', 'velocity at first touch'), &
@@ -106,7 +106,6 @@ contains
 
    !> The numbers that describe an impact.
    pure function get_scalars(history) result(values)
-      !> The history.
       type(force_history_type), intent(in) :: history
       !> The numbers, SI units: [size(scalar_fields)].
       real(wp) :: values(size(scalar_fields))
@@ -117,7 +116,7 @@ contains
          history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
    end function get_scalars
 
-   !> Finds the contact time between samples: the force goes on to zero in a straight line from the last two
+   !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
    !> samples of the first contact.
    pure subroutine continue_to_zero(history)
       !> The history, with its contact time; gets the exact one.
@@ -139,7 +138,6 @@ contains
    pure function new_force_history(sample_rate, n_sample, part_name) result(history)
       !> Samples per second, Hz.
       real(wp), intent(in) :: sample_rate
-      !> Number of samples.
       integer, intent(in) :: n_sample
       !> Names of the parts of the force: [n_part].
       character(len=*), intent(in) :: part_name(:)

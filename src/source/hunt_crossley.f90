@@ -76,9 +76,7 @@ contains
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(hunt_crossley_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
 
       if (options%stiffness > 0.0_wp .eqv. options%contact_time > 0.0_wp) then
@@ -95,7 +93,6 @@ contains
 
    !> Right-hand side of the equation of motion.
    pure subroutine get_derivative(self, time, state, rate, valid)
-      !> The spring.
       class(spring_type), intent(in) :: self
       !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
@@ -118,7 +115,6 @@ contains
 
    !> Spring and damping force of one instant.
    pure subroutine get_parts(self, state, parts, elastic_force)
-      !> The spring.
       class(spring_type), intent(in) :: self
       !> State, see `thud_lumped`: [4].
       real(wp), intent(in) :: state(:)
@@ -137,10 +133,8 @@ contains
    !> With x = 3/2 alpha v0 the balance of energy over both phases is
    !> x - ln(1 + x) + e x + ln(1 - e x) = 0, for any exponent.
    pure function get_damping(restitution, impact_velocity) result(damping)
-      !> Coefficient of restitution e, above 0.
-      real(wp), intent(in) :: restitution
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
+      !> Coefficient of restitution e, above 0; velocity at first touch, m/s.
+      real(wp), intent(in) :: restitution, impact_velocity
       !> alpha, s/m.
       real(wp) :: damping
       real(wp) :: left, right, middle
@@ -177,7 +171,6 @@ contains
       pure function excess(x) result(value)
          !> Argument above -1.
          real(wp), intent(in) :: x
-         !> The value.
          real(wp) :: value
          integer :: k
 
@@ -196,14 +189,8 @@ contains
    !> In units of v0 and of the length D = (M v0^2/k)^(1/(n + 1)) the equation holds no k: one
    !> contact in these units gives the ratio of contact time to D/v0.
    pure function get_stiffness(contact_time, exponent, damping, mass, impact_velocity) result(stiffness)
-      !> Wanted contact time, s.
-      real(wp), intent(in) :: contact_time
-      !> Exponent n of the deflection.
-      real(wp), intent(in) :: exponent
-      !> Damping alpha, s/m.
-      real(wp), intent(in) :: damping
-      !> Mass, kg.
-      real(wp), intent(in) :: mass
+      !> Wanted contact time, s; exponent n of the deflection; damping alpha, s/m; mass, kg.
+      real(wp), intent(in) :: contact_time, exponent, damping, mass
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
       !> k, N/m^exponent; 0 where the damping is too high for a rebound.
@@ -222,7 +209,7 @@ contains
       time = 0.0_wp
       do i = 1, max_steps
          call rk4_step(spring, time, state, step, next, valid)
-         ! Asked so that NaN ends the march too.
+         ! Written so that NaN ends the march too.
          if (.not. next(at_deflection) > 0.0_wp) exit
          state = next
          time = time + step
@@ -238,9 +225,7 @@ contains
    subroutine solve(ball, drop, options, sampling, history, error)
       !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
-      !> Stiffness and damping.
       class(hunt_crossley_type), intent(in) :: options
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling

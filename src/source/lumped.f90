@@ -49,15 +49,12 @@ contains
    !> Error of a state outside the domain of the equation; sources that have such states override
    !> it.
    function get_failure(self, drop, time, state) result(error)
-      !> The source.
       class(lumped_type), intent(in) :: self
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Time since first touch, s.
       real(wp), intent(in) :: time
       !> Last valid state: [4].
       real(wp), intent(in) :: state(:)
-      !> The error.
       type(error_type) :: error
 
       error = numerical_error('&drop: height = '//to_text(drop%height)//' m leads out of the model of a source of ' &
@@ -69,7 +66,6 @@ contains
    subroutine solve_lumped(source, drop, sampling, part_name, history, error)
       !> The source in its compression phase.
       class(lumped_type), intent(inout) :: source
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Sampling rate, length of the record, substeps.
       type(sampling_type), intent(in) :: sampling
@@ -115,7 +111,6 @@ contains
    subroutine advance(source, drop, end_time, time, state, history, released, error)
       !> The source; it changes its phase at the turning point.
       class(lumped_type), intent(inout) :: source
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Time at the end of the step, s.
       real(wp), intent(in) :: end_time
@@ -172,14 +167,13 @@ contains
       real(wp), intent(in) :: state(:)
       !> Number of the sample.
       integer, intent(in) :: i
-      !> The history.
       type(force_history_type), intent(inout) :: history
 
       history%deflection(i) = state(at_deflection)
       history%velocity(i) = state(at_velocity)
       call source%get_parts(state, history%part(i, :), history%elastic_force(i))
       history%peak_floor_force = max(history%peak_floor_force, sum(history%part(i, :)))
-      ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
+      ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       if (i == 1) history%part(i, :) = history%part(i, :)/2
       history%floor_force(i) = sum(history%part(i, :))
    end subroutine record_sample
@@ -206,7 +200,7 @@ contains
       end associate
       history%peak_force = max(history%peak_force, maxval(history%elastic_force))
       history%peak_floor_force = max(history%peak_force, history%peak_floor_force)
-      ! Asked so that NaN fails too.
+      ! Written so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
          error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
             //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(max_residual))
@@ -215,9 +209,8 @@ contains
 
    !> Error of steps that are too long for the source.
    pure function coarse_error(finding) result(error)
-      !> What tells it.
+      !> What shows it.
       character(len=*), intent(in) :: finding
-      !> The error.
       type(error_type) :: error
 
       error = numerical_error('&sampling: substeps is too low for this source: '//finding &

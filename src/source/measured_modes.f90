@@ -18,14 +18,13 @@ module thud_measured_modes
 
    public :: measured_modes_type
 
-   !> Part by which the effective masses may miss the mass of the ball: their printed digits.
+   !> Relative error of the sum of effective masses that printed digits explain.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
 
    !> Options of the model: one entry per mode in each list.
    type, extends(source_model_type) :: measured_modes_type
       !> Natural frequencies, Hz.
       type(list_type) :: frequency
-      !> Damping ratios.
       type(list_type) :: damping_ratio
       !> Effective masses, kg.
       type(list_type) :: effective_mass
@@ -71,13 +70,10 @@ contains
 
    !> Refuses lists that do not fit each other or the ball.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(measured_modes_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: total
 
@@ -102,9 +98,7 @@ contains
    subroutine solve(ball, drop, options, sampling, history, error)
       !> The ball, whose mass the effective masses add up to.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
-      !> The modes.
       class(measured_modes_type), intent(in) :: options
       !> Sampling rate and length of the record.
       type(sampling_type), intent(in) :: sampling
@@ -124,7 +118,7 @@ contains
       step = 1/sampling%sample_rate
       history = new_force_history(sampling%sample_rate, n_sample, ['modal_force'])
       history%impact_velocity = v0
-      ! The first zero is not to be missed: sixteen looks at the shortest period.
+      ! Sixteen checks per shortest period find the first zero.
       substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
       released = .false.
       march: do i = 1, n_sample
@@ -142,7 +136,7 @@ contains
             //fixed(1.0e3_wp*time, 1)//' ms of contact; allowed: longer than the contact')
          return
       end if
-      ! Dashpots begin with a jump; a sample of a jump is the mean of its two sides.
+      ! Dashpots start with a jump; a sample of a jump is the mean of its two sides.
       history%part(1, 1) = history%part(1, 1)/2
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
@@ -163,11 +157,9 @@ contains
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)
       !> Natural frequency, Hz.
       real(wp), intent(in) :: frequency
-      !> Damping ratio.
       real(wp), intent(in) :: damping_ratio
       !> Effective mass, kg.
       real(wp), intent(in) :: mass
-      !> The mode.
       type(mode_type) :: mode
 
       mode%mass = mass
@@ -181,20 +173,12 @@ contains
    pure subroutine get_motion(modes, impact_velocity, time, deflection, velocity, force, power, stored)
       !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
-      !> Velocity at first touch, m/s.
-      real(wp), intent(in) :: impact_velocity
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
-      !> Deflection of the centre of mass, m.
-      real(wp), intent(out) :: deflection
-      !> Its velocity, m/s.
-      real(wp), intent(out) :: velocity
-      !> Force on the floor, N.
-      real(wp), intent(out) :: force
-      !> Power of the dashpots, W.
-      real(wp), intent(out), optional :: power
-      !> Kinetic and elastic energy, J.
-      real(wp), intent(out), optional :: stored
+      !> Velocity at first touch, m/s; time since first touch, s.
+      real(wp), intent(in) :: impact_velocity, time
+      !> Deflection of the centre of mass, m; its velocity, m/s; force on the floor, N.
+      real(wp), intent(out) :: deflection, velocity, force
+      !> Power of the dashpots, W; kinetic and elastic energy, J.
+      real(wp), intent(out), optional :: power, stored
       real(wp), dimension(size(modes)) :: d, v, decay, sine
 
       associate (m => modes%mass, w => modes%omega, zeta => modes%zeta, wd => modes%omega_damped)
@@ -216,10 +200,8 @@ contains
       type(mode_type), intent(in) :: modes(:)
       !> Velocity at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
-      !> A time at which the force is positive, s.
-      real(wp), intent(in) :: before
-      !> The next sample, at which it is not, s.
-      real(wp), intent(in) :: after
+      !> A time at which the force is positive, s; the next sample, at which it is not, s.
+      real(wp), intent(in) :: before, after
       !> Time of release, s.
       real(wp) :: time
       real(wp) :: left, right, deflection, velocity, force

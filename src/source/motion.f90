@@ -10,42 +10,41 @@ module thud_motion
    type :: motion_type
       !> Number of snapshots taken.
       integer :: n_frame = 0
-      !> Times since the record began, s: [room].
+      !> Times since the record began, s: [capacity].
       real(wp), allocatable :: time(:)
       !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: start(:, :, :)
-      !> Positions, the floor at height 0, m: [0:n_polar, 0:n_radial, 2, room].
+      !> Positions, the floor at height 0, m: [0:n_polar, 0:n_radial, 2, capacity].
       real(wp), allocatable :: position(:, :, :, :)
       !> Velocities, m/s: the same shape.
       real(wp), allocatable :: velocity(:, :, :, :)
-      !> Pressure on the floor at the nodes of the outer surface, Pa: [0:n_polar, room].
+      !> Pressure on the floor at the nodes of the outer surface, Pa: [0:n_polar, capacity].
       real(wp), allocatable :: contact_pressure(:, :)
-      !> Overpressure of the gas, Pa: [room].
+      !> Overpressure of the gas, Pa: [capacity].
       real(wp), allocatable :: cavity_pressure(:)
    end type motion_type
 
 contains
 
-   !> Room for snapshots.
-   pure function new_motion(start, room) result(motion)
+   !> Space for snapshots.
+   pure function new_motion(start, capacity) result(motion)
       !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
       real(wp), intent(in) :: start(0:, 0:, :)
-      !> Most snapshots.
-      integer, intent(in) :: room
+      !> Maximum number of snapshots.
+      integer, intent(in) :: capacity
       !> No snapshot yet.
       type(motion_type) :: motion
       integer :: n_polar, n_radial
 
       n_polar = ubound(start, 1)
       n_radial = ubound(start, 2)
-      allocate (motion%time(room), motion%cavity_pressure(room), motion%contact_pressure(0:n_polar, room))
+      allocate (motion%time(capacity), motion%cavity_pressure(capacity), motion%contact_pressure(0:n_polar, capacity))
       allocate (motion%start(0:n_polar, 0:n_radial, 2), source=start)
-      allocate (motion%position(0:n_polar, 0:n_radial, 2, room), motion%velocity(0:n_polar, 0:n_radial, 2, room))
+      allocate (motion%position(0:n_polar, 0:n_radial, 2, capacity), motion%velocity(0:n_polar, 0:n_radial, 2, capacity))
    end function new_motion
 
-   !> Adds a snapshot where there is room for one.
+   !> Adds a snapshot where there is space for one.
    pure subroutine take_snapshot(motion, time, position, velocity, contact_pressure, cavity_pressure)
-      !> The snapshots.
       type(motion_type), intent(inout) :: motion
       !> Time since the record began, s.
       real(wp), intent(in) :: time

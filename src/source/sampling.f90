@@ -46,7 +46,7 @@ contains
          integer_field('substeps', sampling%substeps, 'integration steps per sampling interval', '[1, 10000]')]
    end function get_sampling_fields
 
-   !> Complains about a record with too many samples or steps.
+   !> Refuses a record with too many samples or steps.
    subroutine check_sampling(sampling, error)
       !> The sampling, each value of it inside its own range.
       type(sampling_type), intent(in) :: sampling
@@ -66,9 +66,8 @@ contains
       end if
    end subroutine check_sampling
 
-   !> Complains about a contact of hardly any samples.
+   !> Refuses a contact of too few samples.
    subroutine check_contact_samples(sampling, contact_time, error)
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Contact time, s.
       real(wp), intent(in) :: contact_time
@@ -82,7 +81,6 @@ contains
 
    !> Number of samples of the record.
    pure function get_sample_count(sampling) result(n_sample)
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Samples from first touch on, the first one included.
       integer :: n_sample

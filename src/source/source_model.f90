@@ -1,7 +1,7 @@
-!> What every source model is: options that stand in namelist groups, and the force of one drop.
+!> The abstract source model: options from namelist groups, and the force of one drop.
 !>
 !> A model is a module `thud_<name>` with a type `<name>_type` that extends this one; the list of names in
-!> src/CMakeLists.txt makes it known. Its options stand in the group of its name unless it says otherwise.
+!> src/CMakeLists.txt makes it known. Its options belong to the group of its name unless stated otherwise.
 module thud_source_model
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type
@@ -41,15 +41,12 @@ module thud_source_model
       subroutine solve(ball, drop, options, sampling, history, error)
          import :: ball_type, drop_type, error_type, force_history_type, sampling_type, source_model_type
          implicit none (type, external)
-         !> The ball.
          type(ball_type), intent(in) :: ball
-         !> The drop.
          type(drop_type), intent(in) :: drop
          !> The options, checked.
          class(source_model_type), intent(in) :: options
          !> Sampling rate, length of the record, substeps.
          type(sampling_type), intent(in) :: sampling
-         !> Force and motion.
          type(force_history_type), intent(out) :: history
          !> The drop leads out of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error
@@ -60,11 +57,9 @@ contains
 
    !> Refuses options that do not fit each other, the ball or the sampling; by default all fit.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(source_model_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Names group, key, value and what is allowed.
       type(error_type), allocatable, intent(out) :: error
@@ -73,9 +68,7 @@ contains
 
    !> Size of the snapshots of the deformed ball; by default there are none.
    function get_snapshot_shape(options, sampling) result(extents)
-      !> The options.
       class(source_model_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
       !> Nodes from pole to pole, nodes through the wall, snapshots.
       integer :: extents(3)
@@ -83,9 +76,8 @@ contains
       extents = 0
    end function get_snapshot_shape
 
-   !> About the time that one drop takes on one core, s.
+   !> Approximate time of one drop on one core, s.
    function get_cost(options) result(cost)
-      !> The options.
       class(source_model_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
@@ -95,9 +87,7 @@ contains
 
    !> Loss factor of the material against frequency, of models that have a material; others refuse.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The options.
       class(source_model_type), intent(in) :: options
       !> Frequencies, Hz: [n].
       real(wp), intent(in) :: frequency(:)

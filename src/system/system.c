@@ -1,5 +1,5 @@
 // The calls of the operating system that Fortran lacks, with the system's own headers.
-// Functions return 0, or the number of the error, where nothing else is said.
+// Functions return 0, or the number of the error, unless stated otherwise.
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <errno.h>
@@ -25,7 +25,7 @@ static void interrupt(int number)
       return;
    }
 
-   // The terminal has shown ^C, perhaps behind a line of progress.
+   // The terminal has shown ^C, perhaps after a line of progress.
    const char *text = isatty(STDERR_FILENO) ? interruption : interruption + 1;
 
    if (write(STDERR_FILENO, text, strlen(text)) < 0) _exit(130);
@@ -144,7 +144,7 @@ int thud_lock_directory(const char *path, int make)
          return -error;
       }
       while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) continue;
-      // Whoever had the lock may have renamed or removed the directory.
+      // The previous owner of the lock may have renamed or removed the directory.
       if (fstat(descriptor, &locked) == 0 && lstat(path, &named) == 0 && locked.st_dev == named.st_dev
           && locked.st_ino == named.st_ino)
          return descriptor;
@@ -220,7 +220,7 @@ size_t thud_next_name(DIR *directory, char *name, size_t length)
 }
 
 // Bytes that this user may write to the disk of a directory, or of the next one above that is there; negative where
-// the system does not say.
+// unknown.
 double thud_get_free_bytes(const char *path)
 {
    struct statvfs disk;

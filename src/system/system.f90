@@ -52,12 +52,12 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
    interface
-      !> Makes errors of full and closed outputs, which would end the process, and a sentence of an interrupt.
+      !> Turns signals of full and closed outputs into errors, and an interrupt into a sentence.
       subroutine prepare_process() bind(c, name='thud_prepare_process')
          implicit none (type, external)
       end subroutine prepare_process
 
-      !> Keeps an interrupt from now on; it ends `write_text`.
+      !> Keeps an interrupt from now on; it then stops `write_text`.
       subroutine keep_interrupts() bind(c, name='thud_keep_interrupts')
          implicit none (type, external)
       end subroutine keep_interrupts
@@ -143,11 +143,9 @@ module thud_system
 
 contains
 
-   !> What the system says of an error.
+   !> The system's sentence of an error.
    function get_system_message(status) result(text)
-      !> Number of the error.
       integer, intent(in) :: status
-      !> Its sentence.
       character(len=:), allocatable :: text
       character(len=128) :: buffer
 
@@ -155,7 +153,7 @@ contains
       text = buffer(:index(buffer, c_null_char) - 1)
    end function get_system_message
 
-   !> Whether somebody sees what is written.
+   !> Whether a descriptor is a terminal.
    function is_terminal(descriptor) result(yes)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -167,7 +165,6 @@ contains
 
    !> Opens a file, pipe or device to be read.
    function open_descriptor(path) result(descriptor)
-      !> Path.
       character(len=*), intent(in) :: path
       !> The descriptor; negative where it cannot be opened.
       integer :: descriptor
@@ -175,9 +172,8 @@ contains
       descriptor = int(c_open(path//c_null_char))
    end function open_descriptor
 
-   !> Reads what there is, at most as much as the buffer holds.
+   !> Reads the available bytes, up to the length of the buffer.
    subroutine read_bytes(descriptor, buffer, count)
-      !> The descriptor.
       integer, intent(in) :: descriptor
       !> The bytes.
       character(len=*), intent(out) :: buffer
@@ -203,9 +199,7 @@ contains
 
    !> Makes a file, or empties it.
    subroutine create_file(path, descriptor, status)
-      !> Path.
       character(len=*), intent(in) :: path
-      !> Its descriptor.
       integer, intent(out) :: descriptor
       !> 0, or the number of the error.
       integer, intent(out) :: status
@@ -216,9 +210,7 @@ contains
 
    !> Writes all of a text to a file or to the screen.
    subroutine write_text(descriptor, text, status)
-      !> The descriptor.
       integer, intent(in) :: descriptor
-      !> The text.
       character(len=*), intent(in) :: text
       !> 0, the number of the error, or negative after an interrupt.
       integer, intent(out) :: status
@@ -228,7 +220,6 @@ contains
 
    !> Brings all files of a directory to the disk.
    subroutine flush_directory(path, status)
-      !> Path.
       character(len=*), intent(in) :: path
       !> 0, or the number of the error.
       integer, intent(out) :: status
@@ -238,7 +229,6 @@ contains
 
    !> Whether a directory of that name is there.
    function directory_exists(path) result(there)
-      !> Path.
       character(len=*), intent(in) :: path
       !> It exists and can be read.
       logical :: there
@@ -251,7 +241,6 @@ contains
 
    !> Names in a directory.
    subroutine list_directory(path, names)
-      !> Path.
       character(len=*), intent(in) :: path
       !> The names, none where it cannot be read: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
@@ -293,7 +282,6 @@ contains
 
    !> Waits for the lock on a directory and takes it, until its descriptor is closed.
    subroutine lock_directory(path, make, descriptor)
-      !> Path of the directory.
       character(len=*), intent(in) :: path
       !> To make it where it is missing.
       logical, intent(in) :: make
@@ -305,7 +293,6 @@ contains
 
    !> Whether `exchange_directories` has a chance.
    function can_exchange(path, other) result(yes)
-      !> Path of a directory.
       character(len=*), intent(in) :: path
       !> Path of another one.
       character(len=*), intent(in) :: other
@@ -317,7 +304,6 @@ contains
 
    !> Exchanges the names of two directories in one step; owner and permissions stay with the second name.
    subroutine exchange_directories(path, other, done)
-      !> Path of a directory.
       character(len=*), intent(in) :: path
       !> Path of another one.
       character(len=*), intent(in) :: other
@@ -329,7 +315,6 @@ contains
 
    !> Gives a file another name; a file that has that name is replaced in the same instant.
    subroutine rename_file(old_path, new_path, done)
-      !> Path of the file.
       character(len=*), intent(in) :: old_path
       !> New path in the same file system.
       character(len=*), intent(in) :: new_path
@@ -341,7 +326,6 @@ contains
 
    !> Gives a file a second name, unless something else has it.
    subroutine link_file(path, new_path, done)
-      !> Path of the file.
       character(len=*), intent(in) :: path
       !> New path in the same file system.
       character(len=*), intent(in) :: new_path
@@ -353,7 +337,6 @@ contains
 
    !> Removes a file or an empty directory if it is there.
    subroutine remove_file(path, done)
-      !> Path.
       character(len=*), intent(in) :: path
       !> There was something, and it is gone.
       logical, intent(out), optional :: done
@@ -365,9 +348,8 @@ contains
 
    !> Free space on the disk of a directory, or of the next one above that is there.
    function get_free_bytes(path) result(bytes)
-      !> Path.
       character(len=*), intent(in) :: path
-      !> Bytes that this user may write; huge where the system does not say.
+      !> Bytes that this user may write; huge where unknown.
       real(wp) :: bytes
 
       bytes = real(c_get_free_bytes(path//c_null_char), wp)

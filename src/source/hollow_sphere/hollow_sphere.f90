@@ -17,7 +17,7 @@ module thud_hollow_sphere
    private
 
    public :: compression_weights, flux_choices, get_gas_energy, get_gas_force
-   public :: get_shell_stiffness, hollow_sphere_type, is_wild, new_shell, restitution_weights, shell_type
+   public :: get_shell_stiffness, hollow_sphere_type, new_shell, restitution_weights, shell_type
    public :: solve_hollow_sphere
 
    !> Options of the model.
@@ -33,10 +33,8 @@ module thud_hollow_sphere
    character(len=24), parameter :: flux_choices(4) = [character(len=24) :: &
       'momentum_balance', 'retarding', 'conservative', 'none']
 
-   !> Factor s of the flux term in compression, for each choice.
+   !> Factors s of the flux term in compression and in restitution, for each choice.
    real(wp), parameter :: compression_weights(4) = [0.0_wp, -1.0_wp, 0.5_wp, 0.0_wp]
-
-   !> Factor s of the flux term in restitution, for each choice.
    real(wp), parameter :: restitution_weights(4) = [1.0_wp, 0.0_wp, 0.5_wp, 0.0_wp]
 
    !> Equation of motion of the shell (paper eq. 3) for one phase of the impact.
@@ -53,10 +51,8 @@ module thud_hollow_sphere
       real(wp) :: ambient_pressure = 0.0_wp
       !> Ratio of specific heats of the gas.
       real(wp) :: heat_capacity_ratio = 0.0_wp
-      !> Factor s of the flux term before the turning point.
-      real(wp) :: compression_weight = 0.0_wp
-      !> Factor s of the flux term after it.
-      real(wp) :: restitution_weight = 0.0_wp
+      !> Factors s of the flux term before and after the turning point.
+      real(wp) :: compression_weight = 0.0_wp, restitution_weight = 0.0_wp
    contains
       procedure :: get_derivative
       procedure :: get_parts
@@ -78,13 +74,9 @@ contains
 
    !> The equation of motion of a ball.
    pure function new_shell(ball, compression_weight, restitution_weight) result(shell)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> Factor s of the flux term in compression.
-      real(wp), intent(in) :: compression_weight
-      !> Factor s of the flux term in restitution.
-      real(wp), intent(in) :: restitution_weight
-      !> The equation.
+      !> Factors s of the flux term in compression and in restitution.
+      real(wp), intent(in) :: compression_weight, restitution_weight
       type(shell_type) :: shell
 
       shell%radius = ball%outer_radius
@@ -100,7 +92,6 @@ contains
 
    !> Stiffness of the shell under the flattening load, N/m (paper eq. 2, after Reissner).
    pure function get_shell_stiffness(ball) result(stiffness)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> k = 8 E h^2/(R sqrt(12 (1 - nu^2))), N/m.
       real(wp) :: stiffness
@@ -111,7 +102,6 @@ contains
 
    !> Enclosed volume over that of the undeformed sphere.
    pure function get_volume_ratio(shell, deflection) result(ratio)
-      !> The shell.
       class(shell_type), intent(in) :: shell
       !> Deflection, m.
       real(wp), intent(in) :: deflection
@@ -123,7 +113,6 @@ contains
 
    !> Force of the enclosed gas, N (paper eq. 2): adiabatic overpressure on the flat cap.
    pure function get_gas_force(shell, deflection) result(force)
-      !> The shell.
       class(shell_type), intent(in) :: shell
       !> Deflection, m; below the closing deflection.
       real(wp), intent(in) :: deflection
@@ -138,7 +127,6 @@ contains
 
    !> Work against the gas force from rest to a deflection, J: the integral of `get_gas_force`.
    pure function get_gas_energy(shell, deflection) result(energy)
-      !> The shell.
       class(shell_type), intent(in) :: shell
       !> Deflection, m; below the closing deflection.
       real(wp), intent(in) :: deflection
@@ -160,7 +148,6 @@ contains
    !> Right-hand side of the equation of motion, m a = s (M/2R) v^2 - F_B - F_G, with
    !> m = M (1 - deflection/2R).
    pure subroutine get_derivative(self, time, state, rate, valid)
-      !> The shell.
       class(shell_type), intent(in) :: self
       !> Time since first touch, s; the equation does not depend on it.
       real(wp), intent(in) :: time
@@ -207,9 +194,7 @@ contains
 
    !> Factor s of the flux term in the present phase.
    pure function get_flux_weight(shell) result(weight)
-      !> The shell.
       class(shell_type), intent(in) :: shell
-      !> The factor.
       real(wp) :: weight
 
       weight = merge(shell%compression_weight, shell%restitution_weight, shell%compressing)
@@ -217,7 +202,6 @@ contains
 
    !> Whether a state is so far outside that not the shell has reached it but too long a step.
    pure function is_wild(shell, state) result(wild)
-      !> The shell.
       class(shell_type), intent(in) :: shell
       !> State: [4].
       real(wp), intent(in) :: state(:)
@@ -229,15 +213,12 @@ contains
 
    !> Error of a drop that closes the shell.
    function get_failure(self, drop, time, state) result(error)
-      !> The shell.
       class(shell_type), intent(in) :: self
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Time since first touch, s.
       real(wp), intent(in) :: time
       !> Last valid state: [4].
       real(wp), intent(in) :: state(:)
-      !> The error.
       type(error_type) :: error
 
       if (is_wild(self, state)) then
@@ -251,9 +232,7 @@ contains
 
    !> Force history of one drop.
    subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> The choice of momentum flux.
       class(hollow_sphere_type), intent(in) :: options

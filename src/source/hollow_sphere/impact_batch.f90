@@ -12,7 +12,7 @@ module thud_impact_batch
 
    public :: add_end, advance, finish_step, get_single, get_watched, impact_batch_type, is_finite, locate
 
-   !> Impacts, in the units of `thud_shell_batch` unless said otherwise. Fastest where it begins with a
+   !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest where it begins with a
    !> line of the cache, see `thud_cache_line`.
    type :: impact_batch_type
       !> Series of the equations.
@@ -23,15 +23,14 @@ module thud_impact_batch
       type(state_batch_type) :: states(2)
       !> Ones, the length of whole steps: [batch_size].
       real(wp) :: whole_step(batch_size)
-      !> Largest deflection: [batch_size].
+      !> Maximum deflection: [batch_size].
       real(wp) :: max_deflection(batch_size)
-      !> Largest elastic force, at samples and turning point, N: [batch_size].
+      !> Maximum elastic force, at samples and turning point, N: [batch_size].
       real(wp) :: peak_force(batch_size)
-      !> Largest force on the floor, likewise, N: [batch_size].
+      !> Maximum force on the floor, likewise, N: [batch_size].
       real(wp) :: peak_floor_force(batch_size)
       !> Steps from first touch to release: [batch_size].
       real(wp) :: contact(batch_size)
-      !> The equations.
       type(shell_batch_type) :: shell
       !> Factor s of the flux term in restitution.
       real(wp) :: restitution_weight
@@ -81,7 +80,6 @@ contains
       type(impact_batch_type), intent(inout) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> Length of the step.
       real(wp), intent(in) :: length
       real(wp), dimension(4) :: state, new
       logical :: valid
@@ -97,7 +95,6 @@ contains
 
    !> The equation of one lane as the single solver has it, in the units of the lanes.
    pure function get_single(shell, i) result(single)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
       !> Number of the lane.
       integer, intent(in) :: i
@@ -117,9 +114,7 @@ contains
 
    !> Whether a value is a number.
    elemental function is_finite(value) result(finite)
-      !> The value.
       real(wp), intent(in) :: value
-      !> It is.
       logical :: finite
 
       finite = abs(value) <= huge(value)
@@ -165,7 +160,7 @@ contains
             right_value = value
             left_value = merge(left_value/2, left_value, right_moved)
          end where
-         ! A value that is rounding only cannot lead any nearer.
+         ! A value of rounding only gives no better estimate.
          where (open .and. abs(value) <= rounding)
             left = length
             right = length
@@ -197,7 +192,6 @@ contains
 
    !> What the end of the phase brings to zero: velocity or deflection.
    pure function get_watched(state, compressing) result(watched)
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity.
       logical, intent(in) :: compressing

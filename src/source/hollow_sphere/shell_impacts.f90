@@ -1,7 +1,7 @@
 !> Impacts of many balls side by side: the march of `thud_lumped`, with the same steps and the same
 !> change of phase at the turning point and at release, located on the step itself.
 !>
-!> Lanes run in step, so that sample i of all forces is written at once. A lane that has come to its
+!> Lanes run in step, so that sample i of all forces is written at once. A lane that has reached its
 !> turning point waits until all others have, or closed; then the turning points are located
 !> together, and each lane goes on at its own time.
 module thud_shell_impacts
@@ -21,12 +21,9 @@ contains
 
    !> Impacts from first touch to release, and their forces.
    subroutine solve_impacts(impacts, n_sample, substeps, force, last_sample)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
-      !> Samples of the record.
-      integer, intent(in) :: n_sample
-      !> Steps per sampling interval.
-      integer, intent(in) :: substeps
+      !> Samples of the record; steps per sampling interval.
+      integer, intent(in) :: n_sample, substeps
       !> Elastic forces, then floor forces, N, up to the last contact: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
       !> Number of the last sample that was written.
@@ -57,13 +54,12 @@ contains
       impacts%contact = last + length
       last_sample = last_step/substeps + 1
       call get_peaks(force(:, :last_sample), impacts%peak_force, impacts%peak_floor_force)
-      ! A part that sets in with a jump at first touch: a sample of a jump is the mean of its two sides.
+      ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
 
-   !> Marches until every lane has come to the end of its phase, or to that of the record.
+   !> Marches until every lane has reached the end of its phase or of the record.
    subroutine march(impacts, compressing, start, last, n_step, substeps, n_sample, force, last_step)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
@@ -71,12 +67,8 @@ contains
       real(wp), intent(in) :: start(batch_size)
       !> Step in which its phase ends, or in which it fails; `never` if neither: [batch_size].
       real(wp), intent(out) :: last(batch_size)
-      !> Steps of the record.
-      integer, intent(in) :: n_step
-      !> Steps per sampling interval.
-      integer, intent(in) :: substeps
-      !> Samples of the record.
-      integer, intent(in) :: n_sample
+      !> Steps of the record; steps per sampling interval; samples of the record.
+      integer, intent(in) :: n_step, substeps, n_sample
       !> Forces, N: [2 batch_size, n_sample].
       real(wp), intent(inout) :: force(2*batch_size, n_sample)
       !> Last step of any lane; unchanged where none began.
@@ -119,7 +111,6 @@ contains
    !> A new series for each lane that begins or strayed and, asked at fixed times, where the old one will
    !> not last: nothing that depends on other lanes.
    pure subroutine renew_series(impacts, start, n)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> Step with which each lane begins: [batch_size].
       real(wp), intent(in) :: start(batch_size)
@@ -157,7 +148,6 @@ contains
 
    !> Takes over a step where it stays inside the phase; other lanes stop in front of it.
    pure subroutine settle(impacts, compressing, n, start, last, undisturbed, done)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
@@ -195,11 +185,9 @@ contains
 
    !> Whether all lanes stay inside the phase.
    pure function all_stay(state, compressing) result(all_do)
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> The phase ends with the velocity, not with the deflection.
       logical, intent(in) :: compressing
-      !> They do.
       logical :: all_do
       real(wp) :: lost
       integer :: i
@@ -222,7 +210,6 @@ contains
 
    !> To the turning point and on to the end of its step, with the flux term of restitution.
    subroutine turn(impacts, turns)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> The lane has a turning point: [batch_size].
       logical, intent(in) :: turns(batch_size)
@@ -239,13 +226,13 @@ contains
       impacts%peak_floor_force = floor_force
    end subroutine turn
 
-   !> Raises the forces at the turning point to the largest of all samples.
+   !> Raises the forces at the turning point to the maximum of all samples.
    pure subroutine get_peaks(force, peak_force, peak_floor_force)
       !> Elastic forces, then floor forces, N: [2 batch_size, n_sample].
       real(wp), intent(in) :: force(:, :)
-      !> Largest elastic force, N: [batch_size].
+      !> Maximum elastic force, N: [batch_size].
       real(wp), intent(inout) :: peak_force(batch_size)
-      !> Largest force on the floor, N: [batch_size].
+      !> Maximum force on the floor, N: [batch_size].
       real(wp), intent(inout) :: peak_floor_force(batch_size)
       integer :: i, n
 

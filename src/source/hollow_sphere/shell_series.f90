@@ -30,7 +30,7 @@ module thud_shell_series
    !> Part of the reach that is used as long as the steps are short.
    real(wp), parameter :: inner = 0.6_wp
 
-   !> Steps between the times at which series are looked after. At the default step a ball from 2.7 m stays in
+   !> Steps between two checks of the series. At the default step a ball from 2.7 m stays in
    !> reach of its series for as many.
    integer, parameter :: series_steps = 16
 
@@ -50,15 +50,9 @@ contains
 
    !> Whether the series of a lane lasts for the next `series_steps`, in the inner part of its reach.
    elemental function will_last(place, reach, deflection, velocity) result(lasts)
-      !> Place of the series.
       real(wp), intent(in) :: place
-      !> Its reach.
-      real(wp), intent(in) :: reach
-      !> y.
-      real(wp), intent(in) :: deflection
-      !> z.
-      real(wp), intent(in) :: velocity
-      !> It does.
+      !> Its reach; y; z.
+      real(wp), intent(in) :: reach, deflection, velocity
       logical :: lasts
 
       lasts = max(abs(deflection - place), abs(deflection + series_steps*velocity - place)) <= inner*reach
@@ -66,13 +60,10 @@ contains
 
    !> Expands lanes about the middle of the way that lies before them; the present deflection is in reach.
    pure subroutine place_series(shell, state, wanted, series)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
-      !> The states.
       type(state_batch_type), intent(in) :: state
-      !> The lane is expanded anew: [batch_size].
+      !> The lane is expanded again: [batch_size].
       logical, intent(in) :: wanted(batch_size)
-      !> The series.
       type(series_batch_type), intent(inout) :: series
       real(wp), dimension(batch_size) :: place, inverse, power
       real(wp) :: term(batch_size, 0:degree)
@@ -126,7 +117,6 @@ contains
    elemental function get_ratio(deflection) result(ratio)
       !> y.
       real(wp), intent(in) :: deflection
-      !> x.
       real(wp) :: ratio
 
       ratio = (1 - deflection)*(1 - deflection)*(1 + 2*deflection)
@@ -136,7 +126,6 @@ contains
    elemental function get_reach(deflection) result(reach)
       !> y.
       real(wp), intent(in) :: deflection
-      !> The distance.
       real(wp) :: reach
 
       reach = near*min(1 - deflection, 0.5_wp + deflection)
@@ -146,7 +135,6 @@ contains
    elemental function get_pull(y, d, c0, c1, c2, c3, c4, c5, c6, c7) result(pull)
       !> y, its distance from the place of the series, and the terms of the series.
       real(wp), intent(in) :: y, d, c0, c1, c2, c3, c4, c5, c6, c7
-      !> y c.
       real(wp) :: pull
 
       pull = y*(c0 + d*(c1 + d*(c2 + d*(c3 + d*(c4 + d*(c5 + d*(c6 + d*c7)))))))
@@ -170,11 +158,9 @@ contains
 
    !> Force on the floor and power lost, and their rates of change.
    pure subroutine get_flows(shell, series, state, force, force_rate, power, power_rate)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
       !> The series, in whose reach the states are.
       type(series_batch_type), intent(in) :: series
-      !> The states.
       type(state_batch_type), intent(in) :: state
       !> Force on the floor: [batch_size].
       real(wp), intent(out) :: force(batch_size)
@@ -205,11 +191,8 @@ contains
 
    !> One classical step, or part of one, as `rk4_step`; the forces at its beginning, and their sums.
    pure subroutine take_step(shell, series, state, length, new, elastic_force, floor_force, missed)
-      !> The equations.
       type(shell_batch_type), intent(in) :: shell
-      !> The series.
       type(series_batch_type), intent(in) :: series
-      !> State at the beginning.
       type(state_batch_type), intent(in) :: state
       !> Length, in whole steps: [batch_size].
       real(wp), intent(in) :: length(batch_size)
@@ -249,7 +232,7 @@ contains
                d4 = y4 - place
                a4 = s*get_push(z4, d4, inverse) - get_pull(y4, d4, c0, c1, c2, c3, c4, c5, c6, c7)
 
-               ! Added, because a choice between the two would not be vectorised.
+               ! Added, as a branch would not be vectorised.
                outside = merge(0.0_wp, not_a_number, max(max(abs(d1), abs(d2)), max(abs(d3), abs(d4))) <= series%reach(i))
                outsides = outsides + outside
                sixth = h*(1/6.0_wp)

@@ -1,29 +1,26 @@
 !> Many drops of `thud_hollow_sphere`, a block of lanes at a time: the same equation, steps and checks
 !> as `solve_hollow_sphere`, and the same numbers to 1e-10; the impulse to the residual of its balance.
 !>
-!> Sets that cannot be computed have a status and NaN; they leave the others as they are.
+!> Sets that cannot be computed have NaN; they leave the others as they are.
 module thud_shell_sets
    use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
-   use thud_cache_line, only: get_aligned_start, line_length
    use thud_ball, only: ball_type, get_ball_fields
+   use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_error, only: error_type
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type, max_residual
-   use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, is_wild, &
-      restitution_weights, shell_type, solve_hollow_sphere
-   use thud_impact_batch, only: get_single, impact_batch_type
+   use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, &
+      restitution_weights, solve_hollow_sphere
+   use thud_impact_batch, only: impact_batch_type
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
    use thud_new_field, only: in_group
-   use thud_lumped, only: at_deflection, at_velocity
    use thud_power, only: not_a_number
-   use thud_rk4, only: longest_valid, rk4_step
    use thud_sampling, only: get_sample_count, min_contact_samples, sampling_type
-   use thud_set_status, only: set_closes, set_coarse, set_few_samples, set_is_fine, set_outlasts, set_range
-   use thud_shell_impacts, only: solve_impacts
    use thud_shell_batch, only: batch_size
+   use thud_shell_impacts, only: solve_impacts
    implicit none (type, external)
    private
 
@@ -34,25 +31,23 @@ module thud_shell_sets
 
    !> One drop.
    type :: set_type
-      !> The ball.
       type(ball_type) :: ball
-      !> The drop.
       type(drop_type) :: drop
       !> Number of the choice of the flux term, as in `flux_choices`.
       integer :: flux = 1
    end type set_type
 
-   !> What one drop came to; NaN but for the status where it could not be computed.
+   !> Outcome of one drop; NaN where it could not be computed.
    type :: set_outcome_type
-      !> A code of `thud_set_status`.
-      integer :: status = set_is_fine
+      !> The batch has computed it; else the single solver has the result or the sentence.
+      logical :: computed = .false.
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
-      !> Largest elastic force, N.
+      !> Maximum elastic force, N.
       real(wp) :: peak_force = not_a_number
-      !> Largest force on the floor, N.
+      !> Maximum force on the floor, N.
       real(wp) :: peak_floor_force = not_a_number
-      !> Largest deflection, m.
+      !> Maximum deflection, m.
       real(wp) :: max_deflection = not_a_number
       !> Velocity at release over velocity at first touch.
       real(wp) :: restitution = not_a_number
@@ -60,7 +55,7 @@ module thud_shell_sets
       real(wp) :: impulse = not_a_number
    end type set_outcome_type
 
-   !> Residual of the balances of impulse and energy from which on the single solver is asked: the sums that
+   !> Residual of the balances of impulse and energy above which the single solver decides: the sums that
    !> are taken here err by up to some twenty times as much as the single solver's.
    real(wp), parameter :: doubtful = 0.1_wp*max_residual
 
@@ -78,7 +73,6 @@ contains
 
    !> The numbers of a set: ball and drop hold nothing else, in the order of their keys.
    pure function get_numbers(set) result(values)
-      !> The set.
       type(set_type), intent(in) :: set
       !> The numbers: [n_key].
       real(wp) :: values((storage_size(set%ball) + storage_size(set%drop))/storage_size(1.0_wp))
@@ -88,20 +82,20 @@ contains
 
    !> Blocks of the sets that can be computed: of one choice of the flux term, so that lanes share their
    !> equation, and with similar contact times, because a block takes as long as its longest contact.
-   subroutine get_blocks(sets, status, order, first)
+   subroutine get_blocks(sets, valid, order, first)
       !> The sets: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> What is wrong with the input of each set, or `set_is_fine`: [n_set].
-      integer, intent(out) :: status(:)
+      !> The values of each set lie inside their ranges: [n_set].
+      logical, intent(out) :: valid(:)
       !> Numbers of the sets whose input is right: [n_valid].
       integer, allocatable, intent(out) :: order(:)
       !> Places in `order` where blocks begin, and the place after the last: [n_block + 1].
       integer, allocatable, intent(out) :: first(:)
       !> Classes of contact times per doubling.
       integer, parameter :: classes = 64
-      !> Most classes that are told apart, for each choice of the flux term.
-      integer, parameter :: most = 64*classes
-      integer :: next(0:size(compression_weights)*most)
+      !> Maximum number of classes, for each choice of the flux term.
+      integer, parameter :: max_class = 64*classes
+      integer :: next(0:size(compression_weights)*max_class)
       integer :: class(size(sets))
       integer :: i, j
       type(set_type), target :: any_set
@@ -112,37 +106,35 @@ contains
       ranges = [(new_interval(fields(i)%range), i=1, size(fields))]
       next = 0
       do i = 1, size(sets)
-         status(i) = get_input_status(sets(i), fields%key, ranges)
-         if (status(i) /= set_is_fine) cycle
+         valid(i) = is_valid(sets(i), fields%key, ranges)
+         if (.not. valid(i)) cycle
          class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
-         class(i) = min(max(class(i), 0), most - 1) + (sets(i)%flux - 1)*most
+         class(i) = min(max(class(i), 0), max_class - 1) + (sets(i)%flux - 1)*max_class
          next(class(i) + 1) = next(class(i) + 1) + 1
       end do
       do i = 1, ubound(next, 1)
          next(i) = next(i) + next(i - 1)
       end do
       allocate (order(next(ubound(next, 1))))
-      first = [((j, j=next((i - 1)*most) + 1, next(i*most), block_size), i=1, size(compression_weights)), size(order) + 1]
+      first = [((j, j=next((i - 1)*max_class) + 1, next(i*max_class), block_size), &
+         i=1, size(compression_weights)), size(order) + 1]
       do i = 1, size(sets)
-         if (status(i) /= set_is_fine) cycle
+         if (.not. valid(i)) cycle
          next(class(i)) = next(class(i)) + 1
          order(next(class(i))) = i
       end do
    end subroutine get_blocks
 
-   !> What is wrong with the input of a set.
-   pure function get_input_status(set, keys, ranges) result(status)
-      !> The set.
+   !> Whether the values of a set lie inside their ranges.
+   pure function is_valid(set, keys, ranges) result(inside)
       type(set_type), intent(in) :: set
       !> Names of its numbers: [n_key].
       character(len=*), intent(in) :: keys(:)
       !> Their ranges, whose ends may depend on the set: [n_key].
       type(interval_type), intent(in) :: ranges(:)
-      !> `set_is_fine`, or `set_range` where a value lies outside of its range.
-      integer :: status
+      logical :: inside
       type(interval_type) :: range
       real(wp) :: values(size(keys))
-      logical :: inside
       integer :: i
 
       values = get_numbers(set)
@@ -156,13 +148,11 @@ contains
             inside = inside .and. range%contains(values(i))
          end if
       end do
-      status = merge(set_is_fine, set_range, inside)
-   end function get_input_status
+   end function is_valid
 
    !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
    !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like sets.
    pure function get_rough_contact_time(set) result(time)
-      !> The set.
       type(set_type), intent(in) :: set
       !> The time, s.
       real(wp) :: time
@@ -181,7 +171,6 @@ contains
    subroutine solve_block(sets, sampling, force, last_sample, outcomes)
       !> The sets, their input checked: [n_set].
       type(set_type), intent(in) :: sets(:)
-      !> Sampling of all.
       type(sampling_type), intent(in) :: sampling
       !> Elastic forces, then floor forces, N, up to the last contact: [2 block_size, n_sample].
       real(wp), intent(inout), contiguous :: force(:, :)
@@ -190,11 +179,11 @@ contains
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
       type(impact_batch_type), pointer :: impacts
-      real(wp), target :: room(storage_size(impacts)/storage_size(1.0_wp) + line_length)
+      real(wp), target :: buffer(storage_size(impacts)/storage_size(1.0_wp) + line_length)
       real(wp) :: step
       integer :: i
 
-      call c_f_pointer(c_loc(room(get_aligned_start(room))), impacts)
+      call c_f_pointer(c_loc(buffer(get_aligned_start(buffer))), impacts)
 
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       impacts%shell%weight = compression_weights(sets(1)%flux)
@@ -205,8 +194,8 @@ contains
       end do
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, last_sample)
       do i = 1, size(sets)
-         outcomes(i)%status = get_lane_status(impacts, i, sets(i), sampling)
-         if (outcomes(i)%status /= set_is_fine) cycle
+         outcomes(i)%computed = is_computed(impacts, i, sets(i), sampling)
+         if (.not. outcomes(i)%computed) cycle
          associate (diameter => 2*sets(i)%ball%outer_radius)
             outcomes(i)%contact_time = impacts%contact(i)*step
             outcomes(i)%peak_force = impacts%peak_force(i)
@@ -220,11 +209,9 @@ contains
 
    !> Equation and beginning of one lane; see `thud_shell_batch` for the units.
    pure subroutine set_lane(impacts, i, set, step)
-      !> The impacts.
       type(impact_batch_type), intent(inout) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> The set.
       type(set_type), intent(in) :: set
       !> The step, s.
       real(wp), intent(in) :: step
@@ -242,76 +229,30 @@ contains
       end associate
    end subroutine set_lane
 
-   !> What became of one lane, asked in the order of `solve_lumped`.
-   function get_lane_status(impacts, i, set, sampling) result(status)
-      !> The impacts.
+   !> Whether a lane has a result: the checks of `solve_lumped`.
+   function is_computed(impacts, i, set, sampling) result(computed)
       type(impact_batch_type), intent(in) :: impacts
       !> Number of the lane.
       integer, intent(in) :: i
-      !> Its set.
       type(set_type), intent(in) :: set
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
-      !> A code of `thud_set_status`.
-      integer :: status
-      real(wp) :: change, energy
-
-      associate (z => impacts%states(impacts%now)%velocity(i), z0 => impacts%impact_velocity(i))
-         if (impacts%left(i)) then
-            status = get_reason(impacts, i, set)
-         else if (.not. impacts%released(i)) then
-            status = set_outlasts
-         else if (impacts%contact(i) < min_contact_samples*sampling%substeps) then
-            status = set_few_samples
-         else
-            change = abs(impacts%states(impacts%now)%impulse(i) - (z0 - z))/(z0 - z)
-            energy = abs(z**2 + 2*impacts%states(impacts%now)%loss(i) - z0**2)/z0**2
-            status = set_is_fine
-            ! Asked so that NaN is doubtful too.
-            if (.not. max(change, energy) <= doubtful) status = get_single_status(set, sampling)
-         end if
-      end associate
-   end function get_lane_status
-
-   !> Whether the single solver finds the steps fine enough; its sums take in the stages of each step.
-   function get_single_status(set, sampling) result(status)
-      !> The set.
-      type(set_type), intent(in) :: set
-      !> The sampling.
-      type(sampling_type), intent(in) :: sampling
-      !> `set_is_fine` or `set_coarse`.
-      integer :: status
+      logical :: computed
       type(force_history_type) :: history
       type(error_type), allocatable :: error
+      real(wp) :: change, energy
 
+      computed = impacts%released(i) .and. .not. impacts%left(i)
+      if (computed) computed = impacts%contact(i) >= min_contact_samples*sampling%substeps
+      if (.not. computed) return
+      associate (state => impacts%states(impacts%now), v0 => impacts%impact_velocity(i))
+         change = abs(state%impulse(i) - (v0 - state%velocity(i)))/(v0 - state%velocity(i))
+         energy = abs(state%velocity(i)**2 + 2*state%loss(i) - v0**2)/v0**2
+      end associate
+      if (max(change, energy) <= doubtful) return
+      ! The sums of the single solver, which include the stages of each step, decide.
       call solve_hollow_sphere(set%ball, set%drop, hollow_sphere_type(momentum_flux=flux_choices(set%flux)), sampling, &
          history, error)
-      status = merge(set_coarse, set_is_fine, allocated(error))
-   end function get_single_status
-
-   !> Why a lane has left the domain of the equation: the single solver's own question, asked of the
-   !> last state inside.
-   function get_reason(impacts, i, set) result(status)
-      !> The impacts.
-      type(impact_batch_type), intent(in) :: impacts
-      !> Number of the lane.
-      integer, intent(in) :: i
-      !> Its set.
-      type(set_type), intent(in) :: set
-      !> `set_closes` or `set_coarse`.
-      integer :: status
-      type(shell_type) :: shell
-      real(wp) :: state(4), last(4)
-      logical :: valid
-
-      shell = get_single(impacts%shell, i)
-      state = 0.0_wp
-      state(at_deflection) = impacts%states(impacts%now)%deflection(i)
-      state(at_velocity) = impacts%states(impacts%now)%velocity(i)
-      shell%compression_weight = compression_weights(set%flux)
-      shell%compressing = state(at_velocity) > 0.0_wp
-      call rk4_step(shell, 0.0_wp, state, longest_valid(shell, 0.0_wp, state, 1.0_wp), last, valid)
-      status = merge(set_coarse, set_closes, is_wild(shell, last))
-   end function get_reason
+      computed = .not. allocated(error)
+   end function is_computed
 
 end module thud_shell_sets

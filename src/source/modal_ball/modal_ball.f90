@@ -27,14 +27,14 @@ module thud_modal_ball
 
    public :: modal_ball_type
 
-   !> Angle that a mode may turn through in a step; faster ones answer statically.
+   !> Maximum phase angle of a mode in a step; faster ones answer statically.
    real(wp), parameter :: max_phase = pi/2
 
    !> Part of the energy at first touch that the steps may lose in contact.
    real(wp), parameter :: max_energy_residual = 0.02_wp
 
-   !> Families whose energy is told apart in the output, from n = 0 on.
-   integer, parameter :: n_told = 6
+   !> Families whose energies are separate channels, from n = 0 on.
+   integer, parameter :: n_family = 6
 
    !> The model.
    type, extends(modal_ball_options_type) :: modal_ball_type
@@ -59,9 +59,8 @@ module thud_modal_ball
 
 contains
 
-   !> About the time that one drop takes on one core, s.
+   !> Approximate time of one drop on one core, s.
    function get_cost(options) result(cost)
-      !> The options.
       class(modal_ball_type), intent(in) :: options
       !> The time, s.
       real(wp) :: cost
@@ -71,9 +70,7 @@ contains
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The drop.
       type(drop_type), intent(in) :: drop
       !> Modes, rings and damping.
       class(modal_ball_type), intent(in) :: options
@@ -92,9 +89,9 @@ contains
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       history = new_force_history(sampling%sample_rate, n_sample, ['contact_force'])
       history%impact_velocity = get_impact_velocity(drop)
-      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_told - 1), &
+      history%channel_name = [character(len=24) :: 'contact_radius_m', ('energy_n'//to_text(i)//'_J', i=0, n_family - 1), &
          'energy_rest_J']
-      allocate (history%channel(n_sample, n_told + 2), source=0.0_wp)
+      allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       call prepare(ball, options, interval, step, contact, error)
       if (allocated(error)) return
@@ -103,17 +100,14 @@ contains
 
    !> Modes, their steps and the response of the rings.
    subroutine prepare(ball, options, interval, step, contact, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Modes, rings and damping.
       class(modal_ball_options_type), intent(in) :: options
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      !> The modes.
       type(mode_step_type), intent(out) :: step
-      !> The rings.
       type(ring_contact_type), intent(out) :: contact
-      !> The modes cannot be computed, or the rings cannot be told apart.
+      !> The modes cannot be computed, or the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: response(options%rings, options%rings)
       real(wp), allocatable :: zeta(:)
@@ -131,12 +125,11 @@ contains
       end do
       call new_ring_contact(response, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
-         //' cannot be told apart; allowed: fewer rings, more static_harmonics, or more substeps')
+         //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
    !> Modes of all harmonics, and the static response of the rings to what these leave out.
    subroutine add_modes(ball, options, interval, step, response, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Modes and rings.
       class(modal_ball_options_type), intent(in) :: options
@@ -190,7 +183,6 @@ contains
 
    !> Angles of the rings from the lowest point to the equator.
    pure function get_ring_angles(n_ring) result(angle)
-      !> Number of rings.
       integer, intent(in) :: n_ring
       !> Angles, rad: [n_ring].
       real(wp) :: angle(n_ring)
@@ -201,17 +193,12 @@ contains
 
    !> Marches from first touch until the ball has left for good.
    subroutine march(ball, sampling, interval, step, contact, history, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> Sampling of the record.
       type(sampling_type), intent(in) :: sampling
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      !> The modes.
       type(mode_step_type), intent(in) :: step
-      !> The rings.
       type(ring_contact_type), intent(inout) :: contact
-      !> The history.
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
@@ -263,12 +250,9 @@ contains
 
    !> One step of the modes, and the impulses of the floor at its beginning.
    subroutine take_step(step, interval, mass, height, state, contact, impulse, error)
-      !> The modes.
       type(mode_step_type), intent(in) :: step
-      !> Length of the step, s.
-      real(wp), intent(in) :: interval
-      !> Mass of the ball, kg.
-      real(wp), intent(in) :: mass
+      !> Length of the step, s; mass of the ball, kg.
+      real(wp), intent(in) :: interval, mass
       !> Heights of the rings of the undeformed ball below its centre, m: [n_ring].
       real(wp), intent(in) :: height(:)
       !> Motion of the ball.
@@ -305,7 +289,7 @@ contains
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
          end if
-         ! What damping takes lies between the impulse at the beginning and the end of the step.
+         ! The loss by damping lies between the impulse at the beginning and the end of the step.
          state%loss = state%loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
       end associate
    end subroutine take_step
@@ -314,7 +298,6 @@ contains
    subroutine finish(mass, step, state, history, error)
       !> Mass of the ball, kg.
       real(wp), intent(in) :: mass
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball after the contact.
       type(state_type), intent(in) :: state
@@ -343,15 +326,12 @@ contains
 
    !> Writes motion and energies of one instant into the history.
    pure subroutine record_motion(ball, step, state, i, history)
-      !> The ball.
       type(ball_type), intent(in) :: ball
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball.
       type(state_type), intent(in) :: state
       !> Number of the sample.
       integer, intent(in) :: i
-      !> The history.
       type(force_history_type), intent(inout) :: history
       integer :: k, place
 
@@ -359,7 +339,7 @@ contains
       history%velocity(i) = -state%speed
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(state%q)
-         place = 2 + min(step%harmonic(k), n_told)
+         place = 2 + min(step%harmonic(k), n_family)
          history%channel(i, place) = history%channel(i, place) + (state%v(k)**2 + (step%omega(k)*state%q(k))**2)/2
       end do
    end subroutine record_motion

@@ -66,13 +66,10 @@ contains
 
    !> Refuses rings that are too few for the harmonics.
    subroutine check(ball, options, sampling, error)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
       class(modal_ball_options_type), intent(in) :: options
-      !> The sampling.
       type(sampling_type), intent(in) :: sampling
-      !> What is wrong.
       type(error_type), allocatable, intent(out) :: error
 
       if (2*options%rings < options%harmonics) error = input_error('&modal_ball: harmonics = ' &

@@ -31,7 +31,7 @@ contains
       real(wp), intent(in) :: interval
       real(wp), dimension(size(step%omega)) :: zeta, decay, root, c, s
 
-      ! Critical damping has no closed form of either kind; a millionth beside it nobody can tell.
+      ! Critical damping has no closed form of either kind; a millionth off makes no difference.
       zeta = merge(1 + 1.0e-6_wp, damping_ratio, abs(damping_ratio - 1) < 1.0e-6_wp)
       decay = zeta*step%omega
       root = step%omega*sqrt(abs(1 - zeta**2))
@@ -50,7 +50,6 @@ contains
 
    !> Energy of the modes, J.
    pure function get_energy(step, q, v) result(energy)
-      !> The modes.
       type(mode_step_type), intent(in) :: step
       !> Amplitudes, m sqrt(kg): [n_mode].
       real(wp), intent(in) :: q(:)

@@ -79,7 +79,7 @@ contains
          if (round < max_rounds/2) then
             contact%touches = contact%touches .neqv. wrong
          else
-            ! One ring at a time cannot go round in circles (Murty's rule).
+            ! One ring at a time cannot cycle (Murty's rule).
             first_wrong = findloc(wrong, .true., dim=1)
             contact%touches(first_wrong) = .not. contact%touches(first_wrong)
          end if
@@ -90,7 +90,6 @@ contains
 
    !> Impulses that close the gaps of the touching rings.
    subroutine close_gaps(contact, gap, failed)
-      !> The contact.
       type(ring_contact_type), intent(inout) :: contact
       !> Gaps without contact, m: [n_ring].
       real(wp), intent(in) :: gap(:)

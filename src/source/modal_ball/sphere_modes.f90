@@ -66,13 +66,11 @@ contains
 
    !> Basis for all harmonics up to a highest one.
    function new_basis(ball, highest_harmonic, with_gas) result(basis)
-      !> The ball.
       type(ball_type), intent(in) :: ball
       !> Highest harmonic that will be asked for.
       integer, intent(in) :: highest_harmonic
       !> The enclosed gas resists changes of its volume.
       logical, intent(in) :: with_gas
-      !> The basis.
       type(basis_type) :: basis
       real(wp), allocatable :: node(:)
       integer :: degree, n, i
@@ -173,13 +171,11 @@ contains
    end subroutine set_gram
 
    !> Degree of the polynomials that resolve a harmonic: its modes fall off like r^n, which takes
-   !> a degree in proportion to the root of the exponent; the tests hold it against higher ones.
+   !> a degree in proportion to the root of the exponent; the tests compare it with higher ones.
    pure function get_degree(basis, harmonic) result(degree)
       !> The basis, its radii set.
       type(basis_type), intent(in) :: basis
-      !> The harmonic.
       integer, intent(in) :: harmonic
-      !> Degree.
       integer :: degree
 
       degree = 10 + ceiling(2.4_wp*sqrt(harmonic*log(basis%outer_radius/basis%inner_radius)))
@@ -187,7 +183,6 @@ contains
 
    !> The lowest modes of one harmonic, and the flexibility of all others.
    subroutine get_family(basis, harmonic, max_modes, highest_omega, family, failed)
-      !> The basis.
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
@@ -195,7 +190,6 @@ contains
       integer, intent(in) :: max_modes
       !> Highest angular frequency to keep, rad/s.
       real(wp), intent(in) :: highest_omega
-      !> The modes.
       type(family_type), intent(out) :: family
       !> The eigenproblem could not be solved.
       logical, intent(out) :: failed
@@ -224,7 +218,6 @@ contains
 
    !> Flexibility of a whole harmonic, without its modes.
    subroutine get_static_family(basis, harmonic, family, failed)
-      !> The basis.
       type(basis_type), intent(in) :: basis
       !> Harmonic n, at least 2.
       integer, intent(in) :: harmonic
@@ -247,7 +240,6 @@ contains
 
    !> Stiffness, mass and surface displacements of one harmonic in the basis.
    subroutine assemble(basis, harmonic, stiffness, mass, surface)
-      !> The basis.
       type(basis_type), intent(in) :: basis
       !> Harmonic n.
       integer, intent(in) :: harmonic
@@ -286,7 +278,6 @@ contains
 
    !> The same for n = 0, where U = S/r^2 with S a polynomial, a constant if incompressible.
    subroutine assemble_breathing(basis, stiffness, mass, surface)
-      !> The basis.
       type(basis_type), intent(in) :: basis
       !> Stiffness matrix, N/m: [n, n].
       real(wp), allocatable, intent(out) :: stiffness(:, :)
