@@ -42,27 +42,10 @@ def run_blocks(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> None:
-    """Compute blocks in any order and keep the results of each as soon as it is done.
+    """Compute blocks in any order; `keep` takes each with its results as soon as it is done.
 
-    Parameters
-    ----------
-    blocks
-        The blocks.
-    keep
-        Takes a block and its results.
-    backend
-        ``"threads"`` (the default), ``"processes"`` or ``"dask"`` (the default with a scheduler).
-    workers
-        Number of threads or processes, up to 1024; by default one per processor.
-    scheduler
-        Address of a Dask scheduler.
-
-    Raises
-    ------
-    InputError
-        Where there is no such backend or scheduler.
-    NumericalError
-        Where the backend loses a block.
+    Backend, workers and scheduler are those of `thud.studies.kind.How`. Raises NumericalError where
+    the backend loses a block.
     """
     backend, workers, scheduler = checked_backend(backend, workers, scheduler)
     with _open(backend, workers, scheduler) as (executor, width):
@@ -110,7 +93,6 @@ def checked_backend(
 
 
 def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) -> None:
-    """Wait for blocks and keep them."""
     done, _ = wait(running, return_when=FIRST_COMPLETED)
     for future in done:
         try:
@@ -133,7 +115,7 @@ def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) 
 def _open(
     backend: str, workers: int | None, scheduler: str | None
 ) -> Iterator[tuple[Executor, int]]:
-    """Open a backend; return its executor and how many blocks it computes at once."""
+    """Open a backend; yield its executor and how many blocks run at once."""
     if scheduler is not None:
         with _dask(scheduler) as opened:
             yield opened
@@ -150,7 +132,7 @@ def _open(
 
 
 def _follow_parent() -> None:
-    """Leave interrupts to the process that started this one, and end with it."""
+    """Leave interrupts to the parent process, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None  # noqa: S101 - this runs in processes that were started
@@ -165,7 +147,6 @@ def _follow_parent() -> None:
 
 @contextmanager
 def _dask(address: str) -> Iterator[tuple[Executor, int]]:
-    """Open a Dask scheduler."""
     try:
         from distributed import Client  # noqa: PLC0415 - an optional package
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
@@ -201,7 +182,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
 
 @contextmanager
 def _silent(name: str) -> Iterator[None]:
-    """Keep the loggers of a package quiet: what goes wrong is told in one sentence."""
+    """Silence the loggers of a package: one sentence reports what fails."""
     known = [
         other for other in logging.root.manager.loggerDict if f"{other}.".startswith(f"{name}.")
     ]

@@ -31,17 +31,7 @@ _SEAL = b"thud sha256 "
 
 
 class Blocks:
-    """The finished blocks of a study in its directory, and what becomes of them at its end.
-
-    Parameters
-    ----------
-    folder
-        The directory, taken for the study.
-    study
-        The study.
-    size
-        Sets in a block.
-    """
+    """The finished blocks of a study, of `size` sets each, in its directory, and their joining."""
 
     def __init__(self, folder: Path, study: SetStudy, size: int) -> None:
         self._study = study
@@ -50,15 +40,7 @@ class Blocks:
         self._identity = {**study.identity, "sets in a block": f"{size}"}
 
     def open(self) -> None:
-        """Begin the study, or go on with it.
-
-        Raises
-        ------
-        InputError
-            Where the disk is too small, or the blocks have another size.
-        OSError
-            Where nothing can be written.
-        """
+        """Begin or continue the study. Raises InputError where the disk is too small."""
         with _named(self.path):
             self._require_space()
             self._partial.mkdir(exist_ok=True)
@@ -76,7 +58,6 @@ class Blocks:
         return self.path.exists()
 
     def _require_space(self) -> None:
-        """Raise InputError where the disk is too small."""
         free = shutil.disk_usage(self.path.parent).free
         needed = disk_space(self._study) - sum(path.stat().st_size for path in self._blocks())
         if needed > free:
@@ -91,7 +72,6 @@ class Blocks:
         return block_paths(self._partial)
 
     def _block(self, start: int) -> Path:
-        """Return the file of a block."""
         return self._partial / f"block_{start:012d}.nc"
 
     def has(self, start: int) -> bool:
@@ -99,13 +79,13 @@ class Blocks:
         return self._block(start).exists()
 
     def keep(self, block: Block, found: Columns) -> None:
-        """Write the results of a block, completely or not at all."""
+        """Write the results of a block atomically."""
         stop = block.start + len(found["status"])
         columns = self._study.parameter_columns(block.start, stop)
         _write(new_dataset(self._study, columns, found), self._block(block.start))
 
     def finish(self) -> None:
-        """Put all blocks together, then remove them."""
+        """Join all blocks, then remove them."""
         if not self.complete:
             paths = self._blocks()
             if self.path.suffix == ".nc":
@@ -210,7 +190,7 @@ def _join(paths: list[Path], names: list[str] | None = None) -> xr.Dataset:
 
 
 def _loaded(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in memory, its texts of any length as they were before they were written."""
+    """Load a dataset; its texts have any length again."""
     texts: dict[Any, Any] = {
         name: variable.astype(object)
         for name, variable in dataset.variables.items()
@@ -221,7 +201,6 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
-    """Open a file or Zarr group to be read."""
     with _readable(path):
         with uninterrupted():
             if path.suffix == ".zarr":
@@ -234,13 +213,12 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
 
 
 def _open_zarr(path: Path) -> xr.Dataset:
-    """Open a Zarr group: its arrays are read when they are needed, whether Dask is there or not."""
+    """Open a Zarr group; its arrays are read on demand, with or without Dask."""
     return in_order(xr.open_zarr(path, consolidated=False, chunks=None))
 
 
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
-    """Raise InputError where there is no dataset."""
     try:
         yield
     except (OSError, ValueError, KeyError, RuntimeError) as error:
@@ -249,14 +227,14 @@ def _readable(path: Path) -> Iterator[None]:
 
 
 def _write(dataset: xr.Dataset, path: Path) -> None:
-    """Write a NetCDF file, completely or not at all."""
+    """Write a NetCDF file atomically."""
     with uninterrupted():
         content = bytes(dataset.to_netcdf(engine="h5netcdf"))
         replace_file(path, content + _SEAL + sha256(content).digest())
 
 
 def _require_whole(path: Path) -> None:
-    """Raise ValueError where a NetCDF file is damaged: HDF5 may search such a file for ever."""
+    """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
     content, seal, digest = path.read_bytes().rpartition(_SEAL)
     # Files of an older thud have no checksum.
     if seal and sha256(content).digest() != digest:
@@ -266,7 +244,7 @@ def _require_whole(path: Path) -> None:
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Give errors of the disk the path that was asked for."""
+    """Give errors of the disk the requested path."""
     try:
         yield
     except OSError as error:

@@ -54,21 +54,9 @@ def coordinate(parameter: Parameter) -> str:
 
 
 def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset:
-    """Return the results of some sets as a dataset, one after the other.
+    """Return the results of some sets, along the dimension ``set`` (levels also along their bands).
 
-    Parameters
-    ----------
-    study
-        The study.
-    columns
-        Its parameters, by their names.
-    found
-        Results of the same sets, as `evaluate` gives them.
-
-    Returns
-    -------
-    Dataset
-        Of the dimensions ``set`` and ``octave``, and ``third`` where the case wants them.
+    `columns` holds their parameters by name, `found` what `evaluate` returns.
     """
     levels = level_names(study.case)
     coordinates: dict[str, Any] = {
@@ -89,7 +77,6 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
 
 
 def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
-    """Return the attributes of a parameter; figures show it in unit and scale of the study."""
     key, law = parameter.key, study.temperature
     shown_unit, power = parameter.shown_unit
     meaning = key.meaning
@@ -132,7 +119,7 @@ def provenance(study: SetStudy) -> dict[str, str]:
 
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with results and parameters in one order, whatever Zarr made of it."""
+    """Return a dataset with variables in the order of `MEANINGS`, which Zarr does not keep."""
     results = {name: dataset.variables[name] for name in MEANINGS if name in dataset.data_vars}
     names = [*BANDWIDTHS, *dataset.attrs["parameters"].split()]
     coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}

@@ -122,13 +122,12 @@ def design_map(
 
 
 def _is_axis(parameter: Parameter) -> bool:
-    """Return whether a parameter has two numbers or more."""
     # Very many values between two ends are not made for this.
     return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
 
 
 def _mark(study: SetStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return where the ball of the paper lies if the rest is as in the paper, or the case."""
+    """Return the place of the paper's ball if all else is as in the paper, else of the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
     by_density = study.density is not None or DENSITY.name in names
@@ -146,7 +145,7 @@ def _mark(study: SetStudy) -> tuple[tuple[float, float] | None, str]:
 
 
 def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
-    """Return the numbers of ball and drop, the density of the wall among them."""
+    """Return the numbers of ball, drop and density of the wall."""
     ball = case.ball
     volume = wall_volume(ball.outer_radius, ball.wall_thickness)
     if density is None:

@@ -35,22 +35,7 @@ def makers(design: str) -> dict[str, str]:
 def read_design(
     given: Mapping[str, Any], allowed: tuple[str, ...], parameters: tuple[Parameter, ...]
 ) -> tuple[str, int, int]:
-    """Return kind, size and seed of a design.
-
-    Parameters
-    ----------
-    given
-        The table ``[design]``.
-    allowed
-        The designs that suit the kind of study, the default first.
-    parameters
-        Its parameters.
-
-    Raises
-    ------
-    InputError
-        Where the design does not suit the study or its parameters.
-    """
+    """Return kind, size and seed of ``[design]``; the first of the allowed kinds is the default."""
     design = given.get("kind", allowed[0])
     if design not in allowed:
         message = f"[design] kind = {design!r} is not allowed; allowed: {', '.join(allowed)}"
@@ -95,10 +80,7 @@ def read_design(
 def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
     design: str, dimension: int, size: int, seed: int, start: int, stop: int
 ) -> NDArray[np.float64]:
-    """Return some points of a design in the unit cube, shape (stop - start, dimension).
-
-    Random and Sobol points are made when they are asked for; the other designs are a whole.
-    """
+    """Return points of a design in the unit cube, shape (stop - start, dimension)."""
     if design == "random":
         generator = np.random.PCG64(seed).advance(start * dimension)
         return np.random.Generator(generator).random((stop - start, dimension))
@@ -117,7 +99,6 @@ def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
 
 @lru_cache(maxsize=1)
 def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    """Return all points of a design."""
     if design == "latin_hypercube":
         from scipy.stats import qmc  # noqa: PLC0415 - takes its time
 
@@ -133,5 +114,4 @@ def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.floa
 
 
 def _float(points: Any) -> NDArray[np.float64]:  # noqa: ANN401 - of libraries without types
-    """Return points as an array of floats."""
     return np.asarray(points, dtype=np.float64)

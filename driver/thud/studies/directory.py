@@ -25,25 +25,10 @@ _MAX_SHOWN = 3
 
 
 class Directory:
-    """A results directory that one run has taken: a context, in which it is locked.
+    """A results directory, locked for one run in a ``with`` block.
 
-    Parameters
-    ----------
-    folder
-        The directory; it is made where there is none.
-    kind
-        The kind of study.
-    study
-        The study that it is taken for.
-    replace
-        Remove the results of another version of the study.
-
-    Raises
-    ------
-    InputError
-        Where another run is at work there, or results of something else lie there.
-    OSError
-        Where nothing can be written there.
+    Raises InputError where another run uses it or it holds other results (of another version of the
+    study only without `replace`), OSError where nothing can be written.
     """
 
     def __init__(
@@ -59,7 +44,7 @@ class Directory:
         self._descriptor: int | None = None
 
     def __enter__(self) -> Self:
-        """Take the directory."""
+        """Lock the directory and check its results."""
         results = [self.folder / name for name in self._kind.results(self._study)]
         self.folder.mkdir(parents=True, exist_ok=True)
         self._descriptor = lock(self.folder, results[0])
@@ -75,13 +60,13 @@ class Directory:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Let others in again."""
+        """Unlock the directory."""
         if self._descriptor is not None:
             os.close(self._descriptor)
         self._descriptor = None
 
     def _take(self, path: Path) -> None:
-        """Raise InputError where results are those of something else, or remove them if asked."""
+        """Raise InputError for results of something else, or remove them if asked."""
         if not path.exists():
             return
         try:
@@ -110,7 +95,7 @@ class Directory:
 
 
 def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
-    """Write files by their names, and figures as PNG and SVG; return their paths."""
+    """Write files, and figures as PNG and SVG, by name; return their paths."""
     paths = []
     for name, content in files.items():
         paths.append(folder / name)
@@ -123,7 +108,7 @@ def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a directory, if there is one."""
+    """Remove a file or a directory, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

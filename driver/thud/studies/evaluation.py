@@ -29,18 +29,10 @@ _BLOCK_TIME = 0.5
 
 @dataclass(frozen=True)
 class Block:
-    """Sets that are computed together.
+    """Sets from number `start` on that are computed together.
 
-    Attributes
-    ----------
-    start : int
-        The first of them.
-    case : Case
-        The case from which they differ.
-    columns : dict of str to ndarray, shape (n_set,)
-        Their values by the names of keys.
-    version : str
-        The version of thud that has to compute them.
+    They differ from the case in the columns, shape (n_set,), by names of keys; `version` is that of
+    thud which has to compute them.
     """
 
     start: int
@@ -52,22 +44,9 @@ class Block:
 def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
-    Parameters
-    ----------
-    block
-        The sets.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n_set,) or (n_set, n_band)
-        The `SCALARS`; the levels of `level_names`, dB; ``margin``, the minimum distance of the
-        judged force's octave levels to a limit, dB; ``conforms``; ``status``, 0 or the exit code
-        of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
-
-    Raises
-    ------
-    InputError
-        Where this is another version of thud.
+    Returns the `SCALARS`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
+    ``conforms``; ``status`` and ``reason``. Sets with an error have no numbers: NaN.
+    Raises InputError where this is another version of thud.
     """
     if block.version != version():
         message = (
@@ -88,9 +67,9 @@ def evaluate(block: Block) -> Columns:
 
 
 def level_names(case: Case) -> dict[str, tuple[str, str]]:
-    """Return force and bands of the levels that each set has, by their names.
+    """Return force and bands of the levels of each set, by name.
 
-    The octaves serve the verdict also where the case wants others only.
+    Octaves are always among them: the verdict needs them.
     """
     octave, *others = BANDWIDTHS
     wanted = [bands for bands in others if case.levels.bands in {bands, "both"}]
@@ -101,5 +80,5 @@ def level_names(case: Case) -> dict[str, tuple[str, str]]:
 
 
 def block_size(case: Case) -> int:
-    """Return how many sets are computed together: the same wherever they are computed."""
+    """Return the number of sets in a block, the same for all backends."""
     return max(1, round(_BLOCK_TIME / get_cost(case)))

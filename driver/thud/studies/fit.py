@@ -128,7 +128,6 @@ def fit(  # noqa: PLR0913 - what there is to choose
 
 
 def _require_options(options: Mapping[str, Any]) -> None:
-    """Raise InputError where an option of a search cannot be used."""
     require_confidence(options["confidence"])
     require_whole("starts", options["starts"], 1, _MAXIMUM)
     require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
@@ -248,7 +247,6 @@ KIND = FitKind()
 
 
 def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarget:
-    """Return the target of a study."""
     if ("file" in table) == ("levels" in table):
         message = (
             "[target] takes one of file and levels; allowed: file = 'record.csv' or levels = [...]"
@@ -280,7 +278,7 @@ def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarg
 
 
 def _measured(place: str, given: object, unit: str) -> tuple[float, float]:
-    """Return value and standard deviation of a table, in the unit of a key."""
+    """Return value and standard deviation of a table in the unit of a key."""
     words = ("value", "uncertainty")
     if not isinstance(given, dict) or not set(words) <= set(given):
         message = (

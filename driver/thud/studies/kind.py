@@ -72,7 +72,6 @@ class Kind(ABC, Generic[S, R]):
         return study
 
     def _read(self, given: dict[str, Any], folder: Path, name: str, text: str) -> S:
-        """Return the study that some tables describe."""
         given.setdefault("name", name)
         common = read_common(given, folder, self.name, self.words, self.new_parameter)
         return self.complete(dataclasses.replace(common, text=text), given, folder)

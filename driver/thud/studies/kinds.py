@@ -53,13 +53,7 @@ PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
 
 
 def load(module: str) -> ModuleType:
-    """Return a module of this package.
-
-    Raises
-    ------
-    InputError
-        Where a package that it needs is not installed.
-    """
+    """Return a module of this package. Raises InputError where its dependencies are missing."""
     try:
         return importlib.import_module(f"thud.studies.{module}")
     except ModuleNotFoundError as error:
@@ -70,13 +64,7 @@ def load(module: str) -> ModuleType:
 
 
 def get_kind(name: str) -> Kind[Any, Any]:
-    """Return a kind of study by its name.
-
-    Raises
-    ------
-    InputError
-        Where there is no such kind; lists those that there are.
-    """
+    """Return a kind of study by name. Raises InputError for an unknown one."""
     if name not in KINDS:
         message = f"kind = {name!r} is not known; allowed: {', '.join(KINDS)}"
         raise InputError(message)

@@ -149,30 +149,12 @@ class Parameter:
 
 
 def _in_unit(value: Value, power: int) -> Value:
-    """Return a number in the unit of a study, and anything else as it is."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
 
 
 def varied(name: str, given: object, model: str, centre: Value | None) -> Parameter:
-    """Return a parameter that varies.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    given
-        Its table.
-    model
-        The source model.
-    centre
-        Value of the key in the case: the mean where none is given.
-
-    Raises
-    ------
-    InputError
-        Where there is no such key, or it takes no such values.
-    """
+    """Return a parameter that varies; `centre`, its value in the case, is the default mean."""
     words = [word for form in FORMS.values() for word in form]
     place, key, given, power = _begin(name, given, model, words)
     form = next((form for form in FORMS if form in given), None)
@@ -200,22 +182,7 @@ def varied(name: str, given: object, model: str, centre: Value | None) -> Parame
 
 
 def fitted(name: str, given: object, model: str) -> Parameter:
-    """Return a parameter that is fitted.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    given
-        Its table, a `Parameter`, its start, or None.
-    model
-        The source model.
-
-    Raises
-    ------
-    InputError
-        Where there is no such key, or it takes no such values.
-    """
+    """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
     if isinstance(given, Parameter):
         given = given.given
     elif given is None:
@@ -234,7 +201,7 @@ def fitted(name: str, given: object, model: str) -> Parameter:
 def _begin(
     name: str, given: object, model: str, words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return place, key, table and power of ten of its unit of a parameter."""
+    """Return place, key, table and power of ten of the unit of a parameter."""
     place = f"[parameters] {name}"
     key, entry = find_key(name, model)
     if key.kind == "list" and entry is None:
@@ -249,13 +216,7 @@ def _begin(
 
 
 def checked(place: str, key: Key, value: object, power: int) -> Value:
-    """Return one value in the unit of its key.
-
-    Raises
-    ------
-    InputError
-        Where the key takes no such value.
-    """
+    """Return a value in the unit of its key. Raises InputError where it is not of its kind."""
     if key.kind == "choice" and value in key.choices:
         return str(value)
     if key.kind == "flag" and isinstance(value, bool):
@@ -276,7 +237,6 @@ def checked(place: str, key: Key, value: object, power: int) -> Value:
 
 
 def _is_number(value: object) -> bool:
-    """Return whether a value is a finite number that a float holds."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return -LARGEST < value < LARGEST
@@ -285,7 +245,6 @@ def _is_number(value: object) -> bool:
 def _between(
     place: str, key: Key, given: Mapping[str, Any], power: int, _: Value | None
 ) -> Parameter:
-    """Return values between two ends."""
     if "high" not in given:
         message = f"{place} has no high end; allowed: high beside low"
         raise InputError(message)
@@ -315,7 +274,6 @@ def _between(
 def _normal(
     place: str, key: Key, given: Mapping[str, Any], power: int, centre: Value | None
 ) -> Parameter:
-    """Return a normal distribution, by default around the value of the case."""
     if key.kind == "whole":
         message = f"{place} is a whole number; allowed: values = [...], or low and high"
         raise InputError(message)
@@ -332,22 +290,7 @@ def _normal(
 
 
 def quantity(place: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
-    """Return a value, or the numbers of a list, in the unit of a key.
-
-    Parameters
-    ----------
-    place
-        Where it stands, for messages.
-    given
-        The value, or a table with ``value`` and ``unit``.
-    unit
-        Unit of the key.
-
-    Raises
-    ------
-    InputError
-        Where the table or its unit cannot be used.
-    """
+    """Return a value, a list, or a table of ``value`` and ``unit``, in the unit of a key."""
     if not isinstance(given, Mapping):
         return given
     require_words(place, given, ("value", "unit"))

@@ -128,7 +128,6 @@ def sensitivity(
 
 
 def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
-    """Return the Sobol indices of the sets of a study."""
     force = study.case.levels.force
     levels = dataset[f"{force}_level"].values
     peak = "peak_force" if force == "elastic" else "peak_floor_force"
@@ -160,21 +159,10 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
 def sobol_indices(
     values: NDArray[np.float64], dimension: int, seed: int = 0
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return the Sobol indices of one quantity.
+    """Return first order and total Sobol indices of a quantity, each with its half interval.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n (dimension + 2),)
-        The quantity at the points of a ``"saltelli"`` design, in their order.
-    dimension
-        Number of parameters.
-    seed
-        Seed of the resampling for the confidence intervals.
-
-    Returns
-    -------
-    first, first_interval, total, total_interval : ndarray, shape (dimension,)
-        Indices and half widths of their confidence intervals; NaN where nothing varies.
+    `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is
+    that of the resampling. Indices have shape (dimension,), and are NaN where nothing varies.
     """
     from SALib.analyze import sobol  # noqa: PLC0415 - takes its time
 

@@ -163,28 +163,9 @@ class SetKind(Kind[SetStudy, R]):
 
 
 def compute_sets(study: SetStudy, directory: Directory | None, how: How) -> xr.Dataset:
-    """Compute every set of a study; one that was interrupted goes on in its directory.
+    """Compute or continue a study; without a directory its results are not written.
 
-    Parameters
-    ----------
-    study
-        The study.
-    directory
-        Where results are kept; None: they are not written.
-    how
-        Backend and progress.
-
-    Returns
-    -------
-    Dataset
-        A grid has one dimension per parameter, other designs the dimension ``set``.
-
-    Raises
-    ------
-    NumericalError
-        Where the backend loses sets; single sets that fail have a status and a reason instead.
-    OSError
-        Where the results cannot be written.
+    Raises NumericalError where the backend loses sets; sets that fail have a status and a reason.
     """
     total, size = study.count, block_size(study.case)
     blocks = Blocks(directory.folder, study, size) if directory else None
@@ -222,7 +203,6 @@ def compute_sets(study: SetStudy, directory: Directory | None, how: How) -> xr.D
 
 
 def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
-    """Yield the blocks that begin with some sets."""
     for start in starts:
         columns = study.parameter_columns(start, min(start + size, study.count))
         yield Block(start, study.case, study.key_columns(columns), version())

@@ -26,15 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Temperature:
-    """How the modulus of elasticity falls with temperature: E (1 + c (T - T_ref)).
-
-    Attributes
-    ----------
-    reference : float
-        Temperature T_ref at which the modulus is that of the case, degrees Celsius.
-    coefficient : float
-        Relative change c of the modulus, 1/K.
-    """
+    """Temperature law of the modulus, E (1 + c (T - T_ref)): T_ref in degC, c in 1/K."""
 
     reference: float
     coefficient: float
@@ -63,7 +55,7 @@ class SetStudy(Study):
     format: str = "auto"
 
     def own_identity(self) -> dict[str, str]:
-        """Return what the sets depend on besides."""
+        """Return design and temperature law."""
         found = makers(self.design) | {"[design] kind": self.design}
         if self.size:
             found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
@@ -88,18 +80,7 @@ class SetStudy(Study):
         return math.prod(self.shape)
 
     def parameter_columns(self, start: int, stop: int) -> Columns:
-        """Return the parameters of some sets in their order, in the units of their keys.
-
-        Parameters
-        ----------
-        start, stop
-            The first set, and the one after the last.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (stop - start,)
-            Values by the names of parameters.
-        """
+        """Return sets `start` to `stop` - 1: values by parameter, units of keys, shape (n_set,)."""
         if self.design == "grid":
             places = np.unravel_index(np.arange(start, stop), self.shape)
             return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
@@ -109,19 +90,9 @@ class SetStudy(Study):
         return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
-        """Return what some sets mean for the keys of the input.
+        """Return sets of `parameter_columns` as values of keys of the library, shape (n_set,).
 
-        The density gives the mass, and the temperature the modulus of elasticity.
-
-        Parameters
-        ----------
-        columns
-            What `parameter_columns` gives.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (n_set,)
-            Values by the names of keys of the library.
+        The density determines the mass, the temperature the modulus of elasticity.
         """
         found = dict(columns)
         density = found.pop(DENSITY.name, self.density)

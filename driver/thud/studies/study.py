@@ -86,7 +86,6 @@ class Study:
 
 
 def _shortened(text: str) -> str:
-    """Return a text, or the beginning of a long one with its checksum."""
     if len(text) <= _LONG:
         return text
     import hashlib  # noqa: PLC0415 - seldom needed
@@ -134,7 +133,7 @@ def read_content(
 
 
 def _text(source: Mapping[str, Any]) -> str:
-    """Return what would stand in a file as JSON, whatever kinds of numbers and tables it has."""
+    """Return tables as JSON."""
     try:
         return json.dumps(source, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
@@ -143,7 +142,7 @@ def _text(source: Mapping[str, Any]) -> str:
 
 
 def _plain(value: object) -> object:
-    """Return tables, paths, and numbers and arrays of NumPy as what JSON knows."""
+    """Return tables, paths, numbers and arrays of NumPy in types of JSON."""
     if isinstance(value, Parameter):
         return value.given
     if isinstance(value, Mapping):
@@ -163,26 +162,7 @@ def read_common(
     words: Iterable[str],
     new_parameter: Callable[[str, object, Case, Value | None], Parameter],
 ) -> Study:
-    """Read what every study has.
-
-    Parameters
-    ----------
-    given
-        The tables of the study; ``name`` is given.
-    folder
-        Where its files are named from.
-    kind
-        Its kind.
-    words
-        What this kind may hold besides `WORDS`.
-    new_parameter
-        Makes a parameter of its name, table, case and value there.
-
-    Raises
-    ------
-    InputError
-        Names table, key, value and what is allowed.
-    """
+    """Read what all kinds share; `words` are those that this kind has in addition to `WORDS`."""
     require_words("the study", given, (*WORDS, *words))
     fixed, parameters = (table_of(given, name) for name in ("fixed", "parameters"))
     name = given["name"]
@@ -218,7 +198,6 @@ def table_of(given: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
-    """Return the case of a file, or the default, with its model."""
     if path is not None and not isinstance(path, str):
         message = f"case = {path!r} is not allowed; allowed: the path of a namelist file"
         raise InputError(message)
@@ -236,7 +215,7 @@ def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
 
 
 def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
-    """Return the case with the keys that the study fixes, and a density if it fixes one."""
+    """Return the case with fixed keys, and a density if it is fixed."""
     values: dict[str, object] = {}
     for name, entry in fixed.items():
         if name == "model":
@@ -277,7 +256,7 @@ def _require_valid(
     parameters: tuple[Parameter, ...],
     density: float | None,
 ) -> None:
-    """Raise InputError where the library refuses a fixed value, whatever the parameters are."""
+    """Raise InputError where the library refuses a fixed value for all values of the parameters."""
     keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if density else set())
     trials = [p.trials(_SHARES) for p in parameters if p.key not in {DENSITY, TEMPERATURE}]
     names = [p.name for p in parameters if p.key not in {DENSITY, TEMPERATURE}]

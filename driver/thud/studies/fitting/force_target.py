@@ -91,7 +91,6 @@ class ForceTarget:
         return ForceMisfit(time, force, rate, self.noise, self.force, self.below, free_shift=shift)
 
     def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Return times, forces and sampling rate."""
         given = self.record
         if isinstance(given, Recording):
             return given.time, given.record, given.sample_rate
@@ -112,7 +111,6 @@ class ForceTarget:
 def _cut(
     time: NDArray[np.float64], force: NDArray[np.float64], window: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the part of a record in a window of time."""
     try:
         begin, end = map(float, window)
     except (TypeError, ValueError, OverflowError):
@@ -234,6 +232,6 @@ class ForceMisfit:
 
 
 def _parts(spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return a transform as independent real numbers, whose squares sum to those of its history."""
+    """Return a transform as independent real numbers with the sum of squares of its history."""
     rest = np.sqrt(2) * spectrum[1:]
     return np.concatenate([spectrum[:1].real, rest.real, rest.imag])

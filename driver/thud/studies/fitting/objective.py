@@ -85,7 +85,7 @@ class Objective:
     def _column(
         self, place: NDArray[np.float64], i: int, step: float, here: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the derivative with one parameter; of one side where the other is impossible."""
+        """Return the derivative by one parameter; one-sided where the other side is impossible."""
         ends = []
         for beside in (min(place[i] + step, self.high[i]), max(place[i] - step, self.low[i])):
             other = place.copy()

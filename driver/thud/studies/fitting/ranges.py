@@ -29,18 +29,10 @@ SPREAD = 2.0
 
 @dataclass(frozen=True)
 class Range:
-    """A parameter with everything that the search needs, SI units.
+    """Start and limits of a parameter of a fit, SI units.
 
-    Attributes
-    ----------
-    name, unit : str
-        Name of the key, with the place in brackets where it takes a list; its unit.
-    start, low, high : float
-        Start and limits of the search.
-    scale : float
-        What the parameter is measured in: its start, or a tenth of the range where that is 0.
-    spread : tuple of float
-        Between these lie other starts.
+    `scale` divides it in the search: its start, or a tenth of the range where that is 0. Further
+    starts lie within `spread`.
     """
 
     name: str
@@ -53,7 +45,7 @@ class Range:
 
 
 def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
-    """Return key and value of everything that can be fitted, by name.
+    """Return key and value of all parameters that can be fitted, by name.
 
     Entries of lists are counted from 1, as in a namelist: ``"frequency(1)"``.
     """
@@ -79,13 +71,7 @@ def with_values(case: Case, values: Mapping[str, float]) -> Case:
 
 
 def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
-    """Return a parameter of a fit.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be fitted; lists those that can.
-    """
+    """Return a parameter of a fit. Raises InputError where it cannot be fitted."""
     known = known_parameters(case)
     if name not in known:
         model = case.model.name if case.model else ""
@@ -100,13 +86,7 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
 def bound_parameters(
     case: Case, parameters: Iterable[str] | Mapping[str, Parameter | float | None]
 ) -> tuple[Parameter, ...]:
-    """Return the parameters that a fit is called with.
-
-    Raises
-    ------
-    InputError
-        Where there is none, or one cannot be fitted.
-    """
+    """Return the parameters of a call of `thud.fit`."""
     require_kind("parameters", parameters, Iterable)
     if isinstance(parameters, str):
         parameters = [parameters]
@@ -119,13 +99,7 @@ def bound_parameters(
 
 
 def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
-    """Return start, limits and scale of the parameters of a fit.
-
-    Raises
-    ------
-    InputError
-        Where start and limits do not fit together.
-    """
+    """Return ranges of parameters. Raises InputError where start and limits do not fit together."""
     found = list(parameters)
     # Ends of ranges that are other keys are those at the start.
     begin = with_values(case, {p.name: p.start for p in found if p.start is not None})
@@ -133,7 +107,6 @@ def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
 
 
 def _get_range(case: Case, given: Parameter) -> Range:
-    """Return start, limits and scale of one parameter of a case that has the starts."""
     name, key = given.name, given.key
     start = float(known_parameters(case)[name][1])
     lower, upper = limits(key, case)

@@ -148,18 +148,11 @@ class Fit:
         }
 
     def _coverage_factor(self, confidence: float | None = None) -> float:
-        """Return how many standard errors an interval reaches."""
         freedom = None if self.known_noise else self.degrees_of_freedom
         return coverage_factor(self.confidence if confidence is None else confidence, freedom)
 
     def table(self, units: Mapping[str, tuple[str, float]] | None = None) -> str:
-        """Return the fit as text.
-
-        Parameters
-        ----------
-        units
-            Other units by parameter: name, and how many SI units it is.
-        """
+        """Return the fit as text; `units` as in `shown_units`."""
         rows = [("parameter", "value", "standard error", f"{self.confidence:.0%} interval", "unit")]
         intervals = self.intervals()
         for name, (shown, factor) in self.shown_units(units).items():
@@ -175,7 +168,7 @@ class Fit:
     def shown_units(
         self, units: Mapping[str, tuple[str, float]] | None = None
     ) -> dict[str, tuple[str, float]]:
-        """Return the units of tables and figures: name, and how many SI units it is."""
+        """Return name and SI factor of the unit of each parameter; `units` override the default."""
         handy = {
             name: handy_unit(unit, value)
             for (name, value), unit in zip(self.values.items(), self.units, strict=True)
@@ -241,13 +234,7 @@ class Fit:
         return draw_fit(self, self.shown_units(units))
 
     def files(self, **extra: object) -> dict[str, bytes]:
-        """Return the content of ``fit.json``, ``fit.csv`` and ``fitted.nml``.
-
-        Parameters
-        ----------
-        **extra
-            What ``fit.json`` is to hold besides.
-        """
+        """Return ``fit.json``, with further entries, ``fit.csv`` and ``fitted.nml`` by name."""
         content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
         columns = self.misfit.columns(self.impact, self.time_shift)
         rows = [columns, *zip(*columns.values(), strict=True)]
@@ -293,12 +280,11 @@ class Fit:
 
 
 def _digits(value: float, error: float) -> int:
-    """Return how many digits show a value to two digits of its error."""
+    """Return the number of digits that shows a value to two digits of its error."""
     if not (np.isfinite(error) and error > 0 and value):
         return 6
     return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))
 
 
 def _finite(value: float) -> float | None:
-    """Return a number, or None for what is not finite."""
     return float(value) if np.isfinite(value) else None
