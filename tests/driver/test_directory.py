@@ -32,7 +32,7 @@ HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 LONG = """
 name = "long"
 fixed = { model = "modal_ball", harmonics = 16, static_harmonics = 48, rings = 20 }
-design = { kind = "random", size = 400, seed = 4 }
+design = { kind = "random", size = 1000, seed = 4 }
 parameters = { height = { low = 0.9, high = 1.1 } }
 """
 
@@ -114,28 +114,28 @@ def test_ended_study_goes_on_where_it_stopped(
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()
     finished = thud.read_sweep(tmp_path / "long.partial")
-    assert 0 < finished.sizes["set"] < 400
+    assert 0 < finished.sizes["set"] < 1000
     known = np.isin(whole["height"], finished["height"])
     assert values(finished).identical(values(whole.isel(set=known)))
 
     computed = []
     evaluate = evaluation.evaluate
 
-    def count(block: evaluation.Block, threads: int) -> dict[str, Any]:
+    def count(block: evaluation.Block) -> dict[str, Any]:
         computed.append(len(block.columns["height"]))
-        return evaluate(block, threads)
+        return evaluate(block)
 
     monkeypatch.setattr("thud.studies.backends.evaluate", count)
     # What is finished needs no space again.
     left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
     monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path)
-    assert sum(computed) == 400 - finished.sizes["set"]
+    assert sum(computed) == 1000 - finished.sizes["set"]
     assert values(resumed).identical(values(whole))
     assert not (tmp_path / "long.partial").exists()
     again = thud.sweep(tmp_path / "long.toml", tmp_path)
     assert again.identical(resumed)
-    assert sum(computed) == 400 - finished.sizes["set"]
+    assert sum(computed) == 1000 - finished.sizes["set"]
 
 
 def test_full_disk_is_told_and_loses_nothing(
@@ -144,7 +144,7 @@ def test_full_disk_is_told_and_loses_nothing(
     (tmp_path / "long.toml").write_text(LONG)
     arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    size = evaluation.block_size(thud.read_study(tmp_path / "long.toml").case)
+    size = KIND.read_study(tmp_path / "long.toml").block_size
     blocks = -(-whole.sizes["set"] // size)
     assert blocks > 1
     block, end = (
@@ -191,7 +191,7 @@ def test_disk_that_is_full_for_zarr_is_told_and_loses_nothing(
     assert "File too large; allowed: a place that you may write to" in errors
     assert errors.count("\n") == 1
     assert sorted(found.name for found in tmp_path.iterdir()) == ["long.partial", "long.toml"]
-    assert thud.read_sweep(tmp_path / "long.partial").sizes["set"] == 400
+    assert thud.read_sweep(tmp_path / "long.partial").sizes["set"] == 1000
 
     def compute_again(*_: object) -> None:
         pytest.fail("all sets were kept")
@@ -294,7 +294,9 @@ def test_replace_does_not_remove_what_is_of_something_else(tmp_path: Path) -> No
         thud.sweep(HEIGHTS, tmp_path, replace=True)
     (tmp_path / "fit.json").write_text("[]")
     study = {"target": {"levels": [39, 31, 23, 17, 12]}, "parameters": {"mass": {}}}
-    with pytest.raises(thud.InputError, match="of something else, or of an older thud; allowed"):
+    with pytest.raises(
+        thud.InputError, match="holds something else, or results of an older thud; allowed"
+    ):
         fit.KIND.run(study, tmp_path, replace=True)
     assert (tmp_path / "fit.json").read_text() == "[]"
 

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole, shown
 from thud.ensemble import MAX_THREADS
-from thud.errors import InputError, NumericalError, ThudError
+from thud.errors import NumericalError, ThudError
+from thud.studies.checks import refuse, refuse_value, require_choice
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:
@@ -75,19 +76,16 @@ def checked_backend(
 ) -> tuple[str, int | None, str | None]:
     """Return a backend, number of workers and scheduler that belong together."""
     backend = backend or ("dask" if scheduler else BACKENDS[0])
-    if backend not in BACKENDS:
-        message = f"backend = {backend!r} is not known; allowed: {', '.join(BACKENDS)}"
-        raise InputError(message)
+    require_choice("backend", backend, BACKENDS)
     if (backend == "dask") != (scheduler is not None):
-        message = (
-            f"backend = {backend!r} with scheduler = {scheduler!r} is not allowed; "
-            f"allowed: the address of a scheduler for dask, and only there"
+        refuse_value(
+            f"backend = {backend!r} with scheduler",
+            scheduler,
+            "the address of a scheduler for dask, and only there",
         )
-        raise InputError(message)
     if workers is not None:
         if scheduler:
-            message = f"workers = {shown(workers)} is not allowed for dask; allowed: those it has"
-            raise InputError(message)
+            refuse(f"workers = {shown(workers)} is not allowed for dask", "those it has")
         require_whole("workers", workers, 1, MAX_THREADS)
     return backend, workers, scheduler
 
@@ -152,8 +150,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
         from distributed.comm.registry import get_backend  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        message = f"{error.name} is not installed; allowed: pip install 'thud[studies,dask]'"
-        raise InputError(message) from error
+        refuse(f"{error.name} is not installed", "pip install 'thud[studies,dask]'", error)
     try:
         # A client of an unknown kind of address would fail again when it is thrown away.
         get_backend(parse_address(address)[0])
@@ -164,17 +161,16 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
             set_as_default=False,
         )
     except (OSError, ValueError, TypeError) as error:
-        message = (
-            f"scheduler = {address!r} does not answer within {PATIENCE} s; "
-            f"allowed: the address of a running one, such as tcp://host:8786"
+        refuse(
+            f"scheduler = {address!r} does not answer within {PATIENCE} s",
+            "the address of a running one, such as tcp://host:8786",
+            error,
         )
-        raise InputError(message) from error
     with _silent("distributed"), client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as error:
-            message = f"scheduler = {address!r} has no workers; allowed: one with workers"
-            raise InputError(message) from error
+            refuse(f"scheduler = {address!r} has no workers", "one with workers", error)
         width = sum(client.nthreads().values())
         with client.get_executor() as executor:
             yield executor, width

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.errors import InputError
 from thud.files import replace_file, uninterrupted
+from thud.studies.checks import refuse
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ class Blocks:
         with _named(self.path):
             self._require_space()
             self._partial.mkdir(exist_ok=True)
-            if self._blocks():
+            if block_paths(self._partial):
                 before = json.loads((self._partial / MARK).read_bytes())
                 if before != self._identity:
                     # Blocks of another size have gaps or overlap.
@@ -59,17 +59,14 @@ class Blocks:
 
     def _require_space(self) -> None:
         free = shutil.disk_usage(self.path.parent).free
-        needed = disk_space(self._study) - sum(path.stat().st_size for path in self._blocks())
+        needed = disk_space(self._study) - sum(
+            path.stat().st_size for path in block_paths(self._partial)
+        )
         if needed > free:
-            message = (
-                f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are "
-                f"free; allowed: fewer sets, or another disk"
+            refuse(
+                f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are free",
+                "fewer sets, or another disk",
             )
-            raise InputError(message)
-
-    def _blocks(self) -> list[Path]:
-        """Return the files of the blocks that are finished, in their order."""
-        return block_paths(self._partial)
 
     def _block(self, start: int) -> Path:
         return self._partial / f"block_{start:012d}.nc"
@@ -87,7 +84,7 @@ class Blocks:
     def finish(self) -> None:
         """Join all blocks, then remove them."""
         if not self.complete:
-            paths = self._blocks()
+            paths = block_paths(self._partial)
             if self.path.suffix == ".nc":
                 _write(grid_of(self._study, _join(paths)), self.path)
             else:
@@ -167,8 +164,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     if place.suffix == ".partial":
         paths = block_paths(place)
         if not paths:
-            message = f"{place} holds no finished sets; allowed: results of a study"
-            raise InputError(message)
+            refuse(f"{place} holds no finished sets", "results of a study")
         return _join(paths)
     if place.suffix == ".zarr":
         with _readable(place):
@@ -222,8 +218,7 @@ def _readable(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, KeyError, RuntimeError) as error:
-        message = f"{path} cannot be read; allowed: results of a study, or remove it"
-        raise InputError(message) from error
+        refuse(f"{path} cannot be read", "results of a study, or remove it", error)
 
 
 def _write(dataset: xr.Dataset, path: Path) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case
-from thud.errors import InputError
 from thud.keys import DENSITY
+from thud.studies.checks import refuse
 from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume
@@ -77,8 +77,7 @@ class DesignMapKind(SetKind[DesignMap]):
         """Return a study of two numeric parameters."""
         found = super().complete(study, given, folder)
         if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
-            message = "[parameters] are no map; allowed: two numeric ones of two values or more"
-            raise InputError(message)
+            refuse("[parameters] are no map", "two numeric ones of two values or more")
         return found
 
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:

@@ -1,4 +1,4 @@
-"""What becomes of a block of sets: one call of the library, whatever computes it."""
+"""How a block of sets is computed, by any backend: one call of the library."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from thud import _schema as schema
 from thud._api import version
-from thud.ensemble import get_cost, solve_many
-from thud.errors import InputError
+from thud.ensemble import solve_many
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS
+from thud.studies.checks import refuse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,12 +19,16 @@ if TYPE_CHECKING:
 
     Columns = dict[str, NDArray[Any]]
 
-# By name: unit and meaning of the numbers that each set has.
+# Force and bands of the levels that a set may have, by name.
+LEVELS = {
+    f"{force}_level" if bands == BANDWIDTHS[0] else f"{force}_{bands}_level": (force, bands)
+    for bands in BANDWIDTHS
+    for force in FORCES
+}
+# Unit and meaning of the numbers of each set, by name.
 SCALARS = {
     name: (schema.SCALARS[name][0] or "1", schema.SCALARS[name][1]) for name in schema.OUTCOMES
 }
-# A block of sets should take about this time, s.
-_BLOCK_TIME = 0.5
 
 
 @dataclass(frozen=True)
@@ -49,11 +53,10 @@ def evaluate(block: Block) -> Columns:
     Raises InputError where this is another version of thud.
     """
     if block.version != version():
-        message = (
-            f"thud {version()} is asked for sets of thud {block.version}; "
-            f"allowed: the same version everywhere"
+        refuse(
+            f"thud {version()} cannot compute sets of thud {block.version}",
+            "the same version everywhere",
         )
-        raise InputError(message)
     found = solve_many(block.columns, block.case, threads=1)
     columns: Columns = {name: getattr(found, name) for name in SCALARS}
     for name, (force, bands) in level_names(block.case).items():
@@ -71,14 +74,5 @@ def level_names(case: Case) -> dict[str, tuple[str, str]]:
 
     Octaves are always among them: the verdict needs them.
     """
-    octave, *others = BANDWIDTHS
-    wanted = [bands for bands in others if case.levels.bands in {bands, "both"}]
-    names = {f"{force}_level": (force, octave) for force in FORCES}
-    return names | {
-        f"{force}_{bands}_level": (force, bands) for bands in wanted for force in FORCES
-    }
-
-
-def block_size(case: Case) -> int:
-    """Return the number of sets in a block, the same for all backends."""
-    return max(1, round(_BLOCK_TIME / get_cost(case)))
+    wanted = {BANDWIDTHS[0], *(BANDWIDTHS if case.levels.bands == "both" else [case.levels.bands])}
+    return {name: entry for name, entry in LEVELS.items() if entry[1] in wanted}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.errors import InputError
+from thud.studies.checks import refuse, require_choice
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -57,17 +57,12 @@ def load(module: str) -> ModuleType:
     try:
         return importlib.import_module(f"thud.studies.{module}")
     except ModuleNotFoundError as error:
-        message = (
-            f"{error.name} is not installed; allowed: studies with pip install 'thud[studies]'"
-        )
-        raise InputError(message) from error
+        refuse(f"{error.name} is not installed", "studies with pip install 'thud[studies]'", error)
 
 
 def get_kind(name: str) -> Kind[Any, Any]:
     """Return a kind of study by name. Raises InputError for an unknown one."""
-    if name not in KINDS:
-        message = f"kind = {name!r} is not known; allowed: {', '.join(KINDS)}"
-        raise InputError(message)
+    require_choice("kind", name, KINDS)
     kind: Kind[Any, Any] = load(KINDS[name].module).KIND
     return kind
 

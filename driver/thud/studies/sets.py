@@ -4,24 +4,33 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.case import check_case
 from thud.checks import require_words
+from thud.ensemble import get_cost
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE
+from thud.studies.checks import refuse
 from thud.studies.designs import makers, unit_sets
 from thud.studies.parameter import checked
-from thud.studies.study import Study, wall_volume
+from thud.studies.study import SHARES, Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.case import Case
     from thud.studies.parameter import Parameter
 
     Columns = dict[str, NDArray[Any]]
+
+
+# A block of sets should take about this time, s.
+_BLOCK_TIME = 0.5
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,21 @@ class SetStudy(Study):
         """Number of sets."""
         return math.prod(self.shape)
 
+    @property
+    def block_size(self) -> int:
+        """Number of sets that are computed together, the same for all backends."""
+        return max(1, round(_BLOCK_TIME / get_cost(self.valid_case)))
+
+    @property
+    def valid_case(self) -> Case:
+        """The case, or, if invalid without its parameters, the case with some values of them."""
+        for share in (None, *SHARES):
+            with suppress(InputError):
+                case = self.case if share is None else self.trial_case(share)
+                check_case(case)
+                return case
+        return self.case
+
     def parameter_columns(self, start: int, stop: int) -> Columns:
         """Return sets `start` to `stop` - 1: values by parameter, units of keys, shape (n_set,)."""
         if self.design == "grid":
@@ -113,11 +137,10 @@ def read_temperature(given: object, parameters: tuple[Parameter, ...]) -> Temper
     """Return the law of the modulus in the table ``[temperature]``."""
     varies = any(parameter.key == TEMPERATURE for parameter in parameters)
     if varies != (given is not None):
-        message = (
-            "temperature needs both a parameter and the table [temperature]; "
-            "allowed: reference, degC, and coefficient, 1/K, in [temperature]"
+        refuse(
+            "temperature needs both a parameter and the table [temperature]",
+            "reference, degC, and coefficient, 1/K, in [temperature]",
         )
-        raise InputError(message)
     if not isinstance(given, Mapping):
         return None
     words = ("reference", "coefficient")

@@ -9,8 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import qr
 
-from thud.checks import shown
-from thud.errors import InputError
+from thud.studies.checks import refuse_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -166,5 +165,4 @@ def coverage_factor(confidence: float, freedom: int | None) -> float:
 def require_confidence(confidence: object) -> None:
     """Raise InputError where a confidence is not between 0 and 1."""
     if not (isinstance(confidence, float | np.floating) and 0 < confidence < 1):
-        message = f"confidence = {shown(confidence)} is not allowed; allowed: 0 < confidence < 1"
-        raise InputError(message)
+        refuse_value("confidence", confidence, "0 < confidence < 1")

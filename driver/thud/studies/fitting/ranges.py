@@ -12,6 +12,7 @@ from thud._schema import KEYS
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.keys import limits, put
+from thud.studies.checks import refuse
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
@@ -51,8 +52,7 @@ def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
     """
     model = case.model
     if model is None:
-        message = "&model is missing; allowed: a case with a source model"
-        raise InputError(message)
+        refuse("&model is missing", "a case with a source model")
     found: dict[str, tuple[Key, float]] = {}
     for key in KEYS:
         if key.group not in {"ball", "drop"} and key.owner != model.name:
@@ -75,11 +75,10 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
     known = known_parameters(case)
     if name not in known:
         model = case.model.name if case.model else ""
-        message = (
-            f"[parameters] {name} is not a parameter of {model} that can be fitted; "
-            f"allowed: {', '.join(known)}"
+        refuse(
+            f"[parameters] {name} is not a parameter of {model} that can be fitted",
+            ", ".join(known),
         )
-        raise InputError(message)
     return fitted(name, given, case.model.name)  # type: ignore[union-attr]
 
 
@@ -93,8 +92,7 @@ def bound_parameters(
     if not isinstance(parameters, Mapping):
         parameters = dict.fromkeys(parameters)
     if not parameters:
-        message = f"parameters: none is given; allowed: {', '.join(known_parameters(case))}"
-        raise InputError(message)
+        refuse("parameters: none is given", ", ".join(known_parameters(case)))
     return tuple(fitted_parameter(name, given, case) for name, given in parameters.items())
 
 
