@@ -1,4 +1,4 @@
-"""Backends: the same results from each, whatever happens to workers and schedulers."""
+"""Backends: the same results from each, also after lost workers and schedulers."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def test_killed_worker_of_dask_leaves_no_gap_on_disk(
 
 
 @pytest.mark.parametrize("rest", [{"backend": "processes", "workers": 2}, {"scheduler": True}])
-def test_lost_scheduler_is_told_and_its_study_goes_on_elsewhere(
+def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     rest: dict[str, Any], cluster: LocalCluster, tmp_path: Path
 ) -> None:
     study = tmp_path / "some.toml"
@@ -166,7 +166,7 @@ def test_lost_scheduler_is_told_and_its_study_goes_on_elsewhere(
     assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
 
 
-def test_killed_process_is_told_and_loses_nothing() -> None:
+def test_killed_process_is_reported_and_loses_nothing() -> None:
     kept = []
     others = set(multiprocessing.active_children())
 
@@ -180,7 +180,7 @@ def test_killed_process_is_told_and_loses_nothing() -> None:
     assert kept
 
 
-def test_unreachable_scheduler_is_told_soon(
+def test_unreachable_scheduler_is_reported_soon(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
@@ -194,7 +194,7 @@ def test_unreachable_scheduler_is_told_soon(
         assert errors.count("\n") == 1
 
 
-def test_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
@@ -203,7 +203,7 @@ def test_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> N
         thud.sweep(STUDY, scheduler=empty.scheduler_address)
 
 
-def test_other_version_is_told() -> None:
+def test_other_version_is_reported() -> None:
     block = Block(0, thud.Case(), {"height": np.ones(1)}, "0.0.1")
     with pytest.raises(thud.InputError, match=r"sets of thud 0\.0\.1; allowed: the same version"):
         evaluate(block)
@@ -221,6 +221,6 @@ def test_other_version_is_told() -> None:
         ({"workers": 2, "scheduler": "tcp://x:1"}, "workers = 2 is not allowed for dask; allowed"),
     ],
 )
-def test_useless_backends_are_told(how: dict[str, Any], words: str) -> None:
+def test_useless_backends_are_reported(how: dict[str, Any], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.sweep(STUDY, **how)

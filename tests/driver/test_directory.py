@@ -1,4 +1,4 @@
-"""Directories of studies: whatever ends a study, nothing finished is lost or mixed up."""
+"""Directories of studies: no finished result is lost or mixed up, however a study ends."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert (tmp_path / "six.zarr").is_dir()
 
 
-def test_damaged_results_are_told(tmp_path: Path) -> None:
+def test_damaged_results_are_reported(tmp_path: Path) -> None:
     thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
     whole = (tmp_path / "a.nc").read_bytes()
     told = 0
@@ -138,7 +138,7 @@ def test_ended_study_goes_on_where_it_stopped(
     assert sum(computed) == 1000 - finished.sizes["set"]
 
 
-def test_full_disk_is_told_and_loses_nothing(
+def test_full_disk_is_reported_and_loses_nothing(
     whole: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "long.toml").write_text(LONG)
@@ -166,7 +166,7 @@ def test_full_disk_is_told_and_loses_nothing(
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
 
 
-def test_disk_that_is_full_for_zarr_is_told_and_loses_nothing(
+def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     whole: xr.Dataset,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -301,7 +301,7 @@ def test_replace_does_not_remove_what_is_of_something_else(tmp_path: Path) -> No
     assert (tmp_path / "fit.json").read_text() == "[]"
 
 
-def test_unfinished_blocks_of_another_size_are_computed_anew(tmp_path: Path) -> None:
+def test_unfinished_blocks_of_another_size_are_computed_again(tmp_path: Path) -> None:
     study = thud.read_study(HEIGHTS)
     keep_one_block(study, tmp_path)
     assert thud.sweep(study, tmp_path).identical(thud.sweep(study).assign_attrs(

@@ -88,7 +88,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         ),
     ],
 )
-def test_bad_input_is_told(
+def test_bad_input_is_reported(
     target: object, parameters: object, options: dict[str, object], words: str
 ) -> None:
     with pytest.raises(thud.ThudError, match=words):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
 
 BACKENDS = ("threads", "processes", "dask")
-# A scheduler that does not answer within these seconds is not there.
+# Time limit for a scheduler to answer, s.
 PATIENCE = 5
 
 
@@ -59,7 +59,7 @@ def run_blocks(
             while running:
                 _collect(running, keep)
         except BaseException:
-            # What runs already is waited for and kept; nothing finished is lost.
+            # Running blocks are waited for and kept.
             for future in list(running):
                 if future.cancel():
                     del running[future]
@@ -123,7 +123,7 @@ def _open(
         with ThreadPoolExecutor(width) as threads:
             yield threads, width
         return
-    # Processes that were forked would share locks of threads that they do not have.
+    # Forked processes would inherit locks held by threads that they do not have.
     context = get_context("spawn")
     with ProcessPoolExecutor(width, context, initializer=_follow_parent) as processes:
         yield processes, width
@@ -136,7 +136,7 @@ def _follow_parent() -> None:
     assert parent is not None  # noqa: S101 - this runs in processes that were started
 
     def end_with_it() -> None:
-        # A parent that is killed tells nobody.
+        # A killed parent cannot stop its processes.
         connection.wait([parent.sentinel])
         os._exit(1)
 
@@ -152,12 +152,12 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
     except ModuleNotFoundError as error:
         refuse(f"{error.name} is not installed", "pip install 'thud[studies,dask]'", error)
     try:
-        # A client of an unknown kind of address would fail again when it is thrown away.
+        # A client of an unknown kind of address would fail again when deleted.
         get_backend(parse_address(address)[0])
         client: Any = Client(  # type: ignore[no-untyped-call]
             address,
             timeout=PATIENCE,
-            # As default it would also be asked for the locks of files, which stay in this process.
+            # The default client would also manage locks of files, which stay in this process.
             set_as_default=False,
         )
     except (OSError, ValueError, TypeError) as error:

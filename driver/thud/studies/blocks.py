@@ -1,4 +1,4 @@
-"""Files of sets: finished blocks while a study runs, one file or Zarr group at its end."""
+"""Files of sets: finished blocks while a study runs, then one file or Zarr group."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
-# The file beside the blocks that says what they belong to.
+# The file with the identity of the blocks.
 MARK = "study"
-# What stands between a NetCDF file and its checksum, which HDF5 does not see.
+# Separates a NetCDF file from its checksum, which HDF5 ignores.
 _SEAL = b"thud sha256 "
 
 
@@ -90,7 +90,7 @@ class Blocks:
             else:
                 self._write_zarr(paths)
         shutil.rmtree(self._partial, ignore_errors=True)
-        # What a kill has left of the end of an earlier run.
+        # Left by an earlier run that was killed while it joined blocks.
         for path in self.path.parent.iterdir():
             if path.name.startswith(f".{self.path.name}.") and path.suffix == ".part":
                 path.unlink(missing_ok=True)
@@ -114,7 +114,7 @@ class Blocks:
 
 
 def result_names(study: SetStudy) -> list[str]:
-    """Return the names that results of a study may have; the first is that of its end."""
+    """Return the possible names of results of a study; the first is that of a finished one."""
     large = disk_space(study) > LARGE
     endings = ["nc", "zarr", "partial"]
     if study.format == "zarr" or (large and study.format == "auto"):
@@ -123,7 +123,7 @@ def result_names(study: SetStudy) -> list[str]:
 
 
 def block_paths(partial: Path) -> list[Path]:
-    """Return the files of the blocks that are finished, in their order."""
+    """Return the files of finished blocks in order."""
     return sorted(partial.glob("block_*.nc"))
 
 

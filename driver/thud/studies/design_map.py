@@ -1,4 +1,4 @@
-"""Which balls conform: the margin to the standards over two parameters."""
+"""Which balls conform to the standards: the margin over two parameters."""
 
 from __future__ import annotations
 
@@ -121,7 +121,6 @@ def design_map(
 
 
 def _is_axis(parameter: Parameter) -> bool:
-    # Very many values between two ends are not made for this.
     return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
 
 

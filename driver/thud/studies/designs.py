@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
 MIN_SAMPLES = 4
-# NumPy counts no further.
+# Maximum of NumPy's integers.
 _MAX_SETS = 2**63 - 1
 
 
 def makers(design: str) -> dict[str, str]:
-    """Return the versions of what draws the points of a design: others may draw other points."""
+    """Return the versions of the packages that draw a design; others may draw other points."""
     names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in DRAWN else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 
@@ -71,7 +71,7 @@ def read_design(
     return {"design": design, "size": size, "seed": seed}
 
 
-def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
+def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
     design: str, dimension: int, size: int, seed: int, start: int, stop: int
 ) -> NDArray[np.float64]:
     """Return points of a design in the unit cube, shape (stop - start, dimension)."""

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 # Options of a search, and their defaults.
 OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
-# More starts, or steps of a search, than this come to no end.
+# Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
 # What [target] may hold, and the units of its numbers.
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
@@ -55,7 +55,7 @@ TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
 
 
 @refuse_old_words
-def fit(  # noqa: PLR0913 - what there is to choose
+def fit(  # noqa: PLR0913 - options of a search
     target: ForceTarget | LevelTarget | Recording | Impact | tuple[ArrayLike, ArrayLike],
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],
     case: Case | None = None,
@@ -69,7 +69,7 @@ def fit(  # noqa: PLR0913 - what there is to choose
     """Estimate parameters of a model from a force history or from levels, by least squares.
 
     Trust-region reflective steps (`scipy.optimize.least_squares`) within the limits, parameters
-    measured in their starts. A point at which the model cannot be computed is stepped away from.
+    scaled by their starts. Points at which the model cannot be computed are rejected.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ class FitKind(Kind[FitStudy, Fit]):
         )
 
     def results(self, study: FitStudy) -> list[str]:  # noqa: ARG002
-        """Return the name of the file that says which fit it is."""
+        """Return the name of the file that holds the identity."""
         return ["fit.json"]
 
     def identity_in(self, path: Path) -> dict[str, str]:

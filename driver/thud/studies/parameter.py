@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# More values of a parameter, or base samples, than this do not fit into memory.
+# Maximum number of values of a parameter, or of base samples: memory.
 MAX_VALUES = 2**30
 # Words of a parameter that varies, by its form, and of one that is fitted; all take `unit` too.
 FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
@@ -114,7 +114,7 @@ class Parameter:
         if self.values is not None:
             return np.take(self.grid(), (share * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
-            # A share of exactly 0 would be infinitely far out.
+            # The quantile of a share of 0 is infinite.
             return np.asarray(self.mean + self.std * ndtri(np.maximum(share, 2.0**-54)))
         assert self.low is not None  # noqa: S101 - see `varied`
         assert self.high is not None  # noqa: S101

@@ -1,4 +1,4 @@
-"""Which parameter matters for what: Sobol indices."""
+"""Sobol indices of the parameters."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class SetKind(Kind[SetStudy, R]):
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
-            refuse("[parameters] bands is not allowed", "bands in [fixed], alike for all sets")
+            refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all sets")
         return varied(name, given, case.model.name, centre)  # type: ignore[union-attr]
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:  # noqa: ARG002

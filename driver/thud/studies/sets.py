@@ -1,4 +1,4 @@
-"""Studies of many sets: designs, and what their sets mean for the keys of the input."""
+"""Studies of many sets: designs, and the values of keys in their sets."""
 
 from __future__ import annotations
 

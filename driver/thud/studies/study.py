@@ -1,4 +1,4 @@
-"""Studies: which case, what varies or is fitted, read from TOML."""
+"""Studies as TOML files: the case, and parameters that vary or are fitted."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
 
 # What every study may hold.
 WORDS = ("name", "case", "fixed", "parameters")
-# Longer texts are compared by their beginning and a checksum.
+# Longer texts are shortened to their beginning and a checksum.
 _LONG = 300
 # Quantiles of the parameters at which a case is tried.
 SHARES = (0.01, 0.5, 0.99)

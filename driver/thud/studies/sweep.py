@@ -65,8 +65,7 @@ def sweep(
     study
         Path of a TOML file, or what would stand in it; see docs/studies.md.
     output
-        Directory of the results; an interrupted study goes on where it stopped. None: they are
-        not written.
+        Directory of the results; an interrupted study is continued. None: they are not written.
     **how
         Keywords `backend`, `workers`, `scheduler`, `yes`, `progress`, `replace`; see
         `thud.studies.kind.How`.

@@ -1,4 +1,4 @@
-"""How surely a ball conforms: Monte Carlo over tolerances of manufacture and temperature."""
+"""Probability of conformity: Monte Carlo over tolerances of manufacture and temperature."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ KIND = UncertaintyKind()
 def uncertainty(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
 ) -> Uncertainty:
-    """Compute how tolerances spread the levels, and how probably the ball conforms.
+    """Compute how tolerances spread the levels, and the probability of conformity.
 
     Parameters
     ----------

@@ -17,15 +17,15 @@ from thud.studies.fitting.misfit import Misfit, require_positive
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# What a force plate records ends here, Hz (paper, section 3).
+# Upper limit of the band of a force plate, Hz (paper, section 3).
 BELOW = 1250.0
 # Part of that frequency that rounded times leave open.
 SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
-# A doubt needs this many independent values during contact and otherwise, this probability of
-# Fisher's F, and a residual above this part of the peak force: less comes from sampling.
+# A warning needs this many independent values during contact and otherwise, this probability of
+# Fisher's F, and a residual above this part of the peak force, which exceeds sampling errors.
 MIN_FREEDOM = 5
 SURE = 0.999
 NUMERICAL = 1e-4

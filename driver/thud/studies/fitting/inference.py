@@ -16,16 +16,17 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# A column of the Jacobian this much smaller than the target is none, nor is one with this error.
+# Columns of the Jacobian with a smaller norm over that of the target, or a larger relative error,
+# are zero.
 NO_EFFECT = 1e-9
 UNRESOLVED = 0.5
-# Singular values of the Jacobian below this part of the largest, or below this many of its own
-# errors, are taken for zero.
+# Singular values of the Jacobian below this part of the maximum, or below this many of its own
+# errors, are zero.
 MIN_RATIO = 1e-6
 ERRORS = 3.0
-# Part of a unit vector below which a parameter does not belong to it.
+# Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
-# Part of the largest entry below which a sentence leaves a parameter out.
+# Part of the maximum entry below which a sentence omits a parameter.
 SMALL = 0.05
 
 
@@ -75,7 +76,7 @@ def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return another basis of the same space: in each of its pivot columns one entry is not 0."""
     if not len(rows):
         return rows
-    # The parameters that vary most stand for the directions.
+    # The parameters that vary most represent the directions.
     _, _, order = qr(rows, pivoting=True)
     basis = np.linalg.solve(rows[:, order[: len(rows)]], rows)
     result: NDArray[np.float64] = basis / np.abs(basis).max(axis=1, keepdims=True)

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from thud.key import Key
     from thud.studies.parameter import Parameter
 
-# A start that lies on a limit is moved away from it by this part of itself.
+# A start at a limit is moved away from it by this part of itself.
 INSIDE = 0.01
-# A limit of the library that is this much larger than the start does not guide the search.
+# Limits of the library that exceed the start by this factor are ignored.
 FAR = 10.0
 # Other starts lie within this factor of the first where no limits are given.
 SPREAD = 2.0

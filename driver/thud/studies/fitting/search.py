@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
-# Where steps and gains are this small, relative, the search ends.
+# Relative steps and gains at which the search ends.
 TOLERANCE = 1e-8
-# A parameter this close to a limit, relative, lies at it.
+# A parameter closer to a limit than this, relative, lies at it.
 AT_LIMIT = 1e-4
-# Half an interval, relative, from which little is known of a parameter.
+# Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
-# Probability of a residual as large as it is, below which the model does not explain the data.
+# Probability of the residual below which the model does not explain the data.
 UNLIKELY = 1e-3
 
 
