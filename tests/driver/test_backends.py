@@ -1,4 +1,4 @@
-"""Backends: the same results from each, whatever happens to workers and schedulers."""
+"""Backends: the same results from each, also after lost workers and schedulers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ import thud
 from thud import cli
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks
-from thud.studies.evaluation import Block, block_size, evaluate
+from thud.studies.evaluation import Block, evaluate
+from thud.studies.sweep import KIND
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 STUDY: dict[str, Any] = {
     "name": "some",
     "fixed": {"method": "fft"},
-    "design": {"kind": "latin_hypercube", "size": 600, "seed": 2},
+    "design": {"kind": "latin_hypercube", "size": 2000, "seed": 2},
     "parameters": {
         "height": {"low": -0.1, "high": 60},
         "youngs_modulus": {"std": 0.5, "unit": "MPa"},
@@ -58,7 +59,7 @@ def cluster() -> Iterator[LocalCluster]:
 def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     one = thud.sweep(STUDY, workers=1)
     assert set(one["status"].values) == {0, 1, 2}
-    assert one.sizes["set"] > block_size(thud.read_study(STUDY).case)
+    assert one.sizes["set"] > KIND.read_study(STUDY).block_size
     for how in (
         {"workers": 3},
         {"backend": "processes", "workers": 2},
@@ -66,6 +67,13 @@ def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     ):
         other = thud.sweep(STUDY, **how)  # type: ignore[arg-type]
         assert other.drop_attrs(deep=False).identical(one.drop_attrs(deep=False)), how
+
+
+def test_threads_of_a_block_do_not_matter() -> None:
+    block = Block(0, thud.Case(), {"height": np.linspace(0, 60, 200)}, thud.__version__)
+    one, more = evaluate(block), thud.solve_many(block.columns, block.case, threads=3)
+    for name in ("peak_force", "margin", "status", "reason"):
+        np.testing.assert_array_equal(one[name], getattr(more, name))
 
 
 def modal_blocks() -> list[Block]:
@@ -124,12 +132,12 @@ def test_killed_worker_of_dask_leaves_no_gap_on_disk(
 
 
 @pytest.mark.parametrize("rest", [{"backend": "processes", "workers": 2}, {"scheduler": True}])
-def test_lost_scheduler_is_told_and_its_study_goes_on_elsewhere(
+def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     rest: dict[str, Any], cluster: LocalCluster, tmp_path: Path
 ) -> None:
     study = tmp_path / "some.toml"
     study.write_text(
-        "design = {kind='random', size=400}\nfixed = {model='modal_ball', rings=20}\n"
+        "design = {kind='random', size=2000}\nfixed = {model='modal_ball', rings=20}\n"
         "parameters.height = {low=0.9, high=1.1}"
     )
     with subprocess.Popen(
@@ -151,14 +159,14 @@ def test_lost_scheduler_is_told_and_its_study_goes_on_elsewhere(
     )
     assert errors.count("\n") == 1
     finished = thud.read_sweep(tmp_path / "some.partial")
-    assert 0 < finished.sizes["set"] < 400
+    assert 0 < finished.sizes["set"] < 2000
     if "scheduler" in rest:
         rest = {"scheduler": cluster.scheduler_address}
     found = thud.sweep(study, tmp_path, **rest)
     assert found.drop_attrs(deep=False).identical(thud.sweep(study).drop_attrs(deep=False))
 
 
-def test_killed_process_is_told_and_loses_nothing() -> None:
+def test_killed_process_is_reported_and_loses_nothing() -> None:
     kept = []
     others = set(multiprocessing.active_children())
 
@@ -172,7 +180,7 @@ def test_killed_process_is_told_and_loses_nothing() -> None:
     assert kept
 
 
-def test_unreachable_scheduler_is_told_soon(
+def test_unreachable_scheduler_is_reported_soon(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
@@ -186,7 +194,7 @@ def test_unreachable_scheduler_is_told_soon(
         assert errors.count("\n") == 1
 
 
-def test_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
@@ -195,7 +203,7 @@ def test_scheduler_without_workers_is_told(monkeypatch: pytest.MonkeyPatch) -> N
         thud.sweep(STUDY, scheduler=empty.scheduler_address)
 
 
-def test_other_version_is_told() -> None:
+def test_other_version_is_reported() -> None:
     block = Block(0, thud.Case(), {"height": np.ones(1)}, "0.0.1")
     with pytest.raises(thud.InputError, match=r"sets of thud 0\.0\.1; allowed: the same version"):
         evaluate(block)
@@ -213,6 +221,6 @@ def test_other_version_is_told() -> None:
         ({"workers": 2, "scheduler": "tcp://x:1"}, "workers = 2 is not allowed for dask; allowed"),
     ],
 )
-def test_useless_backends_are_told(how: dict[str, Any], words: str) -> None:
+def test_useless_backends_are_reported(how: dict[str, Any], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.sweep(STUDY, **how)

@@ -174,7 +174,7 @@ def test_places_without_results_stay_empty() -> None:
         {name: {"values": [1, 2]} for name in ("height", "mass", "gravity")},
     ],
 )
-def test_what_is_no_map_is_told(parameters: dict[str, Any]) -> None:
+def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
     with pytest.raises(thud.InputError, match="are no map; allowed: two numeric ones"):
         thud.design_map({"parameters": parameters})
 

@@ -224,7 +224,7 @@ def test_levels_and_what_else_is_known(bands: str) -> None:
     assert not fit.warnings
 
 
-def test_contact_time_is_told_between_samples() -> None:
+def test_contact_time_is_reported_between_samples() -> None:
     # The modal ball tells it in whole samples; its force, continued to zero, moves smoothly.
     moduli = 1.7e6 * (1 + 1e-3 * np.arange(12))
     impacts = [thud.solve(thud.Ball(youngs_modulus=e), model="modal_ball") for e in moduli]
@@ -235,7 +235,7 @@ def test_contact_time_is_told_between_samples() -> None:
     assert not np.diff(whole).all()
 
 
-def test_model_that_cannot_follow_is_told() -> None:
+def test_model_that_cannot_follow_is_reported() -> None:
     record = noisy_record(thud.solve_case(MODAL), 5.0, 1)
     with pytest.warns(thud.FitWarning, match="the model does not follow the force"):
         thud.fit(record, ["youngs_modulus"])
@@ -243,7 +243,7 @@ def test_model_that_cannot_follow_is_told() -> None:
         thud.fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"])
 
 
-def test_limits_hold_and_are_told() -> None:
+def test_limits_hold_and_are_reported() -> None:
     limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.7e6)}
     fit = quiet_fit(thud.solve(TRUTH), limited)
     assert fit.warnings[0].startswith("youngs_modulus ended at its limit, 1.7 MPa: ")
@@ -297,7 +297,7 @@ def test_one_parameter_far_from_its_start() -> None:
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
 
-def test_model_that_fails_around_the_best_place_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch) -> None:
     solve = objective.solve_case
 
     def only_here(case: thud.Case) -> thud.Impact:

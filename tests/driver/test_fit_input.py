@@ -72,13 +72,13 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             thud.LevelTarget([39.0] * 5, bands="half"),
             ["mass"],
             {},
-            r"target: bands = 'half' is not known; allowed: 'octave', 'third'$",
+            r"target: bands = 'half' is not known; allowed: octave, third$",
         ),
         (
             thud.LevelTarget([39.0] * 5, force="gas"),
             ["mass"],
             {},
-            r"target: force = 'gas' is not known; allowed: 'elastic', 'floor'$",
+            r"target: force = 'gas' is not known; allowed: elastic, floor$",
         ),
         (
             thud.LevelTarget([39.0] * 5, restitution=(0.8, 0.1)),
@@ -88,7 +88,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         ),
     ],
 )
-def test_bad_input_is_told(
+def test_bad_input_is_reported(
     target: object, parameters: object, options: dict[str, object], words: str
 ) -> None:
     with pytest.raises(thud.ThudError, match=words):

@@ -90,7 +90,7 @@ def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:
     assert parameter.start == 0.036
 
 
-def test_doubts_are_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_doubts_are_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "study.toml").write_text(STUDY + "wall_thickness = { start = 0.03 }")
     assert cli.main(["fit", "-q", "-o", "found", "study.toml"]) == 0
     captured = capsys.readouterr()
@@ -139,7 +139,7 @@ def test_results_of_another_fit_are_not_touched(
 
 
 @pytest.mark.parametrize("place", ["study.toml", "/proc"])
-def test_useless_directory_is_told_before_the_search(
+def test_useless_directory_is_reported_before_the_search(
     place: str,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -222,7 +222,7 @@ def test_fit_is_printed_even_if_it_cannot_be_saved(
         ),
     ],
 )
-def test_bad_studies_are_told(
+def test_bad_studies_are_reported(
     old: str, new: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert old in STUDY
@@ -234,7 +234,7 @@ def test_bad_studies_are_told(
     assert re.search(words, error), error
 
 
-def test_study_that_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_study_that_is_not_there_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["fit", "nowhere.toml"]) == 1
     assert "nowhere.toml: No such file or directory; allowed: " in capsys.readouterr().err
 
@@ -287,7 +287,7 @@ def test_fits_take_a_directory_one_at_a_time(
     assert cli.main(fit) == 0
 
 
-def test_replace_finds_the_fit_anew_and_leaves_no_older_file(tmp_path: Path) -> None:
+def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) -> None:
     both = STUDY + "height = {}\n"
     (tmp_path / "study.toml").write_text(both)
     fit = ["fit", "-q", "study.toml", "-o", "found"]

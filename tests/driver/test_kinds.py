@@ -24,7 +24,7 @@ def test_every_kind_follows_from_its_line(name: str) -> None:
     assert cli.COMMANDS[name].help == KINDS[name].help
 
 
-def test_unknown_kind_is_told() -> None:
+def test_unknown_kind_is_reported() -> None:
     with pytest.raises(thud.InputError, match="kind = 'cube' is not known; allowed: sweep, sens"):
         thud.read_study({}, "cube")
 

@@ -51,7 +51,9 @@ def test_levels_show_the_tolerance_band(source: str) -> None:
 
 def test_useless_impacts_are_refused() -> None:
     for impacts in ({}, [], thud.solve()):
-        with pytest.raises(thud.InputError, match="allowed: a mapping of names to one or more impacts"):
+        with pytest.raises(
+            thud.InputError, match="allowed: a mapping of names to one or more impacts"
+        ):
             thud.plot.force_history(impacts)  # type: ignore[arg-type]
     with pytest.raises(thud.InputError, match="allowed: an object of Impact"):
         thud.plot.levels({"ball": 1})  # type: ignore[dict-item]

@@ -126,7 +126,7 @@ def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert "total index of" in capsys.readouterr().out
 
 
-def test_useless_designs_are_told() -> None:
+def test_useless_designs_are_reported() -> None:
     with pytest.raises(thud.InputError, match="kind = 'grid' is not allowed; allowed: saltelli"):
         thud.sensitivity({**LUMPED, "design": {"kind": "grid"}})
     with pytest.raises(thud.InputError, match="such as 64 or 128"):

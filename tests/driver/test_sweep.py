@@ -20,7 +20,7 @@ from scipy.stats import qmc
 import thud
 from thud import cli, tables, units
 from thud._schema import MODELS
-from thud.keys import known_keys
+from thud.keys import known_keys, put
 from thud.studies import designs, directory, evaluation, fit, sweep
 from thud.units import MULTIPLES, scaled
 
@@ -259,33 +259,54 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
 
 
 @pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
-def test_ensemble_gives_what_single_drops_give(fixed: dict[str, str]) -> None:
-    study: dict[str, Any] = {
-        "fixed": fixed,
-        "parameters": {
-            "height": {"values": [0.5, 1.0, -1.0]},
-            "mass": {"values": [2.4, 7.3]},
-            "momentum_flux": {"values": ["none", "retarding"]},
-        },
-    }
-    expected = thud.sweep({**study, "fixed": {**fixed, "model": "hollow_sphere"}})
-    # Drops that differ in their sampling are computed one by one.
-    study["parameters"]["sample_rate"] = {"values": [44100]}
-    found = thud.sweep(study).isel(sample_rate=0)
-    for name, variable in expected.data_vars.items():
-        if variable.dtype.kind == "f":
-            # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
-            decibel = 1e-6 if variable.attrs["units"] == "dB" else 0
-            np.testing.assert_allclose(found[name], variable, rtol=1e-9, atol=decibel)
-        else:
-            np.testing.assert_array_equal(found[name], variable)
+def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
+    study = thud.read_study(
+        {
+            "fixed": fixed,
+            "parameters": {
+                "height": {"values": [0.5, 1.0]},
+                "mass": {"values": [2.4, 7.3]},
+                "momentum_flux": {"values": ["none", "retarding"]},
+            },
+        }
+    )
+    found = thud.sweep(study)
+    names = list(found.coords)[1:]
+    for place in np.ndindex(*(found.sizes[name] for name in names)):
+        one = found.isel(dict(zip(names, place, strict=True)))
+        impact = thud.solve_case(put(study.case, {name: one[name].item() for name in names}))
+        # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
+        for name in ("contact_time", "peak_force", "peak_floor_force", "impulse"):
+            assert float(one[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
+        for force in ("elastic", "floor"):
+            levels = impact.levels(force=force)
+            np.testing.assert_allclose(one[f"{force}_level"], levels, rtol=0, atol=1e-6)
+        verdict = impact.conformity(study.case.limits.source, study.case.levels.force)
+        assert bool(one["conforms"]) == verdict.conforms
+
+
+def test_each_worker_computes_blocks_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+
+    solve_many = thud.solve_many
+
+    def count(parameters: dict[str, Any], case: thud.Case, **options: Any) -> thud.Ensemble:  # noqa: ANN401
+        asked.append(options["threads"])
+        return solve_many(parameters, case, **options)
+
+    monkeypatch.setattr(evaluation, "solve_many", count)
+    thud.sweep(HEIGHTS, workers=3)
+    thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
+    thud.sweep({"parameters": {"sample_rate": {"values": [44100, 48000]}}})
+    assert asked == [1, 1, 1]
 
 
 def test_blocks_take_about_half_a_second() -> None:
-    size = evaluation.block_size
-    batch, single = thud.Case(), thud.Case(levels=thud.Levels(method="fft"))
-    assert size(batch) > 50 * size(single) > size(thud.Case(model=thud.ModalBall())) > 10
-    assert size(thud.Case(model=thud.FiniteElement())) == 2
+    def size(**fixed: str) -> int:
+        return thud.read_study({**HEIGHTS, "fixed": fixed}).block_size
+
+    assert size() > size(model="modal_ball") > 10
+    assert size(model="finite_element") == 2
 
 
 def test_many_sets_need_a_word(tmp_path: Path) -> None:
@@ -356,7 +377,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("fixed.mass = -2\nparameters.height.values = [1]", r"\[fixed\]: &ball: mass = -2.0 is "),
         (
             "fixed.wall_thickness = 0.1\nparameters.height.values = [1]",
-            r"\[fixed\]: &ball: wall_thickness = 0.1 is not allowed; allowed: .* < outer",
+            r"\[fixed\]: &ball: wall_thickness = 0.1 is not allowed; allowed: 0 < .* = 0.089 m",
         ),
         ("base = 'a.nml'\nparameters.height.values = [1]", "'base' is now 'case'; allowed: name"),
         ("parameters.height = {lower=1, upper=2}", "height: 'lower' is now 'low'; allowed: val"),
@@ -401,7 +422,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ),
     ],
 )  # fmt: skip
-def test_bad_studies_are_told(
+def test_bad_studies_are_reported(
     text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "study.toml"
@@ -418,7 +439,7 @@ def test_bad_studies_are_told(
 @pytest.mark.parametrize(
     ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design_map, "grid")]
 )
-def test_exploding_designs_are_told_before_they_are_made(
+def test_exploding_designs_are_reported_before_they_are_made(
     compute: Callable[[dict[str, Any]], object], design: str
 ) -> None:
     spread = {"low": 1, "high": 2, "count": 10**9}
@@ -442,13 +463,13 @@ def test_numbers_of_numpy_are_numbers() -> None:
         ({"fixed": {"mass": 10**5000}}, r"no text .*; allowed: tables"),
     ],
 )
-def test_bad_tables_are_told(study: dict[str, Any], words: str) -> None:
+def test_bad_tables_are_reported(study: dict[str, Any], words: str) -> None:
     with pytest.raises(thud.InputError, match=words) as told:
         thud.sweep({**HEIGHTS, **study})
     assert "\n" not in str(told.value)
 
 
-def test_study_that_is_missing_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_study_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["sweep", str(tmp_path / "no.toml")]) == 1
     assert "no.toml: No such file or directory" in capsys.readouterr().err
     with pytest.raises(thud.InputError, match="study = 3 is not allowed"):
@@ -505,14 +526,14 @@ def test_study_without_results_is_a_failure(
     assert "2 of 2 sets have no results, such as: " in capsys.readouterr().err
 
 
-def test_study_of_another_kind_is_told() -> None:
+def test_study_of_another_kind_is_reported() -> None:
     study = thud.read_study(HEIGHTS)
     for function in (thud.sensitivity, thud.design_map, thud.uncertainty):
         with pytest.raises(thud.InputError, match="python is a sweep study; allowed: a "):
             function(study)
 
 
-def test_missing_packages_are_told(tmp_path: Path) -> None:
+def test_missing_packages_are_reported(tmp_path: Path) -> None:
     code = "import sys; sys.modules['xarray'] = None; from thud import cli; sys.exit(cli.main())"
     command = [sys.executable, "-c", code, "sweep", "study.toml"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
@@ -532,10 +553,10 @@ def test_fixed_values_may_suit_parameters_only() -> None:
     thin = {"fixed": {"outer_radius": 0.02}, "parameters": {"wall_thickness": {"values": [0.005]}}}
     thick = {"fixed": {"wall_thickness": 0.1}, "parameters": {"outer_radius": {"values": [0.2]}}}
     for study in (thin, thick):
-        assert thud.read_study(study).count == 1
+        assert (thud.sweep(study)["status"] != thud.InputError.exit_code).all()
 
 
-def test_unknown_keywords_are_told() -> None:
+def test_unknown_keywords_are_reported() -> None:
     with pytest.raises(thud.InputError, match="keywords: 'threads' is not known; allowed: backend"):
         thud.sweep(HEIGHTS, threads=2)
 

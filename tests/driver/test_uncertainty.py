@@ -1,4 +1,4 @@
-"""Monte Carlo against linear propagation, exact probabilities and SciPy's interval."""
+"""Monte Carlo against linear propagation, exact probabilities and Wilson's equation."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from conftest import REPOSITORY
-from scipy.stats import binomtest
+from scipy.stats import norm
 
 import thud
 from thud import cli
-from thud.studies.uncertainty import wilson_interval
+from thud.studies.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -73,8 +74,11 @@ def test_probability_of_a_criterion_that_is_known() -> None:
 
 @pytest.mark.parametrize(("hits", "trials"), [(0, 10), (10, 10), (3, 7), (368, 500)])
 def test_interval_is_wilson_s(hits: int, trials: int) -> None:
-    expected = binomtest(hits, trials).proportion_ci(0.95, "wilson")
-    assert wilson_interval(hits, trials) == pytest.approx((expected.low, expected.high), abs=1e-12)
+    found = Uncertainty(xr.Dataset(), np.empty((0, 5)), "rubber_ball", hits, trials, 0).interval
+    share, z = hits / trials, norm.ppf(0.975)
+    # At its ends the share is z standard errors off: a quadratic equation.
+    coefficients = (1 + z**2 / trials, -2 * share - z**2 / trials, share**2)
+    assert found == pytest.approx(sorted(np.roots(coefficients).real), abs=1e-12)
 
 
 def test_sets_without_results_are_counted_apart() -> None:

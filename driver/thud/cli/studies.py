@@ -85,7 +85,7 @@ def run_study(options: argparse.Namespace) -> int:
         for remark in kind.remarks(result):
             tqdm.write(f"thud-driver: {options.study}: {remark}", file=sys.stderr)
         figures = {} if options.no_figures else kind.figures(result, study)
-        save(directory.folder, kind.files(result, study), figures)
+        save(directory, kind.files(result, study), figures)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if kind.succeeded(result) else NumericalError.exit_code

@@ -20,7 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole, shown
 from thud.ensemble import MAX_THREADS
-from thud.errors import InputError, NumericalError, ThudError
+from thud.errors import NumericalError, ThudError
+from thud.studies.checks import refuse, refuse_value, require_choice
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
 
 BACKENDS = ("threads", "processes", "dask")
-# A scheduler that does not answer within these seconds is not there.
+# Time limit for a scheduler to answer, s.
 PATIENCE = 5
 
 
@@ -42,27 +43,10 @@ def run_blocks(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> None:
-    """Compute blocks in any order and keep the results of each as soon as it is done.
+    """Compute blocks in any order; `keep` takes each with its results as soon as it is done.
 
-    Parameters
-    ----------
-    blocks
-        The blocks.
-    keep
-        Takes a block and its results.
-    backend
-        ``"threads"`` (the default), ``"processes"`` or ``"dask"`` (the default with a scheduler).
-    workers
-        Number of threads or processes, up to 1024; by default one per processor.
-    scheduler
-        Address of a Dask scheduler.
-
-    Raises
-    ------
-    InputError
-        Where there is no such backend or scheduler.
-    NumericalError
-        Where the backend loses a block.
+    Backend, workers and scheduler are those of `thud.studies.kind.How`. Raises NumericalError where
+    the backend loses a block.
     """
     backend, workers, scheduler = checked_backend(backend, workers, scheduler)
     with _open(backend, workers, scheduler) as (executor, width):
@@ -75,7 +59,7 @@ def run_blocks(
             while running:
                 _collect(running, keep)
         except BaseException:
-            # What runs already is waited for and kept; nothing finished is lost.
+            # Running blocks are waited for and kept.
             for future in list(running):
                 if future.cancel():
                     del running[future]
@@ -92,25 +76,21 @@ def checked_backend(
 ) -> tuple[str, int | None, str | None]:
     """Return a backend, number of workers and scheduler that belong together."""
     backend = backend or ("dask" if scheduler else BACKENDS[0])
-    if backend not in BACKENDS:
-        message = f"backend = {backend!r} is not known; allowed: {', '.join(BACKENDS)}"
-        raise InputError(message)
+    require_choice("backend", backend, BACKENDS)
     if (backend == "dask") != (scheduler is not None):
-        message = (
-            f"backend = {backend!r} with scheduler = {scheduler!r} is not allowed; "
-            f"allowed: the address of a scheduler for dask, and only there"
+        refuse_value(
+            f"backend = {backend!r} with scheduler",
+            scheduler,
+            "the address of a scheduler for dask, and only there",
         )
-        raise InputError(message)
     if workers is not None:
         if scheduler:
-            message = f"workers = {shown(workers)} is not allowed for dask; allowed: those it has"
-            raise InputError(message)
+            refuse(f"workers = {shown(workers)} is not allowed for dask", "those it has")
         require_whole("workers", workers, 1, MAX_THREADS)
     return backend, workers, scheduler
 
 
 def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) -> None:
-    """Wait for blocks and keep them."""
     done, _ = wait(running, return_when=FIRST_COMPLETED)
     for future in done:
         try:
@@ -133,7 +113,7 @@ def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) 
 def _open(
     backend: str, workers: int | None, scheduler: str | None
 ) -> Iterator[tuple[Executor, int]]:
-    """Open a backend; return its executor and how many blocks it computes at once."""
+    """Open a backend; yield its executor and how many blocks run at once."""
     if scheduler is not None:
         with _dask(scheduler) as opened:
             yield opened
@@ -143,20 +123,20 @@ def _open(
         with ThreadPoolExecutor(width) as threads:
             yield threads, width
         return
-    # Processes that were forked would share locks of threads that they do not have.
+    # Forked processes would inherit locks held by threads that they do not have.
     context = get_context("spawn")
     with ProcessPoolExecutor(width, context, initializer=_follow_parent) as processes:
         yield processes, width
 
 
 def _follow_parent() -> None:
-    """Leave interrupts to the process that started this one, and end with it."""
+    """Leave interrupts to the parent process, and end with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = parent_process()
     assert parent is not None  # noqa: S101 - this runs in processes that were started
 
     def end_with_it() -> None:
-        # A parent that is killed tells nobody.
+        # A killed parent cannot stop its processes.
         connection.wait([parent.sentinel])
         os._exit(1)
 
@@ -165,35 +145,32 @@ def _follow_parent() -> None:
 
 @contextmanager
 def _dask(address: str) -> Iterator[tuple[Executor, int]]:
-    """Open a Dask scheduler."""
     try:
         from distributed import Client  # noqa: PLC0415 - an optional package
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
         from distributed.comm.registry import get_backend  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        message = f"{error.name} is not installed; allowed: pip install 'thud[studies,dask]'"
-        raise InputError(message) from error
+        refuse(f"{error.name} is not installed", "pip install 'thud[studies,dask]'", error)
     try:
-        # A client of an unknown kind of address would fail again when it is thrown away.
+        # A client of an unknown kind of address would fail again when deleted.
         get_backend(parse_address(address)[0])
         client: Any = Client(  # type: ignore[no-untyped-call]
             address,
             timeout=PATIENCE,
-            # As default it would also be asked for the locks of files, which stay in this process.
+            # The default client would also manage locks of files, which stay in this process.
             set_as_default=False,
         )
     except (OSError, ValueError, TypeError) as error:
-        message = (
-            f"scheduler = {address!r} does not answer within {PATIENCE} s; "
-            f"allowed: the address of a running one, such as tcp://host:8786"
+        refuse(
+            f"scheduler = {address!r} does not answer within {PATIENCE} s",
+            "the address of a running one, such as tcp://host:8786",
+            error,
         )
-        raise InputError(message) from error
     with _silent("distributed"), client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
         except TimeoutError as error:
-            message = f"scheduler = {address!r} has no workers; allowed: one with workers"
-            raise InputError(message) from error
+            refuse(f"scheduler = {address!r} has no workers", "one with workers", error)
         width = sum(client.nthreads().values())
         with client.get_executor() as executor:
             yield executor, width
@@ -201,7 +178,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
 
 @contextmanager
 def _silent(name: str) -> Iterator[None]:
-    """Keep the loggers of a package quiet: what goes wrong is told in one sentence."""
+    """Silence the loggers of a package: one sentence reports what fails."""
     known = [
         other for other in logging.root.manager.loggerDict if f"{other}.".startswith(f"{name}.")
     ]

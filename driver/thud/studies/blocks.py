@@ -1,4 +1,4 @@
-"""Files of sets: finished blocks while a study runs, one file or Zarr group at its end."""
+"""Files of sets: finished blocks while a study runs, then one file or Zarr group."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.errors import InputError
 from thud.files import replace_file, uninterrupted
+from thud.studies.checks import refuse
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
@@ -24,24 +24,14 @@ if TYPE_CHECKING:
 
 # Results that need more bytes than this are written as Zarr.
 LARGE = 256 * 2**20
-# The file beside the blocks that says what they belong to.
+# The file with the identity of the blocks.
 MARK = "study"
-# What stands between a NetCDF file and its checksum, which HDF5 does not see.
+# Separates a NetCDF file from its checksum, which HDF5 ignores.
 _SEAL = b"thud sha256 "
 
 
 class Blocks:
-    """The finished blocks of a study in its directory, and what becomes of them at its end.
-
-    Parameters
-    ----------
-    folder
-        The directory, taken for the study.
-    study
-        The study.
-    size
-        Sets in a block.
-    """
+    """The finished blocks of a study, of `size` sets each, in its directory, and their joining."""
 
     def __init__(self, folder: Path, study: SetStudy, size: int) -> None:
         self._study = study
@@ -50,19 +40,11 @@ class Blocks:
         self._identity = {**study.identity, "sets in a block": f"{size}"}
 
     def open(self) -> None:
-        """Begin the study, or go on with it.
-
-        Raises
-        ------
-        InputError
-            Where the disk is too small, or the blocks have another size.
-        OSError
-            Where nothing can be written.
-        """
+        """Begin or continue the study. Raises InputError where the disk is too small."""
         with _named(self.path):
             self._require_space()
             self._partial.mkdir(exist_ok=True)
-            if self._blocks():
+            if block_paths(self._partial):
                 before = json.loads((self._partial / MARK).read_bytes())
                 if before != self._identity:
                     # Blocks of another size have gaps or overlap.
@@ -76,22 +58,17 @@ class Blocks:
         return self.path.exists()
 
     def _require_space(self) -> None:
-        """Raise InputError where the disk is too small."""
         free = shutil.disk_usage(self.path.parent).free
-        needed = disk_space(self._study) - sum(path.stat().st_size for path in self._blocks())
+        needed = disk_space(self._study) - sum(
+            path.stat().st_size for path in block_paths(self._partial)
+        )
         if needed > free:
-            message = (
-                f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are "
-                f"free; allowed: fewer sets, or another disk"
+            refuse(
+                f"{self.path} needs about {needed / 1e6:.3g} MB and {free / 1e6:.3g} MB are free",
+                "fewer sets, or another disk",
             )
-            raise InputError(message)
-
-    def _blocks(self) -> list[Path]:
-        """Return the files of the blocks that are finished, in their order."""
-        return block_paths(self._partial)
 
     def _block(self, start: int) -> Path:
-        """Return the file of a block."""
         return self._partial / f"block_{start:012d}.nc"
 
     def has(self, start: int) -> bool:
@@ -99,21 +76,21 @@ class Blocks:
         return self._block(start).exists()
 
     def keep(self, block: Block, found: Columns) -> None:
-        """Write the results of a block, completely or not at all."""
+        """Write the results of a block atomically."""
         stop = block.start + len(found["status"])
         columns = self._study.parameter_columns(block.start, stop)
         _write(new_dataset(self._study, columns, found), self._block(block.start))
 
     def finish(self) -> None:
-        """Put all blocks together, then remove them."""
+        """Join all blocks, then remove them."""
         if not self.complete:
-            paths = self._blocks()
+            paths = block_paths(self._partial)
             if self.path.suffix == ".nc":
                 _write(grid_of(self._study, _join(paths)), self.path)
             else:
                 self._write_zarr(paths)
         shutil.rmtree(self._partial, ignore_errors=True)
-        # What a kill has left of the end of an earlier run.
+        # Left by an earlier run that was killed while it joined blocks.
         for path in self.path.parent.iterdir():
             if path.name.startswith(f".{self.path.name}.") and path.suffix == ".part":
                 path.unlink(missing_ok=True)
@@ -137,7 +114,7 @@ class Blocks:
 
 
 def result_names(study: SetStudy) -> list[str]:
-    """Return the names that results of a study may have; the first is that of its end."""
+    """Return the possible names of results of a study; the first is that of a finished one."""
     large = disk_space(study) > LARGE
     endings = ["nc", "zarr", "partial"]
     if study.format == "zarr" or (large and study.format == "auto"):
@@ -146,7 +123,7 @@ def result_names(study: SetStudy) -> list[str]:
 
 
 def block_paths(partial: Path) -> list[Path]:
-    """Return the files of the blocks that are finished, in their order."""
+    """Return the files of finished blocks in order."""
     return sorted(partial.glob("block_*.nc"))
 
 
@@ -187,8 +164,7 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     if place.suffix == ".partial":
         paths = block_paths(place)
         if not paths:
-            message = f"{place} holds no finished sets; allowed: results of a study"
-            raise InputError(message)
+            refuse(f"{place} holds no finished sets", "results of a study")
         return _join(paths)
     if place.suffix == ".zarr":
         with _readable(place):
@@ -210,7 +186,7 @@ def _join(paths: list[Path], names: list[str] | None = None) -> xr.Dataset:
 
 
 def _loaded(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset in memory, its texts of any length as they were before they were written."""
+    """Load a dataset; its texts have any length again."""
     texts: dict[Any, Any] = {
         name: variable.astype(object)
         for name, variable in dataset.variables.items()
@@ -221,7 +197,6 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path) -> Iterator[xr.Dataset]:
-    """Open a file or Zarr group to be read."""
     with _readable(path):
         with uninterrupted():
             if path.suffix == ".zarr":
@@ -234,29 +209,27 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
 
 
 def _open_zarr(path: Path) -> xr.Dataset:
-    """Open a Zarr group: its arrays are read when they are needed, whether Dask is there or not."""
+    """Open a Zarr group; its arrays are read on demand, with or without Dask."""
     return in_order(xr.open_zarr(path, consolidated=False, chunks=None))
 
 
 @contextmanager
 def _readable(path: Path) -> Iterator[None]:
-    """Raise InputError where there is no dataset."""
     try:
         yield
     except (OSError, ValueError, KeyError, RuntimeError) as error:
-        message = f"{path} cannot be read; allowed: results of a study, or remove it"
-        raise InputError(message) from error
+        refuse(f"{path} cannot be read", "results of a study, or remove it", error)
 
 
 def _write(dataset: xr.Dataset, path: Path) -> None:
-    """Write a NetCDF file, completely or not at all."""
+    """Write a NetCDF file atomically."""
     with uninterrupted():
         content = bytes(dataset.to_netcdf(engine="h5netcdf"))
         replace_file(path, content + _SEAL + sha256(content).digest())
 
 
 def _require_whole(path: Path) -> None:
-    """Raise ValueError where a NetCDF file is damaged: HDF5 may search such a file for ever."""
+    """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
     content, seal, digest = path.read_bytes().rpartition(_SEAL)
     # Files of an older thud have no checksum.
     if seal and sha256(content).digest() != digest:
@@ -266,7 +239,7 @@ def _require_whole(path: Path) -> None:
 
 @contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """Give errors of the disk the path that was asked for."""
+    """Give errors of the disk the requested path."""
     try:
         yield
     except OSError as error:

@@ -11,38 +11,34 @@ import numpy as np
 import xarray as xr
 
 from thud._api import compiler, version
-from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
 from thud.studies.designs import makers
-from thud.studies.evaluation import SCALARS, block_size, level_names
+from thud.studies.evaluation import LEVELS, SCALARS, level_names
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from thud.studies.parameter import Parameter
     from thud.studies.sets import Columns, SetStudy
 
 _LEVEL = "force exposure level of the {} force, re 1 N and 1 s"
 MEANINGS = {
     **SCALARS,
-    **{f"{force}_level": ("dB", _LEVEL.format(force)) for force in FORCES},
-    **{
-        f"{force}_{bands}_level": ("dB", _LEVEL.format(force))
-        for bands in BANDWIDTHS[1:]
-        for force in FORCES
-    },
+    **{name: ("dB", _LEVEL.format(force)) for name, (force, _) in LEVELS.items()},
     "margin": ("dB", "minimum distance of the judged octave levels to a limit, positive inside"),
     "conforms": ("1", "all criteria of the standard are met"),
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
 }
-# Bytes of a set on disk besides its levels and parameters, and of a file itself.
+# Bytes of a set on disk without its levels and parameters, and of an empty file.
 _SET_BYTES = 95
 _FILE_BYTES = 27_000
 
 
 def disk_space(study: SetStudy) -> int:
-    """Return about how many bytes the results of a study need, those of its blocks included."""
+    """Return the estimated bytes of the results of a study, blocks included."""
     total = study.count
-    files = 1 - (-total // block_size(study.case))
+    files = 1 - (-total // study.block_size)
     levels = sum(len(get_bands(bands).nominal) for _, bands in level_names(study.case).values())
     return files * _FILE_BYTES + 2 * total * (_SET_BYTES + 8 * (levels + len(study.parameters)))
 
@@ -54,21 +50,9 @@ def coordinate(parameter: Parameter) -> str:
 
 
 def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset:
-    """Return the results of some sets as a dataset, one after the other.
+    """Return the results of some sets, along the dimension ``set`` (levels also along their bands).
 
-    Parameters
-    ----------
-    study
-        The study.
-    columns
-        Its parameters, by their names.
-    found
-        Results of the same sets, as `evaluate` gives them.
-
-    Returns
-    -------
-    Dataset
-        Of the dimensions ``set`` and ``octave``, and ``third`` where the case wants them.
+    `columns` holds their parameters by name, `found` what `evaluate` returns.
     """
     levels = level_names(study.case)
     coordinates: dict[str, Any] = {
@@ -76,9 +60,7 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
         for _, bands in levels.values()
     }
     for parameter in study.parameters:
-        values = columns[parameter.name]
-        if not parameter.numeric and values.dtype.kind == "U":
-            values = values.astype(object)
+        values = _objects(columns[parameter.name])
         coordinates[coordinate(parameter)] = ("set", values, _attributes(study, parameter))
     variables = {}
     for name, values in found.items():
@@ -89,12 +71,11 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
 
 
 def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
-    """Return the attributes of a parameter; figures show it in unit and scale of the study."""
     key, law = parameter.key, study.temperature
     shown_unit, power = parameter.shown_unit
     meaning = key.meaning
     if law and parameter.name == "youngs_modulus":
-        meaning += f" at {law.reference:g} degC; its temperature acts on it besides"
+        meaning += f" at {law.reference:g} degC; changed by its temperature"
     return {
         "units": key.unit or "1",
         "long_name": meaning,
@@ -132,7 +113,7 @@ def provenance(study: SetStudy) -> dict[str, str]:
 
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with results and parameters in one order, whatever Zarr made of it."""
+    """Return a dataset with variables in the order of `MEANINGS`, which Zarr does not keep."""
     results = {name: dataset.variables[name] for name in MEANINGS if name in dataset.data_vars}
     names = [*BANDWIDTHS, *dataset.attrs["parameters"].split()]
     coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
@@ -143,21 +124,19 @@ def grid_of(study: SetStudy, dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset of a complete grid with one dimension per parameter instead of ``set``."""
     if study.design != "grid":
         return dataset
-    sizes = study.shape
-    names = tuple(map(coordinate, study.parameters))
-    axes = {}
-    for parameter, name in zip(study.parameters, names, strict=True):
-        values = parameter.grid()
-        if values.dtype.kind == "U":
-            values = values.astype(object)
-        axes[name] = (name, values, dataset[name].attrs)
-    variables = {
-        name: (
-            (*names, *variable.dims[1:]),
-            variable.to_numpy().reshape(*sizes, *variable.shape[1:]),
-            variable.attrs,
-        )
-        for name, variable in dataset.data_vars.items()
+    coordinates = {name: dataset[name] for name in BANDWIDTHS if name in dataset.coords}
+    names = [coordinate(parameter) for parameter in study.parameters]
+    axes = {
+        name: (name, _objects(parameter.grid()), dataset[name].attrs)
+        for name, parameter in zip(names, study.parameters, strict=True)
     }
-    bands = {name: dataset[name] for name in BANDWIDTHS if name in dataset.coords}
-    return xr.Dataset(variables, {**bands, **axes}, dataset.attrs)
+    variables = {}
+    for name, variable in dataset.data_vars.items():
+        values = variable.to_numpy().reshape(*study.shape, *variable.shape[1:])
+        variables[name] = ((*names, *variable.dims[1:]), values, variable.attrs)
+    return xr.Dataset(variables, {**coordinates, **axes}, dataset.attrs)
+
+
+def _objects(values: NDArray[Any]) -> NDArray[Any]:
+    """Return an array, of texts as objects: xarray would fix their length."""
+    return values.astype(object) if values.dtype.kind == "U" else values

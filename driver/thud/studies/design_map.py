@@ -1,4 +1,4 @@
-"""Which balls conform: the margin to the standards over two parameters."""
+"""Which balls conform to the standards: the margin over two parameters."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case
-from thud.errors import InputError
 from thud.keys import DENSITY
+from thud.studies.checks import refuse
 from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume
@@ -77,8 +77,7 @@ class DesignMapKind(SetKind[DesignMap]):
         """Return a study of two numeric parameters."""
         found = super().complete(study, given, folder)
         if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
-            message = "[parameters] are no map; allowed: two numeric ones of two values or more"
-            raise InputError(message)
+            refuse("[parameters] are no map", "two numeric ones of two values or more")
         return found
 
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:
@@ -122,13 +121,11 @@ def design_map(
 
 
 def _is_axis(parameter: Parameter) -> bool:
-    """Return whether a parameter has two numbers or more."""
-    # Very many values between two ends are not made for this.
     return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
 
 
 def _mark(study: SetStudy) -> tuple[tuple[float, float] | None, str]:
-    """Return where the ball of the paper lies if the rest is as in the paper, or the case."""
+    """Return the place of the paper's ball if all else is as in the paper, else of the case."""
     names = [parameter.name for parameter in study.parameters]
     paper, ours = _ball_and_drop(Case(), None), _ball_and_drop(study.case, study.density)
     by_density = study.density is not None or DENSITY.name in names
@@ -146,7 +143,7 @@ def _mark(study: SetStudy) -> tuple[tuple[float, float] | None, str]:
 
 
 def _ball_and_drop(case: Case, density: float | None) -> dict[str, float]:
-    """Return the numbers of ball and drop, the density of the wall among them."""
+    """Return the numbers of ball, drop and density of the wall."""
     ball = case.ball
     volume = wall_volume(ball.outer_radius, ball.wall_thickness)
     if density is None:

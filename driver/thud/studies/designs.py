@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.checks import LARGEST_SEED, require_whole, require_words
-from thud.errors import InputError
+from thud.studies.checks import refuse, refuse_value
 from thud.studies.parameter import MAX_VALUES, Parameter
 
 if TYPE_CHECKING:
@@ -22,83 +22,59 @@ if TYPE_CHECKING:
 DRAWN = ("random", "latin_hypercube", "sobol", "saltelli")
 # Fewer base samples than this give no Sobol indices.
 MIN_SAMPLES = 4
-# NumPy counts no further.
+# Maximum of NumPy's integers.
 _MAX_SETS = 2**63 - 1
 
 
 def makers(design: str) -> dict[str, str]:
-    """Return the versions of what draws the points of a design: others may draw other points."""
+    """Return the versions of the packages that draw a design; others may draw other points."""
     names = {"saltelli": ("scipy", "SALib")}.get(design, ("scipy",) if design in DRAWN else ())
     return {f"{name.lower()}_version": version(name) for name in names}
 
 
 def read_design(
     given: Mapping[str, Any], allowed: tuple[str, ...], parameters: tuple[Parameter, ...]
-) -> tuple[str, int, int]:
-    """Return kind, size and seed of a design.
-
-    Parameters
-    ----------
-    given
-        The table ``[design]``.
-    allowed
-        The designs that suit the kind of study, the default first.
-    parameters
-        Its parameters.
-
-    Raises
-    ------
-    InputError
-        Where the design does not suit the study or its parameters.
-    """
+) -> dict[str, Any]:
+    """Return design, size and seed of ``[design]``; the first allowed kind is the default."""
     design = given.get("kind", allowed[0])
     if design not in allowed:
-        message = f"[design] kind = {design!r} is not allowed; allowed: {', '.join(allowed)}"
-        raise InputError(message)
+        refuse_value("[design] kind", design, ", ".join(allowed))
     words = ("kind", "size", "seed") if design in DRAWN else ("kind",)
     require_words(f"[design] of kind {design}", given, words)
     for parameter in parameters:
         if design in DRAWN and parameter.count:
-            message = (
-                f"[parameters] {parameter.name}: count has no use in a {design} design; "
-                f"allowed: low, high and scale"
+            refuse(
+                f"[parameters] {parameter.name}: count has no use in a {design} design",
+                "low, high and scale",
             )
-            raise InputError(message)
         if design not in DRAWN and not parameter.size:
-            message = (
-                f"[parameters] {parameter.name} has no values for a {design} design; "
-                f"allowed: values = [...], or low, high and count"
+            refuse(
+                f"[parameters] {parameter.name} has no values for a {design} design",
+                "values = [...], or low, high and count",
             )
-            raise InputError(message)
     if design == "list" and len({p.size for p in parameters}) > 1:
-        message = "[parameters] differ in their number of values; allowed: the same for all"
-        raise InputError(message)
+        refuse("[parameters] differ in their number of values", "the same for all")
     if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SETS:
-        message = "[parameters] make too many sets; allowed: up to 2^63 - 1 in a grid"
-        raise InputError(message)
+        refuse("[parameters] make too many sets", "up to 2^63 - 1 in a grid")
     if design not in DRAWN:
-        return design, 0, 0
+        return {"design": design}
     size, seed = given.get("size", 0), given.get("seed", 0)
     minimum = MIN_SAMPLES if design == "saltelli" else 1
     require_whole("[design] size", size, minimum, MAX_VALUES)
     require_whole("[design] seed", seed, 0, LARGEST_SEED)
     if design in {"sobol", "saltelli"} and size & (size - 1):
         near = 1 << size.bit_length() - 1
-        message = (
-            f"[design] size = {size} breaks the balance of Sobol's points; "
-            f"allowed: powers of 2, such as {near} or {2 * near}"
+        refuse(
+            f"[design] size = {size} breaks the balance of Sobol's points",
+            f"powers of 2, such as {near} or {2 * near}",
         )
-        raise InputError(message)
-    return design, size, seed
+    return {"design": design, "size": size, "seed": seed}
 
 
-def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
+def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
     design: str, dimension: int, size: int, seed: int, start: int, stop: int
 ) -> NDArray[np.float64]:
-    """Return some points of a design in the unit cube, shape (stop - start, dimension).
-
-    Random and Sobol points are made when they are asked for; the other designs are a whole.
-    """
+    """Return points of a design in the unit cube, shape (stop - start, dimension)."""
     if design == "random":
         generator = np.random.PCG64(seed).advance(start * dimension)
         return np.random.Generator(generator).random((stop - start, dimension))
@@ -117,7 +93,6 @@ def unit_sets(  # noqa: PLR0913, PLR0917 - a design has these many numbers
 
 @lru_cache(maxsize=1)
 def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    """Return all points of a design."""
     if design == "latin_hypercube":
         from scipy.stats import qmc  # noqa: PLC0415 - takes its time
 
@@ -133,5 +108,4 @@ def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.floa
 
 
 def _float(points: Any) -> NDArray[np.float64]:  # noqa: ANN401 - of libraries without types
-    """Return points as an array of floats."""
     return np.asarray(points, dtype=np.float64)

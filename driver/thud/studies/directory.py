@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from thud.errors import InputError
 from thud.files import lock, replace_file
+from thud.studies.checks import refuse
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from matplotlib.figure import Figure
 
@@ -20,101 +22,62 @@ if TYPE_CHECKING:
     from thud.studies.study import Study
 
 FORMATS = (".png", ".svg")
-# More differences than this are counted only.
+# Further differences are only counted.
 _MAX_SHOWN = 3
 
 
-class Directory:
-    """A results directory that one run has taken: a context, in which it is locked.
+@contextmanager
+def take(
+    folder: str | os.PathLike[str], kind: Kind[Any, Any], study: Study, *, replace: bool = False
+) -> Iterator[Path]:
+    """Yield a results directory, locked for one run.
 
-    Parameters
-    ----------
-    folder
-        The directory; it is made where there is none.
-    kind
-        The kind of study.
-    study
-        The study that it is taken for.
-    replace
-        Remove the results of another version of the study.
-
-    Raises
-    ------
-    InputError
-        Where another run is at work there, or results of something else lie there.
-    OSError
-        Where nothing can be written there.
+    Raises InputError where another run uses it or it holds other results (of another version of the
+    study only without `replace`), OSError where nothing can be written.
     """
+    place = Path(folder)
+    results = [place / name for name in kind.results(study)]
+    place.mkdir(parents=True, exist_ok=True)
+    descriptor = lock(place, results[0])
+    try:
+        for path in results:
+            changes = _changes(path, kind, study) if path.exists() else ""
+            if changes and not replace:
+                refuse(
+                    f"{path} belongs to another version of this study: {changes}",
+                    "another directory, or --replace (replace=True) to compute it again",
+                )
+            if changes:
+                for name in (*kind.results(study), *kind.other_files(study)):
+                    remove(place / name)
+        if not results[0].exists():
+            with TemporaryFile(dir=place):
+                pass
+        yield place
+    finally:
+        os.close(descriptor)
 
-    def __init__(
-        self,
-        folder: str | os.PathLike[str],
-        kind: Kind[Any, Any],
-        study: Study,
-        *,
-        replace: bool = False,
-    ) -> None:
-        self.folder = Path(folder)
-        self._kind, self._study, self._replace = kind, study, replace
-        self._descriptor: int | None = None
 
-    def __enter__(self) -> Self:
-        """Take the directory."""
-        results = [self.folder / name for name in self._kind.results(self._study)]
-        self.folder.mkdir(parents=True, exist_ok=True)
-        self._descriptor = lock(self.folder, results[0])
-        try:
-            for path in results:
-                self._take(path)
-            if not results[0].exists():
-                with TemporaryFile(dir=self.folder):
-                    pass
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        """Let others in again."""
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-        self._descriptor = None
-
-    def _take(self, path: Path) -> None:
-        """Raise InputError where results are those of something else, or remove them if asked."""
-        if not path.exists():
-            return
-        try:
-            before = self._kind.identity_in(path)
-        except InputError:
-            raise
-        except (ValueError, LookupError, TypeError, FileNotFoundError) as error:
-            message = (
-                f"{path} is of something else, or of an older thud; "
-                "allowed: another directory, or remove it"
-            )
-            raise InputError(message) from error
-        if before is None:
-            return
-        changes = differences(before, self._study.identity)
-        if not changes:
-            return
-        if not self._replace:
-            message = (
-                f"{path} belongs to another version of this study: {changes}; "
-                "allowed: another directory, or --replace (replace=True) to compute it anew"
-            )
-            raise InputError(message)
-        for name in (*self._kind.results(self._study), *self._kind.other_files(self._study)):
-            remove(self.folder / name)
+def _changes(path: Path, kind: Kind[Any, Any], study: Study) -> str:
+    """Return the differences of a study from that of existing results."""
+    try:
+        before = kind.identity_in(path)
+    except InputError:
+        raise
+    except (ValueError, LookupError, TypeError, FileNotFoundError) as error:
+        refuse(
+            f"{path} holds something else, or results of an older thud",
+            "another directory, or remove it",
+            error,
+        )
+    return "" if before is None else differences(before, study.identity)
 
 
 def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
-    """Write files by their names, and figures as PNG and SVG; return their paths."""
-    paths = []
-    for name, content in files.items():
-        paths.append(folder / name)
-        replace_file(paths[-1], content)
+    """Write files, and figures as PNG and SVG, by name; return their paths."""
+    paths = [folder / name for name in files]
+    for path in paths:
+        replace_file(path, files[path.name])
     if figures:
         from thud.plot import save_all  # noqa: PLC0415 - matplotlib takes its time
 
@@ -123,7 +86,7 @@ def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a directory, if there is one."""
+    """Remove a file or a directory, if it exists."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
@@ -131,7 +94,7 @@ def remove(path: Path) -> None:
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:
-    """Return in which places and keys two versions of a study differ, or nothing.
+    """Return the keys in which two versions of a study differ, or nothing.
 
     >>> differences({"[design] size": "500"}, {"[design] size": "1000", "[design] seed": "1"})
     '[design] size = 500 is now 1000, [design] seed = 1 is new'

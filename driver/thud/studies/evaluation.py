@@ -1,4 +1,4 @@
-"""What becomes of a block of sets: one call of the library, whatever computes it."""
+"""How a block of sets is computed, by any backend: one call of the library."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from thud import _schema as schema
 from thud._api import version
-from thud.ensemble import get_cost, solve_many
-from thud.errors import InputError
+from thud.ensemble import solve_many
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS
+from thud.studies.checks import refuse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -19,28 +19,24 @@ if TYPE_CHECKING:
 
     Columns = dict[str, NDArray[Any]]
 
-# By name: unit and meaning of the numbers that each set has.
+# Force and bands of the levels that a set may have, by name.
+LEVELS = {
+    f"{force}_level" if bands == BANDWIDTHS[0] else f"{force}_{bands}_level": (force, bands)
+    for bands in BANDWIDTHS
+    for force in FORCES
+}
+# Unit and meaning of the numbers of each set, by name.
 SCALARS = {
     name: (schema.SCALARS[name][0] or "1", schema.SCALARS[name][1]) for name in schema.OUTCOMES
 }
-# A block of sets should take about this time, s.
-_BLOCK_TIME = 0.5
 
 
 @dataclass(frozen=True)
 class Block:
-    """Sets that are computed together.
+    """Sets from number `start` on that are computed together.
 
-    Attributes
-    ----------
-    start : int
-        The first of them.
-    case : Case
-        The case from which they differ.
-    columns : dict of str to ndarray, shape (n_set,)
-        Their values by the names of keys.
-    version : str
-        The version of thud that has to compute them.
+    They differ from the case in the columns, shape (n_set,), by names of keys; `version` is that of
+    thud which has to compute them.
     """
 
     start: int
@@ -52,29 +48,15 @@ class Block:
 def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
-    Parameters
-    ----------
-    block
-        The sets.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (n_set,) or (n_set, n_band)
-        The `SCALARS`; the levels of `level_names`, dB; ``margin``, the minimum distance of the
-        judged force's octave levels to a limit, dB; ``conforms``; ``status``, 0 or the exit code
-        of the error; ``reason``, its text. Sets with an error have no numbers: NaN.
-
-    Raises
-    ------
-    InputError
-        Where this is another version of thud.
+    Returns the `SCALARS`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
+    ``conforms``; ``status`` and ``reason``. Sets with an error have no numbers: NaN.
+    Raises InputError where this is another version of thud.
     """
     if block.version != version():
-        message = (
-            f"thud {version()} is asked for sets of thud {block.version}; "
-            f"allowed: the same version everywhere"
+        refuse(
+            f"thud {version()} cannot compute sets of thud {block.version}",
+            "the same version everywhere",
         )
-        raise InputError(message)
     found = solve_many(block.columns, block.case, threads=1)
     columns: Columns = {name: getattr(found, name) for name in SCALARS}
     for name, (force, bands) in level_names(block.case).items():
@@ -88,18 +70,9 @@ def evaluate(block: Block) -> Columns:
 
 
 def level_names(case: Case) -> dict[str, tuple[str, str]]:
-    """Return force and bands of the levels that each set has, by their names.
+    """Return force and bands of the levels of each set, by name.
 
-    The octaves serve the verdict also where the case wants others only.
+    Octaves are always among them: the verdict needs them.
     """
-    octave, *others = BANDWIDTHS
-    wanted = [bands for bands in others if case.levels.bands in {bands, "both"}]
-    names = {f"{force}_level": (force, octave) for force in FORCES}
-    return names | {
-        f"{force}_{bands}_level": (force, bands) for bands in wanted for force in FORCES
-    }
-
-
-def block_size(case: Case) -> int:
-    """Return how many sets are computed together: the same wherever they are computed."""
-    return max(1, round(_BLOCK_TIME / get_cost(case)))
+    wanted = {BANDWIDTHS[0], *(BANDWIDTHS if case.levels.bands == "both" else [case.levels.bands])}
+    return {name: entry for name, entry in LEVELS.items() if entry[1] in wanted}

@@ -16,11 +16,11 @@ from thud.checks import (
     require_number,
     require_whole,
     require_words,
-    shown,
 )
 from thud.columns import read_table
-from thud.errors import FitWarning, InputError
+from thud.errors import FitWarning
 from thud.recording import Recording
+from thud.studies.checks import refuse, refuse_value
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
@@ -41,13 +41,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from thud.impact import Impact
-    from thud.studies.directory import Directory
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
 
 # Options of a search, and their defaults.
 OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
-# More starts, or steps of a search, than this come to no end.
+# Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
 # What [target] may hold, and the units of its numbers.
 FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
@@ -56,7 +55,7 @@ TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
 
 
 @refuse_old_words
-def fit(  # noqa: PLR0913 - what there is to choose
+def fit(  # noqa: PLR0913 - options of a search
     target: ForceTarget | LevelTarget | Recording | Impact | tuple[ArrayLike, ArrayLike],
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],
     case: Case | None = None,
@@ -70,7 +69,7 @@ def fit(  # noqa: PLR0913 - what there is to choose
     """Estimate parameters of a model from a force history or from levels, by least squares.
 
     Trust-region reflective steps (`scipy.optimize.least_squares`) within the limits, parameters
-    measured in their starts. A point at which the model cannot be computed is stepped away from.
+    scaled by their starts. Points at which the model cannot be computed are rejected.
 
     Parameters
     ----------
@@ -128,7 +127,6 @@ def fit(  # noqa: PLR0913 - what there is to choose
 
 
 def _require_options(options: Mapping[str, Any]) -> None:
-    """Raise InputError where an option of a search cannot be used."""
     require_confidence(options["confidence"])
     require_whole("starts", options["starts"], 1, _MAXIMUM)
     require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
@@ -183,10 +181,7 @@ class FitKind(Kind[FitStudy, Fit]):
         """Return a study with its target."""
         names = {parameter.name for parameter in study.parameters}
         if study.density is not None and names & {"outer_radius", "wall_thickness"}:
-            message = (
-                "[fixed] density is not allowed beside a geometry that is fitted; allowed: mass"
-            )
-            raise InputError(message)
+            refuse("[fixed] density is not allowed beside a geometry that is fitted", "mass")
         case = study.case
         if study.density is not None:
             case = with_density(case, study.density)
@@ -200,7 +195,7 @@ class FitKind(Kind[FitStudy, Fit]):
         head = {**vars(study), "case": case}
         return FitStudy(**head, target=target, tables=tables, options=options)
 
-    def compute(self, study: FitStudy, directory: Directory | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
+    def compute(self, study: FitStudy, folder: Path | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
         """Return the fit."""
         return search(
             study.case,
@@ -211,7 +206,7 @@ class FitKind(Kind[FitStudy, Fit]):
         )
 
     def results(self, study: FitStudy) -> list[str]:  # noqa: ARG002
-        """Return the name of the file that says which fit it is."""
+        """Return the name of the file that holds the identity."""
         return ["fit.json"]
 
     def identity_in(self, path: Path) -> dict[str, str]:
@@ -248,12 +243,8 @@ KIND = FitKind()
 
 
 def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarget:
-    """Return the target of a study."""
     if ("file" in table) == ("levels" in table):
-        message = (
-            "[target] takes one of file and levels; allowed: file = 'record.csv' or levels = [...]"
-        )
-        raise InputError(message)
+        refuse("[target] takes one of file and levels", "file = 'record.csv' or levels = [...]")
     require_words("[target]", table, FORCE_KEYS if "file" in table else LEVEL_KEYS)
     options = {
         name: quantity(f"[target] {name}", value, TARGET_UNITS[name])
@@ -268,25 +259,20 @@ def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarg
         return LevelTarget(**options)
     if not isinstance(options.get("time_shift", True), bool):
         given = options["time_shift"]
-        message = f"[target] time_shift = {given!r} is not allowed; allowed: true, false"
-        raise InputError(message)
+        refuse_value("[target] time_shift", given, "true, false")
     name = options.pop("file")
     if not isinstance(name, str) or not name.strip():
-        message = f"[target] file = {name!r} is not allowed; allowed: text in quotes"
-        raise InputError(message)
+        refuse_value("[target] file", name, "text in quotes")
     samples = read_table(folder / name)
     Recording.from_arrays(samples, str(folder / name))  # refuses what is no recording
     return ForceTarget((samples[:, 0], samples[:, 1]), **options)
 
 
 def _measured(place: str, given: object, unit: str) -> tuple[float, float]:
-    """Return value and standard deviation of a table, in the unit of a key."""
+    """Return value and standard deviation of a table in the unit of a key."""
     words = ("value", "uncertainty")
     if not isinstance(given, dict) or not set(words) <= set(given):
-        message = (
-            f"{place} = {shown(given)} is not allowed; allowed: a table of value, uncertainty, unit"
-        )
-        raise InputError(message)
+        refuse_value(place, given, "a table of value, uncertainty, unit")
     require_words(place, given, (*words, "unit"))
     power = power_of(given.get("unit", unit or "1"), unit, place)
     for word in words:

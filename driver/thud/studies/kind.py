@@ -7,13 +7,14 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
 
 from thud.checks import require_words
-from thud.errors import InputError
-from thud.studies.directory import Directory, save
-from thud.studies.study import Study, read_common, read_content
+from thud.studies.checks import refuse
+from thud.studies.directory import save, take
+from thud.studies.study import Study, read_common, read_tables
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
     from matplotlib.figure import Figure
@@ -39,7 +40,7 @@ class How(TypedDict, total=False):
     scheduler : str or None
         Address of a Dask scheduler.
     yes : bool
-        Start however many sets there are.
+        Start also with more sets than have to be confirmed.
     progress : bool
         Show a progress bar.
     replace : bool
@@ -58,45 +59,38 @@ class Kind(ABC, Generic[S, R]):
     """A kind of study: what its file may hold, how it is computed, what it prints and writes."""
 
     name: ClassVar[str]
-    # What its file may hold besides what every study has.
+    # What its file may hold in addition to what every study has.
     words: ClassVar[tuple[str, ...]]
 
     def read_study(self, source: Source) -> S:
         """Return a study of this kind; see `thud.studies.kinds.read_study`."""
         if isinstance(source, Study):
             if source.kind != self.name:
-                message = f"{source.name} is a {source.kind} study; allowed: a {self.name} study"
-                raise InputError(message)
+                refuse(f"{source.name} is a {source.kind} study", f"a {self.name} study")
             return source  # type: ignore[return-value]
-        study: S = read_content(source, self._read)
-        return study
-
-    def _read(self, given: dict[str, Any], folder: Path, name: str, text: str) -> S:
-        """Return the study that some tables describe."""
-        given.setdefault("name", name)
-        common = read_common(given, folder, self.name, self.words, self.new_parameter)
-        return self.complete(dataclasses.replace(common, text=text), given, folder)
+        with read_tables(source) as (given, folder, text):
+            common = read_common(given, folder, self.name, self.words, self.new_parameter)
+            return self.complete(dataclasses.replace(common, text=text), given, folder)
 
     def run(
-        self,
-        source: Source,
-        output: str | os.PathLike[str] | None = None,
-        **how: Unpack[How],
+        self, source: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
     ) -> R:
-        """Return what a study gives; an output directory is taken for it."""
+        """Return the result of a study, also written to an output directory."""
         require_words("keywords", how, How.__annotations__)
         study = self.read_study(source)
         self.require(study, **how)
         if output is None:
             return self.compute(study, None, **how)
-        with self.take(study, output, replace=how.get("replace", False)) as directory:
-            result = self.compute(study, directory, **how)
-            save(directory.folder, self.files(result, study), {})
+        with self.take(study, output, replace=how.get("replace", False)) as folder:
+            result = self.compute(study, folder, **how)
+            save(folder, self.files(result, study), {})
             return result
 
-    def take(self, study: S, folder: str | os.PathLike[str], *, replace: bool = False) -> Directory:
-        """Return a results directory to be taken for a study."""
-        return Directory(folder, self, study, replace=replace)
+    def take(
+        self, study: S, folder: str | os.PathLike[str], *, replace: bool = False
+    ) -> AbstractContextManager[Path]:
+        """Return the context of a results directory of a study; see `thud.studies.directory`."""
+        return take(folder, self, study, replace=replace)
 
     @abstractmethod
     def new_parameter(
@@ -116,16 +110,16 @@ class Kind(ABC, Generic[S, R]):
         return f"{study.name}: {', '.join(p.name for p in study.parameters)} of {study.model}"
 
     @abstractmethod
-    def compute(self, study: S, directory: Directory | None, **how: Unpack[How]) -> R:
-        """Return the result, kept in a directory if there is one."""
+    def compute(self, study: S, folder: Path | None, **how: Unpack[How]) -> R:
+        """Return the result, kept in a directory if given."""
 
     @abstractmethod
     def results(self, study: S) -> list[str]:
-        """Return the names of files that hold an identity; the first stands for a study done."""
+        """Return the names of files that hold an identity; the first exists once it is done."""
 
     @abstractmethod
     def identity_in(self, path: Path) -> dict[str, str] | None:
-        """Return the identity of results; None where there is nothing to be lost."""
+        """Return the identity of results; None where no result would be lost."""
 
     @abstractmethod
     def other_files(self, study: S) -> list[str]:
@@ -137,11 +131,11 @@ class Kind(ABC, Generic[S, R]):
 
     @abstractmethod
     def remarks(self, result: R) -> list[str]:
-        """Return what is to be said besides, as sentences."""
+        """Return warnings, as sentences."""
 
     @abstractmethod
     def succeeded(self, result: R) -> bool:
-        """Return whether there is a result to speak of."""
+        """Return whether there is any result."""
 
     def files(self, result: R, study: S) -> dict[str, bytes]:  # noqa: ARG002 - most have none
         """Return further files by their names."""

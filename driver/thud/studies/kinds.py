@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.errors import InputError
+from thud.studies.checks import refuse, require_choice
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -53,33 +53,16 @@ PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
 
 
 def load(module: str) -> ModuleType:
-    """Return a module of this package.
-
-    Raises
-    ------
-    InputError
-        Where a package that it needs is not installed.
-    """
+    """Return a module of this package. Raises InputError where its dependencies are missing."""
     try:
         return importlib.import_module(f"thud.studies.{module}")
     except ModuleNotFoundError as error:
-        message = (
-            f"{error.name} is not installed; allowed: studies with pip install 'thud[studies]'"
-        )
-        raise InputError(message) from error
+        refuse(f"{error.name} is not installed", "studies with pip install 'thud[studies]'", error)
 
 
 def get_kind(name: str) -> Kind[Any, Any]:
-    """Return a kind of study by its name.
-
-    Raises
-    ------
-    InputError
-        Where there is no such kind; lists those that there are.
-    """
-    if name not in KINDS:
-        message = f"kind = {name!r} is not known; allowed: {', '.join(KINDS)}"
-        raise InputError(message)
+    """Return a kind of study by name. Raises InputError for an unknown one."""
+    require_choice("kind", name, KINDS)
     kind: Kind[Any, Any] = load(KINDS[name].module).KIND
     return kind
 

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.special import ndtri
 
 from thud.checks import LARGEST, require_number, require_whole, require_words, shown
-from thud.errors import InputError
 from thud.key import Key
 from thud.keys import Value, find_key
+from thud.studies.checks import refuse, refuse_value, require_choice
 from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
     from typing import Self
 
     from numpy.typing import NDArray
 
-# More values of a parameter, or base samples, than this do not fit into memory.
+# Maximum number of values of a parameter, or of base samples: memory.
 MAX_VALUES = 2**30
-# What a parameter that varies may be given by, and one that is fitted; `unit` may stand beside it.
+# Words of a parameter that varies, by its form, and of one that is fitted; all take `unit` too.
 FORMS = {"values": ("values",), "low": ("low", "high", "count", "scale"), "std": ("mean", "std")}
 FITTED = ("start", "low", "high")
 NUMBERS = ("real", "whole", "list")
@@ -77,12 +77,12 @@ class Parameter:
 
     @property
     def numeric(self) -> bool:
-        """The values are numbers."""
+        """Whether the values are numbers."""
         return self.key.kind in NUMBERS
 
     @property
     def given(self) -> dict[str, Any]:
-        """What is given of it, by the words of its table."""
+        """Its table, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
 
@@ -94,7 +94,7 @@ class Parameter:
 
     @property
     def size(self) -> int:
-        """Number of values in a grid; very many are not made for it, whole numbers are few."""
+        """Number of values in a grid."""
         if self.values is not None:
             return len(self.values)
         return len(self.grid()) if self.key.kind == "whole" and self.count else self.count
@@ -110,11 +110,11 @@ class Parameter:
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
     def quantile(self, share: NDArray[np.float64]) -> NDArray[Any]:
-        """Return the values below which a share of all lies."""
+        """Return the values below which a share of all values lies."""
         if self.values is not None:
             return np.take(self.grid(), (share * len(self.values)).astype(int))
         if self.std is not None and self.mean is not None:
-            # A share of exactly 0 would be infinitely far out.
+            # The quantile of a share of 0 is infinite.
             return np.asarray(self.mean + self.std * ndtri(np.maximum(share, 2.0**-54)))
         assert self.low is not None  # noqa: S101 - see `varied`
         assert self.high is not None  # noqa: S101
@@ -127,13 +127,13 @@ class Parameter:
             found = self.low + share * (high - self.low)
         return np.minimum(np.floor(found), self.high).astype(int) if whole else found
 
-    def trials(self, share: NDArray[np.float64]) -> list[Value]:
-        """Return values to try a case with: the start, or quantiles; none where it has neither."""
+    def trial(self, share: float) -> Value | None:
+        """Return a value to try a case with: the start, or a quantile, or None."""
         if self.start is not None:
-            return [self.start] * len(share)
+            return self.start
         if self.values is None and self.std is None and None in {self.low, self.high}:
-            return []
-        found: list[Value] = self.quantile(share).tolist()
+            return None
+        found: Value = self.quantile(np.array([share])).tolist()[0]
         return found
 
     def __str__(self) -> str:
@@ -149,73 +149,43 @@ class Parameter:
 
 
 def _in_unit(value: Value, power: int) -> Value:
-    """Return a number in the unit of a study, and anything else as it is."""
     number = isinstance(value, int | float) and not isinstance(value, bool)
     return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
 
 
 def varied(name: str, given: object, model: str, centre: Value | None) -> Parameter:
-    """Return a parameter that varies.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    given
-        Its table.
-    model
-        The source model.
-    centre
-        Value of the key in the case: the mean where none is given.
-
-    Raises
-    ------
-    InputError
-        Where there is no such key, or it takes no such values.
-    """
+    """Return a parameter that varies; `centre`, its value in the case, is the default mean."""
     words = [word for form in FORMS.values() for word in form]
     place, key, given, power = _begin(name, given, model, words)
     form = next((form for form in FORMS if form in given), None)
     if form is None:
-        message = (
-            f"{place} = {shown(given)} has no values; allowed: a table with values = [...], or "
-            "low and high, or std, and unit"
+        refuse(
+            f"{place} = {shown(given)} has no values",
+            "a table with values = [...], or low and high, or std, and unit",
         )
-        raise InputError(message)
     require_words(f"{place} with {form}", given, (*FORMS[form], "unit"))
-    unit = given.get("unit")
+    if form != "values" and key.kind not in NUMBERS:
+        allowed = ", ".join(map(repr, key.choices)) or "true, false"
+        refuse(f"{place} is not a number", f"values = [...] of {allowed}")
+
+    def read(word: str) -> float:
+        return float(checked(f"{place}: {word}", key, given[word], power))
+
+    found: dict[str, Any]
     if form == "values":
         values = given["values"]
         if not isinstance(values, list | tuple) or not values:
-            message = f"{place}: values = {values!r} is empty or no list; allowed: [one, or, more]"
-            raise InputError(message)
-        found = tuple(checked(f"{place}: values", key, value, power) for value in values)
-        return Parameter(values=found, unit=unit, name=name, key=key)
-    if key.kind not in NUMBERS:
-        allowed = ", ".join(map(repr, key.choices)) or "true, false"
-        message = f"{place} is not a number; allowed: values = [...] of {allowed}"
-        raise InputError(message)
-    read = _between if form == "low" else _normal
-    return replace(read(place, key, given, power, centre), unit=unit, name=name, key=key)
+            refuse(f"{place}: values = {values!r} is empty or no list", "[one, or, more]")
+        found = {"values": tuple(checked(f"{place}: values", key, v, power) for v in values)}
+    elif form == "low":
+        found = _between(place, key, given, read)
+    else:
+        found = _normal(place, key, given, read, centre)
+    return Parameter(**found, unit=given.get("unit"), name=name, key=key)
 
 
 def fitted(name: str, given: object, model: str) -> Parameter:
-    """Return a parameter that is fitted.
-
-    Parameters
-    ----------
-    name
-        Its name.
-    given
-        Its table, a `Parameter`, its start, or None.
-    model
-        The source model.
-
-    Raises
-    ------
-    InputError
-        Where there is no such key, or it takes no such values.
-    """
+    """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
     if isinstance(given, Parameter):
         given = given.given
     elif given is None:
@@ -234,120 +204,78 @@ def fitted(name: str, given: object, model: str) -> Parameter:
 def _begin(
     name: str, given: object, model: str, words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
-    """Return place, key, table and power of ten of its unit of a parameter."""
+    """Return place, key, table and power of ten of the unit of a parameter."""
     place = f"[parameters] {name}"
     key, entry = find_key(name, model)
     if key.kind == "list" and entry is None:
-        message = f"{place} is a list; allowed: one entry of it, such as {name + '(1)'!r}"
-        raise InputError(message)
+        refuse(f"{place} is a list", f"one entry of it, such as {name + '(1)'!r}")
     if not isinstance(given, Mapping):
-        message = f"{place} = {shown(given)} is no table; allowed: {', '.join(words)}, unit"
-        raise InputError(message)
+        refuse(f"{place} = {shown(given)} is no table", f"{', '.join(words)}, unit")
     require_words(place, given, (*words, "unit"))
     unit = key.unit or "1" if given.get("unit") is None else given["unit"]
     return place, key, given, power_of(unit, key.unit, place)
 
 
 def checked(place: str, key: Key, value: object, power: int) -> Value:
-    """Return one value in the unit of its key.
-
-    Raises
-    ------
-    InputError
-        Where the key takes no such value.
-    """
-    if key.kind == "choice" and value in key.choices:
-        return str(value)
-    if key.kind == "flag" and isinstance(value, bool):
-        return value
-    if key.kind in NUMBERS and _is_number(value):
-        number = scaled(value, power)  # type: ignore[arg-type]
-        if key.kind != "whole" and math.isfinite(number):
-            return number
-        if number.is_integer():
-            return int(number)
-    allowed = {
-        "choice": ", ".join(map(repr, key.choices)),
-        "flag": "true, false",
-        "whole": "whole numbers",
-    }.get(key.kind, "finite numbers")
-    message = f"{place} = {shown(value)} is not allowed; allowed: {allowed}"
-    raise InputError(message)
-
-
-def _is_number(value: object) -> bool:
-    """Return whether a value is a finite number that a float holds."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    return -LARGEST < value < LARGEST
+    """Return a value in the unit of its key. Raises InputError where it is not of its kind."""
+    number = math.nan
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        number = scaled(value, power) if -LARGEST < value < LARGEST else math.inf
+    valid, allowed, found = {
+        "choice": (value in key.choices, ", ".join(map(repr, key.choices)), value),
+        "flag": (isinstance(value, bool), "true, false", value),
+        "whole": (number.is_integer(), "whole numbers", number),
+    }.get(key.kind, (math.isfinite(number), "finite numbers", number))
+    if not valid:
+        refuse_value(place, value, allowed)
+    return int(number) if key.kind == "whole" else found  # type: ignore[return-value]
 
 
 def _between(
-    place: str, key: Key, given: Mapping[str, Any], power: int, _: Value | None
-) -> Parameter:
-    """Return values between two ends."""
+    place: str, key: Key, given: Mapping[str, Any], read: Callable[[str], float]
+) -> dict[str, Any]:
     if "high" not in given:
-        message = f"{place} has no high end; allowed: high beside low"
-        raise InputError(message)
-    low, high = (float(checked(f"{place}: {e}", key, given[e], power)) for e in ("low", "high"))
+        refuse(f"{place} has no high end", "high beside low")
+    low, high = read("low"), read("high")
     whole = key.kind == "whole"
     # Ends that are other keys depend on the set.
     lower = -math.inf if isinstance(key.lower, str) else key.lower
     upper = math.inf if isinstance(key.upper, str) else key.upper
     if whole and not lower <= low <= high <= upper:
-        message = (
-            f"{place}: low = {low:g} and high = {high:g} are not allowed; "
-            f"allowed: {lower:g} <= low < high <= {upper:g}"
+        refuse(
+            f"{place}: low = {low:g} and high = {high:g} are not allowed",
+            f"{lower:g} <= low < high <= {upper:g}",
         )
-        raise InputError(message)
     count, scale = given.get("count", 0), given.get("scale", _SCALES[0])
-    if scale not in _SCALES:
-        message = f"{place}: scale = {scale!r} is not known; allowed: {', '.join(_SCALES)}"
-        raise InputError(message)
-    if not low < high or (scale == "log" and low <= 0):
-        message = f"{place}: low = {given['low']!r} is not allowed; allowed: low < high"
-        raise InputError(message + (", 0 < low" if scale == "log" else ""))
+    require_choice(f"{place}: scale", scale, _SCALES)
+    positive = ", 0 < low" if scale == "log" else ""
+    if not low < high or (positive and low <= 0):
+        refuse_value(f"{place}: low", given["low"], f"low < high{positive}")
     if "count" in given:
         require_whole(f"{place}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
-    return Parameter(low=low, high=high, count=count, scale=scale)
+    return {"low": low, "high": high, "count": count, "scale": scale}
 
 
 def _normal(
-    place: str, key: Key, given: Mapping[str, Any], power: int, centre: Value | None
-) -> Parameter:
-    """Return a normal distribution, by default around the value of the case."""
+    place: str,
+    key: Key,
+    given: Mapping[str, Any],
+    read: Callable[[str], float],
+    centre: Value | None,
+) -> dict[str, Any]:
     if key.kind == "whole":
-        message = f"{place} is a whole number; allowed: values = [...], or low and high"
-        raise InputError(message)
-    std = float(checked(f"{place}: std", key, given["std"], power))
+        refuse(f"{place} is a whole number", "values = [...], or low and high")
+    std = read("std")
     if not std > 0:
-        message = f"{place}: std = {given['std']!r} is not allowed; allowed: 0 < std"
-        raise InputError(message)
-    if "mean" in given:
-        centre = checked(f"{place}: mean", key, given["mean"], power)
-    if centre is None or not math.isfinite(float(centre)):
-        message = f"{place} has no mean; allowed: mean beside std"
-        raise InputError(message)
-    return Parameter(mean=float(centre), std=std)
+        refuse_value(f"{place}: std", given["std"], "0 < std")
+    mean = read("mean") if "mean" in given else centre
+    if mean is None or not math.isfinite(float(mean)):
+        refuse(f"{place} has no mean", "mean beside std")
+    return {"mean": float(mean), "std": std}
 
 
 def quantity(place: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind
-    """Return a value, or the numbers of a list, in the unit of a key.
-
-    Parameters
-    ----------
-    place
-        Where it stands, for messages.
-    given
-        The value, or a table with ``value`` and ``unit``.
-    unit
-        Unit of the key.
-
-    Raises
-    ------
-    InputError
-        Where the table or its unit cannot be used.
-    """
+    """Return a value, a list, or a table of ``value`` and ``unit``, in the unit of a key."""
     if not isinstance(given, Mapping):
         return given
     require_words(place, given, ("value", "unit"))

@@ -1,4 +1,4 @@
-"""Which parameter matters for what: Sobol indices."""
+"""Sobol indices of the parameters."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 import xarray as xr
 
-from thud.errors import InputError
 from thud.levels import get_bands
+from thud.studies.checks import refuse
 from thud.studies.dataset import coordinate
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind
@@ -65,12 +65,9 @@ class Sensitivity:
 
     def csv(self) -> bytes:
         """Return all indices as a table with a line for each output and parameter."""
-        lines = [",".join(("output", "parameter", *INDICES))]
-        for output in self.indices["output"].values:
-            for name in self.indices["parameter"].values:
-                cell = self.indices.sel(output=output, parameter=name)
-                lines.append(",".join((output, name, *(f"{float(cell[i]):.6g}" for i in INDICES))))
-        return "\n".join((*lines, "")).encode()
+        table = self.indices.to_dataframe(dim_order=["output", "parameter"])
+        text: str = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
+        return text.encode()
 
 
 class SensitivityKind(SetKind[Sensitivity]):
@@ -128,29 +125,24 @@ def sensitivity(
 
 
 def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
-    """Return the Sobol indices of the sets of a study."""
     force = study.case.levels.force
     levels = dataset[f"{force}_level"].values
     peak = "peak_force" if force == "elastic" else "peak_floor_force"
-    outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)} | {
-        name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)
-    }
+    outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
+    outputs |= {name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)}
     dimension = len(study.parameters)
     usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_SAMPLES:
         reason = next(text for text in dataset["reason"].values if text)
-        message = f"only {usable.sum()} of {study.size} base samples have results ({reason})"
-        message += "; allowed: ranges in which sets have some"
-        raise InputError(message)
+        refuse(
+            f"only {usable.sum()} of {study.size} base samples have results ({reason})",
+            "ranges in which sets have results",
+        )
     rows = np.repeat(usable, dimension + 2)
     found = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]
     variables = {
-        name: (
-            ("output", "parameter"),
-            np.stack([one[i] for one in found]),
-            {"units": "1", "long_name": meaning},
-        )
-        for i, (name, meaning) in enumerate(INDICES.items())
+        name: (("output", "parameter"), np.stack(values), {"units": "1", "long_name": meaning})
+        for (name, meaning), values in zip(INDICES.items(), zip(*found, strict=True), strict=True)
     }
     names = {"output": list(outputs), "parameter": list(map(coordinate, study.parameters))}
     left_out = int((~usable).sum())
@@ -160,25 +152,14 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
 def sobol_indices(
     values: NDArray[np.float64], dimension: int, seed: int = 0
 ) -> tuple[NDArray[np.float64], ...]:
-    """Return the Sobol indices of one quantity.
+    """Return first order and total Sobol indices of a quantity, each with its half interval.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n (dimension + 2),)
-        The quantity at the points of a ``"saltelli"`` design, in their order.
-    dimension
-        Number of parameters.
-    seed
-        Seed of the resampling for the confidence intervals.
-
-    Returns
-    -------
-    first, first_interval, total, total_interval : ndarray, shape (dimension,)
-        Indices and half widths of their confidence intervals; NaN where nothing varies.
+    `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is
+    that of the resampling. Indices have shape (dimension,), and are NaN where nothing varies.
     """
     from SALib.analyze import sobol  # noqa: PLC0415 - takes its time
 
-    # Rounding is no variance.
+    # Rounding errors are not variance.
     if np.ptp(values) <= 1e-12 * np.abs(values).max():
         return tuple(np.full((4, dimension), np.nan))
     cube = {"num_vars": dimension, "names": list(map(str, range(dimension)))}

@@ -13,14 +13,14 @@ from tqdm import tqdm
 
 from thud._api import version
 from thud._schema import KEYS
-from thud.errors import InputError
 from thud.keys import OF_FILES
 from thud.studies.backends import checked_backend, run_blocks
 from thud.studies.blocks import Blocks, read_identity, read_sweep, result_names
+from thud.studies.checks import refuse, require_choice
 from thud.studies.dataset import disk_space, grid_of, new_dataset
 from thud.studies.designs import read_design
 from thud.studies.directory import FORMATS
-from thud.studies.evaluation import Block, block_size
+from thud.studies.evaluation import Block
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
 from thud.studies.sets import SetStudy, read_temperature
@@ -28,7 +28,7 @@ from thud.studies.study import table_of
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
     import xarray as xr
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
     from thud.case import Case
     from thud.keys import Value
-    from thud.studies.directory import Directory
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
     from thud.studies.sets import Columns
@@ -61,34 +60,24 @@ class SetKind(Kind[SetStudy, R]):
     ) -> Parameter:
         """Return a parameter that varies."""
         if name == "bands":
-            message = (
-                "[parameters] bands is not allowed; allowed: bands in [fixed], alike for all sets"
-            )
-            raise InputError(message)
+            refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all sets")
         return varied(name, given, case.model.name, centre)  # type: ignore[union-attr]
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:  # noqa: ARG002
         """Return a study with its design."""
         written = given.get("format", _FILE_FORMATS[0])
-        if written not in _FILE_FORMATS:
-            message = f"format = {written!r} is not known; allowed: {', '.join(_FILE_FORMATS)}"
-            raise InputError(message)
+        require_choice("format", written, _FILE_FORMATS)
         law = table_of(given, "temperature") if "temperature" in given else None
         temperature = read_temperature(law, study.parameters)
         design = read_design(table_of(given, "design"), self.designs, study.parameters)
         # Sets need neither snapshots nor free modes.
         case = replace(study.case, modes=None)
-        files = {
-            key.name: 0.0 for key in KEYS if key.owner == study.model and key.group == OF_FILES
-        }
+        owned = (key for key in KEYS if key.owner == study.model)
+        files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
-        return SetStudy(
-            *(study.name, study.kind, case, study.parameters, study.density, study.text),
-            *design,
-            temperature,
-            written,
-        )
+        head = {**vars(study), "case": case}
+        return SetStudy(**head, **design, temperature=temperature, format=written)
 
     def describe(self, study: SetStudy) -> str:
         """Return how many sets a study has and how much disk it needs."""
@@ -99,34 +88,20 @@ class SetKind(Kind[SetStudy, R]):
     def require(self, study: SetStudy, **how: Unpack[How]) -> None:
         """Raise InputError where there are too many sets, or no such backend."""
         if study.count > MAX_SETS and not how.get("yes"):
-            message = (
-                f"{self.describe(study)}; "
-                f"allowed: up to {MAX_SETS} sets, more with yes=True (--yes)"
-            )
-            raise InputError(message)
+            refuse(self.describe(study), f"up to {MAX_SETS} sets, more with yes=True (--yes)")
         checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
 
-    def compute(self, study: SetStudy, directory: Directory | None, **how: Unpack[How]) -> R:
-        """Return what the sets of a study tell."""
-        return self.conclude(study, compute_sets(study, directory, how))
+    def compute(self, study: SetStudy, folder: Path | None, **how: Unpack[How]) -> R:
+        """Return the result of all sets, computed or continued."""
+        return self.conclude(study, compute_sets(study, folder, how))
 
     @abstractmethod
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
-        """Return what the results of all sets tell."""
-
-    def rows(self, result: R) -> Sequence[Sequence[str]]:
-        """Return header and rows of text."""
-        rows: Sequence[Sequence[str]] = result.table()  # type: ignore[attr-defined]
-        return rows
+        """Return the result of all sets."""
 
     @abstractmethod
     def draw(self, result: R) -> Figure:
         """Return the figure of a result."""
-
-    def dataset(self, result: R) -> xr.Dataset:
-        """Return every set of a result."""
-        dataset: xr.Dataset = result.dataset  # type: ignore[attr-defined]
-        return dataset
 
     def results(self, study: SetStudy) -> list[str]:
         """Return the names of the dataset and of the directory of blocks."""
@@ -142,11 +117,11 @@ class SetKind(Kind[SetStudy, R]):
 
     def table(self, result: R, study: SetStudy) -> str:  # noqa: ARG002 - sets know their units
         """Return the result as text."""
-        return format_rows(self.rows(result))
+        return format_rows(result.table())  # type: ignore[attr-defined]
 
     def remarks(self, result: R) -> list[str]:
         """Return how many sets have no results, and why."""
-        dataset = self.dataset(result)
+        dataset = _sets(result)
         failed = dataset["status"].values != 0
         if not failed.any():
             return []
@@ -155,39 +130,24 @@ class SetKind(Kind[SetStudy, R]):
 
     def succeeded(self, result: R) -> bool:
         """Return whether any set has results."""
-        return bool((self.dataset(result)["status"] == 0).any())
+        return bool((_sets(result)["status"] == 0).any())
 
     def figures(self, result: R, study: SetStudy) -> dict[str, Figure]:
         """Return the figure by the name of the study."""
         return {study.name: self.draw(result)} if self.succeeded(result) else {}
 
 
-def compute_sets(study: SetStudy, directory: Directory | None, how: How) -> xr.Dataset:
-    """Compute every set of a study; one that was interrupted goes on in its directory.
+def _sets(result: Any) -> xr.Dataset:  # noqa: ANN401 - a dataset, or what has one
+    return getattr(result, "dataset", result)  # type: ignore[no-any-return]
 
-    Parameters
-    ----------
-    study
-        The study.
-    directory
-        Where results are kept; None: they are not written.
-    how
-        Backend and progress.
 
-    Returns
-    -------
-    Dataset
-        A grid has one dimension per parameter, other designs the dimension ``set``.
+def compute_sets(study: SetStudy, folder: Path | None, how: How) -> xr.Dataset:
+    """Compute or continue a study; without a folder its results are not written.
 
-    Raises
-    ------
-    NumericalError
-        Where the backend loses sets; single sets that fail have a status and a reason instead.
-    OSError
-        Where the results cannot be written.
+    Raises NumericalError where the backend loses sets; sets that fail have a status and a reason.
     """
-    total, size = study.count, block_size(study.case)
-    blocks = Blocks(directory.folder, study, size) if directory else None
+    size = study.block_size
+    blocks = Blocks(folder, study, size) if folder else None
     memory: dict[int, Columns] = {}
 
     def keep(block: Block, found: Columns) -> None:
@@ -200,29 +160,28 @@ def compute_sets(study: SetStudy, directory: Directory | None, how: How) -> xr.D
     if not (blocks and blocks.complete):
         if blocks:
             blocks.open()
-        starts = [start for start in range(0, total, size) if not (blocks and blocks.has(start))]
-        left = sum(min(size, total - start) for start in starts)
-        hidden = not how.get("progress", False)
+        starts = range(0, study.count, size)
+        open_starts = [start for start in starts if not (blocks and blocks.has(start))]
+        done = study.count - sum(min(size, study.count - start) for start in open_starts)
         with tqdm(
-            total=total, initial=total - left, unit="set", disable=hidden, file=sys.stderr
+            total=study.count,
+            initial=done,
+            unit="set",
+            disable=not how.get("progress", False),
+            file=sys.stderr,
         ) as bar:
-            run_blocks(
-                _blocks(study, starts, size),
-                keep,
-                *checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler")),
-            )
+            backend = how.get("backend"), how.get("workers"), how.get("scheduler")
+            run_blocks(_blocks(study, open_starts, size), keep, *backend)
     if blocks:
         blocks.finish()
         return read_sweep(blocks.path)
-    whole = {
-        name: np.concatenate([memory[start][name] for start in sorted(memory)])
-        for name in memory[0]
-    }
-    return grid_of(study, new_dataset(study, study.parameter_columns(0, total), whole))
+    parts = [memory[start] for start in sorted(memory)]
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))
 
 
 def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
-    """Yield the blocks that begin with some sets."""
+    case = study.valid_case
     for start in starts:
         columns = study.parameter_columns(start, min(start + size, study.count))
-        yield Block(start, study.case, study.key_columns(columns), version())
+        yield Block(start, case, study.key_columns(columns), version())

@@ -1,40 +1,41 @@
-"""Studies of many sets: designs, and what their sets mean for the keys of the input."""
+"""Studies of many sets: designs, and the values of keys in their sets."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.case import check_case
 from thud.checks import require_words
+from thud.ensemble import get_cost
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE
+from thud.studies.checks import refuse
 from thud.studies.designs import makers, unit_sets
 from thud.studies.parameter import checked
-from thud.studies.study import Study, wall_volume
+from thud.studies.study import SHARES, Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.case import Case
     from thud.studies.parameter import Parameter
 
     Columns = dict[str, NDArray[Any]]
 
 
+# A block of sets should take about this time, s.
+_BLOCK_TIME = 0.5
+
+
 @dataclass(frozen=True)
 class Temperature:
-    """How the modulus of elasticity falls with temperature: E (1 + c (T - T_ref)).
-
-    Attributes
-    ----------
-    reference : float
-        Temperature T_ref at which the modulus is that of the case, degrees Celsius.
-    coefficient : float
-        Relative change c of the modulus, 1/K.
-    """
+    """Temperature law of the modulus, E (1 + c (T - T_ref)): T_ref in degC, c in 1/K."""
 
     reference: float
     coefficient: float
@@ -63,7 +64,7 @@ class SetStudy(Study):
     format: str = "auto"
 
     def own_identity(self) -> dict[str, str]:
-        """Return what the sets depend on besides."""
+        """Return design and temperature law."""
         found = makers(self.design) | {"[design] kind": self.design}
         if self.size:
             found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
@@ -87,19 +88,23 @@ class SetStudy(Study):
         """Number of sets."""
         return math.prod(self.shape)
 
+    @property
+    def block_size(self) -> int:
+        """Number of sets that are computed together, the same for all backends."""
+        return max(1, round(_BLOCK_TIME / get_cost(self.valid_case)))
+
+    @property
+    def valid_case(self) -> Case:
+        """The case, or, if invalid without its parameters, the case with some values of them."""
+        for share in (None, *SHARES):
+            with suppress(InputError):
+                case = self.case if share is None else self.trial_case(share)
+                check_case(case)
+                return case
+        return self.case
+
     def parameter_columns(self, start: int, stop: int) -> Columns:
-        """Return the parameters of some sets in their order, in the units of their keys.
-
-        Parameters
-        ----------
-        start, stop
-            The first set, and the one after the last.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (stop - start,)
-            Values by the names of parameters.
-        """
+        """Return sets `start` to `stop` - 1: values by parameter, units of keys, shape (n_set,)."""
         if self.design == "grid":
             places = np.unravel_index(np.arange(start, stop), self.shape)
             return {p.name: p.grid()[i] for p, i in zip(self.parameters, places, strict=True)}
@@ -109,19 +114,9 @@ class SetStudy(Study):
         return {p.name: p.quantile(shares[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
-        """Return what some sets mean for the keys of the input.
+        """Return sets of `parameter_columns` as values of keys of the library, shape (n_set,).
 
-        The density gives the mass, and the temperature the modulus of elasticity.
-
-        Parameters
-        ----------
-        columns
-            What `parameter_columns` gives.
-
-        Returns
-        -------
-        dict of str to ndarray, shape (n_set,)
-            Values by the names of keys of the library.
+        The density determines the mass, the temperature the modulus of elasticity.
         """
         found = dict(columns)
         density = found.pop(DENSITY.name, self.density)
@@ -142,11 +137,10 @@ def read_temperature(given: object, parameters: tuple[Parameter, ...]) -> Temper
     """Return the law of the modulus in the table ``[temperature]``."""
     varies = any(parameter.key == TEMPERATURE for parameter in parameters)
     if varies != (given is not None):
-        message = (
-            "temperature needs both a parameter and the table [temperature]; "
-            "allowed: reference, degC, and coefficient, 1/K, in [temperature]"
+        refuse(
+            "temperature needs both a parameter and the table [temperature]",
+            "reference, degC, and coefficient, 1/K, in [temperature]",
         )
-        raise InputError(message)
     if not isinstance(given, Mapping):
         return None
     words = ("reference", "coefficient")

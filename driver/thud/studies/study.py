@@ -1,4 +1,4 @@
-"""Studies: which case, what varies or is fitted, read from TOML."""
+"""Studies as TOML files: the case, and parameters that vary or are fitted."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,23 +18,24 @@ import numpy as np
 from thud._api import version
 from thud._schema import MODELS
 from thud.case import Case, check_case, new_model, read_case
-from thud.checks import require_kind, require_words, shown
+from thud.checks import require_kind, require_words
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
+from thud.studies.checks import refuse, refuse_value
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
 # What studies are read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
 
 # What every study may hold.
 WORDS = ("name", "case", "fixed", "parameters")
-# Longer texts are compared by their beginning and a checksum.
+# Longer texts are shortened to their beginning and a checksum.
 _LONG = 300
-# Where spreads are tried for whether a case with fixed values can be valid.
-_SHARES = np.array([0.01, 0.5, 0.99])
+# Quantiles of the parameters at which a case is tried.
+SHARES = (0.01, 0.5, 0.99)
 _NAMED_KEY = re.compile(r"&\w+: (\w+)")
 
 
@@ -80,70 +83,55 @@ class Study:
             found |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
         return {key: _shortened(value) for key, value in found.items()}
 
+    def trial_case(self, share: float) -> Case:
+        """Return the case with its parameters at a quantile; InputError where there is none."""
+        acting = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
+        found = {p.name: p.trial(share) for p in acting}
+        case = put(self.case, {name: v for name, v in found.items() if v is not None})
+        return case if self.density is None else with_density(case, self.density)
+
     def own_identity(self) -> dict[str, str]:
-        """Return what the results of this kind depend on besides."""
+        """Return what only the results of this kind depend on."""
         return {}
 
 
 def _shortened(text: str) -> str:
-    """Return a text, or the beginning of a long one with its checksum."""
     if len(text) <= _LONG:
         return text
-    import hashlib  # noqa: PLC0415 - seldom needed
-
-    return f"{text[:_LONG]}... ({hashlib.sha256(text.encode()).hexdigest()[:16]})"
+    return f"{text[:_LONG]}... ({sha256(text.encode()).hexdigest()[:16]})"
 
 
-def read_content(
+@contextmanager
+def read_tables(
     source: str | os.PathLike[str] | Mapping[str, Any],
-    read: Callable[[dict[str, Any], Path, str, str], Any],
-) -> Any:  # noqa: ANN401 - what the reader makes of it
-    """Read the tables of a study.
-
-    Parameters
-    ----------
-    source
-        Path of a TOML file, or what would stand in it.
-    read
-        Takes the tables, the folder from which files are named, a name and the text.
-
-    Returns
-    -------
-    object
-        What `read` returns.
-
-    Raises
-    ------
-    InputError
-        With the name of the file.
-    """
+) -> Iterator[tuple[dict[str, Any], Path, str]]:
+    """Yield tables, folder and text of a study; InputErrors within the block name its file."""
     if isinstance(source, Mapping):
         text = _text(source)
-        return read(json.loads(text), Path(), "python", text)
+        yield {"name": "python", **json.loads(text)}, Path(), text
+        return
     require_kind("study", source, str | Path)
     path = Path(source)
     try:
         text = path.read_text(encoding="utf-8")
-        return read(tomllib.loads(text), path.parent, path.stem, text)
+        yield {"name": path.stem, **tomllib.loads(text)}, path.parent, text
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
     except ValueError as error:  # no TOML, no UTF-8, or a number of thousands of digits
-        message = f"{path}: {error}; allowed: TOML"
-        raise InputError(message) from error
+        refuse(f"{path}: {error}", "TOML", error)
 
 
 def _text(source: Mapping[str, Any]) -> str:
-    """Return what would stand in a file as JSON, whatever kinds of numbers and tables it has."""
+    """Return tables as JSON."""
     try:
         return json.dumps(source, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
-        message = f"the study is no text ({error}); allowed: tables, lists, numbers and text"
-        raise InputError(message) from error
+        refuse(f"the study is no text ({error})", "tables, lists, numbers and text", error)
 
 
 def _plain(value: object) -> object:
-    """Return tables, paths, and numbers and arrays of NumPy as what JSON knows."""
+    """Return tables, paths, numbers and arrays of NumPy in types of JSON."""
     if isinstance(value, Parameter):
         return value.given
     if isinstance(value, Mapping):
@@ -163,80 +151,50 @@ def read_common(
     words: Iterable[str],
     new_parameter: Callable[[str, object, Case, Value | None], Parameter],
 ) -> Study:
-    """Read what every study has.
-
-    Parameters
-    ----------
-    given
-        The tables of the study; ``name`` is given.
-    folder
-        Where its files are named from.
-    kind
-        Its kind.
-    words
-        What this kind may hold besides `WORDS`.
-    new_parameter
-        Makes a parameter of its name, table, case and value there.
-
-    Raises
-    ------
-    InputError
-        Names table, key, value and what is allowed.
-    """
+    """Read what all kinds share; `words` are those that this kind has in addition to `WORDS`."""
     require_words("the study", given, (*WORDS, *words))
     fixed, parameters = (table_of(given, name) for name in ("fixed", "parameters"))
     name = given["name"]
-    if (
-        not isinstance(name, str)
-        or not name.strip()
-        or not name.isprintable()
-        or Path(name).name != name
-        or name == ".."
-    ):
-        message = f"name = {name!r} is not allowed; allowed: the name of a file, without folders"
-        raise InputError(message)
+    is_text = isinstance(name, str) and name.strip() and name.isprintable()
+    if not is_text or name == ".." or Path(name).name != name:
+        refuse_value("name", name, "the name of a file, without folders")
     case, density = _fix(_case(given.get("case"), folder, fixed), fixed)
     if not parameters:
-        message = "[parameters] is empty; allowed: one parameter or more"
-        raise InputError(message)
+        refuse("[parameters] is empty", "one parameter or more")
     found = tuple(
         new_parameter(name, entry, case, density if name == DENSITY.name else value_in(case, name))
         for name, entry in parameters.items()
     )
     _require_use(fixed, parameters)
-    _require_valid(case, fixed, found, density)
-    return Study(name, kind, case, found, density)
+    study = Study(name, kind, case, found, density)
+    _require_valid(study, fixed)
+    return study
 
 
 def table_of(given: Mapping[str, Any], name: str) -> dict[str, Any]:
     """Return a table of a study, empty where it is missing."""
     table = given.get(name, {})
     if not isinstance(table, dict):
-        message = f"{name} = {shown(table)} is not allowed; allowed: a table [{name}]"
-        raise InputError(message)
+        refuse_value(name, table, f"a table [{name}]")
     return table
 
 
 def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
-    """Return the case of a file, or the default, with its model."""
-    if path is not None and not isinstance(path, str):
-        message = f"case = {path!r} is not allowed; allowed: the path of a namelist file"
-        raise InputError(message)
+    if not isinstance(path, str | None):
+        refuse_value("case", path, "the path of a namelist file")
     case = Case() if path is None else read_case(folder / path)
-    model = fixed.get("model")
-    if model is not None and not isinstance(model, str):
-        message = f"[fixed] model = {shown(model)} is not allowed; allowed: {', '.join(MODELS)}"
-        raise InputError(message)
-    if model is not None and (case.model is None or model != case.model.name):
-        case = replace(case, model=new_model(model, {}))
+    if (model := fixed.get("model")) is not None:
+        if not isinstance(model, str):
+            refuse_value("[fixed] model", model, ", ".join(MODELS))
+        if case.model is None or model != case.model.name:
+            case = replace(case, model=new_model(model, {}))
     if case.model is None:
-        message = f"case = {path!r} has no source model; allowed: a case with one"
-        raise InputError(message)
+        refuse(f"case = {path!r} has no source model", "a case with one")
     return case
 
 
 def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
-    """Return the case with the keys that the study fixes, and a density if it fixes one."""
+    """Return the case with fixed keys, and a density if it is fixed."""
     values: dict[str, object] = {}
     for name, entry in fixed.items():
         if name == "model":
@@ -244,8 +202,7 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
         place = f"[fixed] {name}"
         key, place_in_list = find_key(name, case.model.name)  # type: ignore[union-attr]
         if key == TEMPERATURE:
-            message = f"{place} is not allowed; allowed: temperature in [parameters]"
-            raise InputError(message)
+            refuse(f"{place} is not allowed", "temperature in [parameters]")
         value = quantity(place, entry, key.unit)
         if key.kind == "list" and place_in_list is None:
             entries = value if isinstance(value, list) else [value]
@@ -259,40 +216,27 @@ def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
 def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
     """Raise InputError where one key overrules another."""
     if {"mass", DENSITY.name} <= {*fixed, *parameters}:
-        message = "mass and density are both given; allowed: one of them"
-        raise InputError(message)
+        refuse("mass and density are both given", "one of them")
     for name in fixed:
         # A fixed value may be the middle of a normal distribution.
         if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
-            message = (
-                f"[fixed] {name} has no use beside [parameters] {name}; "
-                f"allowed: one of them, or std without mean in [parameters]"
+            refuse(
+                f"[fixed] {name} has no use beside [parameters] {name}",
+                "one of them, or std without mean in [parameters]",
             )
-            raise InputError(message)
 
 
-def _require_valid(
-    case: Case,
-    fixed: Mapping[str, Any],
-    parameters: tuple[Parameter, ...],
-    density: float | None,
-) -> None:
-    """Raise InputError where the library refuses a fixed value, whatever the parameters are."""
-    keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if density else set())
-    trials = [p.trials(_SHARES) for p in parameters if p.key not in {DENSITY, TEMPERATURE}]
-    names = [p.name for p in parameters if p.key not in {DENSITY, TEMPERATURE}]
+def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
+    """Raise InputError where the library refuses a fixed value for all values of the parameters."""
+    keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
     refusals = []
-    for i in range(len(_SHARES)):
-        values = {name: trial[i] for name, trial in zip(names, trials, strict=True) if trial}
+    for share in SHARES:
         try:
-            tried = put(case, values)
-            if density is not None:
-                tried = with_density(tried, density)
-            check_case(replace(tried, modes=None))
+            check_case(replace(study.trial_case(share), modes=None))
         except InputError as error:
             refusals.append(str(error))
     named = [_NAMED_KEY.match(refusal) for refusal in refusals]
-    if len(named) == len(_SHARES) and all(found and found[1] in keys for found in named):
+    if len(named) == len(SHARES) and all(found and found[1] in keys for found in named):
         message = f"[fixed]: {refusals[0]}"
         raise InputError(message)
 
@@ -306,7 +250,7 @@ def with_density(case: Case, density: float) -> Case:
 def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 - or arrays
     """Return the volume of the wall of a ball, m3, from its measures, m."""
     inner = outer_radius - wall_thickness
-    # Products of absurd radii are infinite, where their powers are errors of Python.
+    # Powers of absurd radii raise OverflowError, their products are infinite.
     outer_cube, inner_cube = (radius * radius * radius for radius in (outer_radius, inner))
     return 4 / 3 * np.pi * (outer_cube - inner_cube)
 

@@ -8,6 +8,7 @@ import xarray as xr
 
 from thud.levels import BANDWIDTHS
 from thud.studies.set_kind import SetKind
+from thud.tables import format_rows
 
 if TYPE_CHECKING:
     import os
@@ -29,12 +30,8 @@ class Sweep(SetKind[xr.Dataset]):
         """Return the results of all sets as they are."""
         return dataset
 
-    def dataset(self, result: xr.Dataset) -> xr.Dataset:
-        """Return the results of all sets."""
-        return result
-
-    def rows(self, result: xr.Dataset) -> list[tuple[str, ...]]:
-        """Return header and rows of text: the range of each result."""
+    def table(self, result: xr.Dataset, study: SetStudy) -> str:  # noqa: ARG002
+        """Return the range of each result as text."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         for name, variable in result.data_vars.items():
             if variable.dtype.kind == "f":
@@ -46,7 +43,7 @@ class Sweep(SetKind[xr.Dataset]):
                     numbers = (values.min(), values.median(), values.max())
                     rows.append((label, *(f"{float(number):.4g}" for number in numbers)))
         rows.append(("conforming sets", "", "", f"{int(result['conforms'].sum())}"))
-        return rows
+        return format_rows(rows)
 
     def draw(self, result: xr.Dataset) -> Figure:
         """Return levels against the first numeric parameter."""
@@ -68,8 +65,7 @@ def sweep(
     study
         Path of a TOML file, or what would stand in it; see docs/studies.md.
     output
-        Directory of the results; an interrupted study goes on where it stopped. None: they are
-        not written.
+        Directory of the results; an interrupted study is continued. None: they are not written.
     **how
         Keywords `backend`, `workers`, `scheduler`, `yes`, `progress`, `replace`; see
         `thud.studies.kind.How`.

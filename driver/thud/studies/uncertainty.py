@@ -1,4 +1,4 @@
-"""How surely a ball conforms: Monte Carlo over tolerances of manufacture and temperature."""
+"""Probability of conformity: Monte Carlo over tolerances of manufacture and temperature."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.stats import binomtest
 
-from thud.errors import InputError
 from thud.levels import get_bands, octave_limits
+from thud.studies.checks import refuse
 from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:
@@ -65,8 +65,9 @@ class Uncertainty:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval of the probability, of 95 %; it also holds for none and for all."""
-        return wilson_interval(self.conforming, self.computed)
+        """Wilson's score interval of the probability, of 95 %; valid for none and for all too."""
+        found = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
+        return found.low, found.high
 
     def table(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -78,36 +79,13 @@ class Uncertainty:
             level = self.levels[:, i]
             low, high = np.quantile(level, [0.025, 0.975])
             share = np.mean((level >= lower[i]) & (level <= upper[i]))
-            rows.append(
-                (
-                    f"{band:g}",
-                    f"{level.mean():.2f}",
-                    f"{level.std(ddof=1):.2f}",
-                    f"{low:.2f} to {high:.2f}",
-                    f"{100 * share:.1f} %",
-                )
-            )
+            spread = f"{level.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
+            rows.append((f"{band:g}", f"{level.mean():.2f}", *spread, f"{100 * share:.1f} %"))
         low, high = self.interval
-        rows.append(
-            (
-                "all criteria",
-                f"{100 * self.probability:.1f} %",
-                f"± {100 * self.standard_error:.1f} %",
-                f"{100 * low:.1f} to {100 * high:.1f} %",
-                f"{self.conforming} of {self.computed}",
-            )
-        )
-        return rows
-
-
-def wilson_interval(hits: int, trials: int) -> tuple[float, float]:
-    """Return Wilson's score interval of a probability (Wilson 1927), of 95 %."""
-    z = float(ndtri((1 + CONFIDENCE) / 2))
-    share = hits / trials
-    middle = (share + z * z / (2 * trials)) / (1 + z * z / trials)
-    spread = math.sqrt(share * (1 - share) / trials + (z / (2 * trials)) ** 2)
-    half = z / (1 + z * z / trials) * spread
-    return max(0.0, middle - half), min(1.0, middle + half)
+        probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
+        interval = f"{100 * low:.1f} to {100 * high:.1f} %"
+        count = f"{self.conforming} of {self.computed}"
+        return [*rows, ("all criteria", *probability, interval, count)]
 
 
 class UncertaintyKind(SetKind[Uncertainty]):
@@ -119,13 +97,12 @@ class UncertaintyKind(SetKind[Uncertainty]):
     def new_parameter(
         self, name: str, given: object, case: Case, centre: Value | None
     ) -> Parameter:
-        """Return a parameter that varies, but for what is alike for all sets."""
+        """Return a parameter that varies; the limits are the same for all sets."""
         if name in {"source", "force"}:
-            message = (
-                f"[parameters] {name} is not allowed, because all levels are held "
-                f"against the same limits; allowed: {name} in [fixed]"
+            refuse(
+                f"[parameters] {name} is not allowed, because all sets have the same limits",
+                f"{name} in [fixed]",
             )
-            raise InputError(message)
         return super().new_parameter(name, given, case, centre)
 
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> Uncertainty:
@@ -133,11 +110,8 @@ class UncertaintyKind(SetKind[Uncertainty]):
         dataset = dataset.load()
         good = dataset["status"].values == 0
         if good.sum() < 2:  # noqa: PLR2004 - a spread needs two
-            reasons = [text for text in dataset["reason"].values if text]
-            message = f"only {good.sum()} of {study.size} sets have results"
-            message += f" ({reasons[0]})" if reasons else ""
-            message += "; allowed: two or more"
-            raise InputError(message)
+            reason = next((f" ({text})" for text in dataset["reason"].values if text), "")
+            refuse(f"only {good.sum()} of {study.size} sets have results{reason}", "two or more")
         return Uncertainty(
             dataset,
             dataset[f"{study.case.levels.force}_level"].values[good],
@@ -160,7 +134,7 @@ KIND = UncertaintyKind()
 def uncertainty(
     study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
 ) -> Uncertainty:
-    """Compute how tolerances spread the levels, and how probably the ball conforms.
+    """Compute how tolerances spread the levels, and the probability of conformity.
 
     Parameters
     ----------

@@ -9,24 +9,23 @@ import numpy as np
 from scipy import stats
 from scipy.signal import ZoomFFT
 
-from thud.checks import shown
-from thud.errors import InputError
 from thud.impact import FORCES, Impact
 from thud.recording import MIN_ROWS, Recording
-from thud.studies.fitting.misfit import require_choice, require_positive
+from thud.studies.checks import refuse, refuse_value, require_choice
+from thud.studies.fitting.misfit import Misfit, require_positive
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-# What a force plate records ends here, Hz (paper, section 3).
+# Upper limit of the band of a force plate, Hz (paper, section 3).
 BELOW = 1250.0
 # Part of that frequency that rounded times leave open.
 SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
-# A doubt needs this many independent values during contact and otherwise, this probability of
-# Fisher's F, and a residual above this part of the peak force: less comes from sampling.
+# A warning needs this many independent values during contact and otherwise, this probability of
+# Fisher's F, and a residual above this part of the peak force, which exceeds sampling errors.
 MIN_FREEDOM = 5
 SURE = 0.999
 NUMERICAL = 1e-4
@@ -67,7 +66,7 @@ class ForceTarget:
 
     def misfit(self) -> ForceMisfit:
         """Return what the fit needs of the target."""
-        require_choice("force", self.force, FORCES)
+        require_choice("target: force", self.force, FORCES)
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
@@ -76,22 +75,19 @@ class ForceTarget:
             time, force = _cut(time, force, self.window)
         shift = not isinstance(self.record, Impact) if self.time_shift is None else self.time_shift
         if not 2 / len(time) * rate <= self.below < rate / 2:
-            message = (
-                f"target: below = {self.below} is not allowed; "
-                f"allowed: {2 / len(time) * rate:g} <= below < {rate / 2:g} Hz"
+            refuse(
+                f"target: below = {self.below} is not allowed",
+                f"{2 / len(time) * rate:g} <= below < {rate / 2:g} Hz",
             )
-            raise InputError(message)
         last = force[time > time[-1] - END].mean()
         if last > OPEN_END * force.max():
-            message = (
-                f"target: the force ends with {last / force.max():.0%} of its peak; "
-                "allowed: a record of a whole impact"
+            refuse(
+                f"target: the force ends with {last / force.max():.0%} of its peak",
+                "a record of a whole impact",
             )
-            raise InputError(message)
         return ForceMisfit(time, force, rate, self.noise, self.force, self.below, free_shift=shift)
 
     def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Return times, forces and sampling rate."""
         given = self.record
         if isinstance(given, Recording):
             return given.time, given.record, given.sample_rate
@@ -100,11 +96,12 @@ class ForceTarget:
         try:
             table = np.column_stack([np.asarray(column, dtype=np.float64) for column in given])
         except (TypeError, ValueError) as error:
-            message = (
-                "target cannot be used; allowed: a ForceTarget, LevelTarget, Recording or Impact, "
-                "or two arrays of one length: time, s, and force, N"
+            refuse(
+                "target cannot be used",
+                "a ForceTarget, LevelTarget, Recording or Impact, or two arrays of one length: "
+                "time, s, and force, N",
+                error,
             )
-            raise InputError(message) from error
         recording = Recording.from_arrays(table, "target")
         return recording.time + recording.origin, recording.record, recording.sample_rate
 
@@ -112,23 +109,22 @@ class ForceTarget:
 def _cut(
     time: NDArray[np.float64], force: NDArray[np.float64], window: tuple[float, float]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the part of a record in a window of time."""
     try:
         begin, end = map(float, window)
     except (TypeError, ValueError, OverflowError):
         begin = end = np.nan
     inside = (time >= begin) & (time <= end)
     if np.count_nonzero(inside) < MIN_ROWS or not force[inside].max() > 0:
-        message = (
-            f"target: window = {shown(window)} is not allowed; allowed: begin and end, s, of an "
-            f"impact between {time[0]:g} and {time[-1]:g}"
+        refuse_value(
+            "target: window",
+            window,
+            f"begin and end, s, of an impact between {time[0]:g} and {time[-1]:g}",
         )
-        raise InputError(message)
     return time[inside], force[inside]
 
 
-class ForceMisfit:
-    """How far the force of an impact is from a record, by frequency; see `Misfit`."""
+class ForceMisfit(Misfit):
+    """How far the force of an impact is from a record, by frequency."""
 
     deviation_unit = "N"
 
@@ -234,6 +230,6 @@ class ForceMisfit:
 
 
 def _parts(spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return a transform as independent real numbers, whose squares sum to those of its history."""
+    """Return a transform as independent real numbers with the sum of squares of its history."""
     rest = np.sqrt(2) * spectrum[1:]
     return np.concatenate([spectrum[:1].real, rest.real, rest.imag])

@@ -9,39 +9,39 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import qr
 
-from thud.checks import shown
-from thud.errors import InputError
+from thud.studies.checks import refuse_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-# A column of the Jacobian this much smaller than the target is none, nor is one with this error.
+# Columns of the Jacobian with a smaller norm over that of the target, or a larger relative error,
+# are zero.
 NO_EFFECT = 1e-9
 UNRESOLVED = 0.5
-# Singular values of the Jacobian below this part of the largest, or below this many of its own
-# errors, are taken for zero.
+# Singular values of the Jacobian below this part of the maximum, or below this many of its own
+# errors, are zero.
 MIN_RATIO = 1e-6
 ERRORS = 3.0
-# Part of a unit vector below which a parameter does not belong to it.
+# Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
-# Part of the largest entry below which a sentence leaves a parameter out.
+# Part of the maximum entry below which a sentence omits a parameter.
 SMALL = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Inference:
-    """Covariance of scaled parameters, and directions in which nothing is known.
+    """Covariance of scaled parameters, and directions that are not identifiable.
 
     Attributes
     ----------
     covariance : ndarray, shape (n, n)
-        Covariance for residuals of unit variance; infinite where nothing is known.
+        For residuals of unit variance; infinite where a parameter is not identifiable.
     singular_values : ndarray, shape (n,)
-        Singular values of the Jacobian with columns of unit length, the largest first.
+        Of the Jacobian with columns of unit length, in descending order.
     null : ndarray, shape (n_null, n)
-        Changes of the parameters that change nothing else, as few at a time as can be.
+        Changes that leave the residuals as they are, of the fewest parameters.
     """
 
     covariance: NDArray[np.float64]
@@ -50,21 +50,10 @@ class Inference:
 
 
 def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float) -> Inference:
-    """Return covariance and directions in which nothing is known.
+    """Return covariance, singular values and null directions.
 
-    Parameters
-    ----------
-    jacobian : ndarray, shape (m, n)
-        Derivatives of the weighted residuals with the scaled parameters.
-    finer : ndarray, shape (m, n)
-        The same with other steps: the difference is the error.
-    size
-        Length of the weighted target.
-
-    Returns
-    -------
-    Inference
-        Covariance, singular values, null directions.
+    `jacobian`, shape (m, n), holds derivatives of weighted residuals by scaled parameters, `finer`
+    the same with another step: their difference is the error. `size` is the norm of the target.
     """
     count = jacobian.shape[1]
     length = np.linalg.norm(jacobian, axis=0)
@@ -84,10 +73,10 @@ def infer(jacobian: NDArray[np.float64], finer: NDArray[np.float64], size: float
 
 
 def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return another basis of the same space, in which each of as many columns has one entry."""
+    """Return another basis of the same space: in each of its pivot columns one entry is not 0."""
     if not len(rows):
         return rows
-    # The parameters that vary most stand for the directions.
+    # The parameters that vary most represent the directions.
     _, _, order = qr(rows, pivoting=True)
     basis = np.linalg.solve(rows[:, order[: len(rows)]], rows)
     result: NDArray[np.float64] = basis / np.abs(basis).max(axis=1, keepdims=True)
@@ -97,7 +86,7 @@ def _sparse(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 def worst_directions(
     covariance: NDArray[np.float64], maximum: float
 ) -> list[tuple[float, NDArray[np.float64]]]:
-    """Return directions of scaled parameters with a larger standard deviation than allowed."""
+    """Return directions whose standard deviation exceeds a maximum, with that deviation."""
     finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
     variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
     found = []
@@ -110,7 +99,7 @@ def worst_directions(
 
 
 def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
-    """Return what a direction in which nothing is known means."""
+    """Return the meaning of a direction that is not identifiable."""
     part = _parts(names, direction)
     if len(part) == 1:
         return f"{part[0][0]} has no effect on what is compared: it cannot be fitted to this target"
@@ -121,17 +110,7 @@ def null_sentence(names: Sequence[str], direction: NDArray[np.float64]) -> str:
 def weak_sentence(
     names: Sequence[str], direction: NDArray[np.float64], width: float, confidence: float
 ) -> str:
-    """Return what a direction in which little is known means.
-
-    Parameters
-    ----------
-    names, direction
-        The parameters, and how they change together.
-    width
-        Half the confidence interval of that change, relative.
-    confidence
-        Confidence of the interval.
-    """
+    """Return the meaning of a direction with a relative half interval `width` that is wide."""
     part = _parts(names, direction)
     share = f"{100 * width * max(abs(value) for _, value in part):.0f} %"
     if len(part) == 1:
@@ -146,7 +125,7 @@ def weak_sentence(
 
 
 def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[str, float]]:
-    """Return names and entries of a direction without what is negligible; the largest is 1."""
+    """Return names and entries of a direction without negligible ones; the maximum is 1."""
     largest = np.abs(direction).max()
     found = [
         (name, float(value / largest))
@@ -158,17 +137,15 @@ def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[s
 
 
 def _join(words: Sequence[str]) -> str:
-    """Return words as a list in a sentence."""
     return f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _change(part: Sequence[tuple[str, float]]) -> str:
-    """Return a small change along a direction."""
     return _join([f"{name} {value:+.2g} %" for name, value in part])
 
 
 def _product(part: Sequence[tuple[str, float]]) -> str:
-    """Return what two parameters that change together determine."""
+    """Return the product of powers that two parameters determine."""
     if len(part) > 2:  # noqa: PLR2004 - a pair determines one product of powers
         return ""
     (first, one), (second, other) = part
@@ -177,19 +154,9 @@ def _product(part: Sequence[tuple[str, float]]) -> str:
 
 
 def coverage_factor(confidence: float, freedom: int | None) -> float:
-    """Return how many standard errors a two-sided interval reaches.
+    """Return the half width of a two-sided interval in standard errors.
 
-    Parameters
-    ----------
-    confidence
-        Confidence of the interval.
-    freedom
-        Degrees of freedom of Student's t; None where the noise is known.
-
-    Raises
-    ------
-    InputError
-        Where the confidence is not between 0 and 1.
+    It is Student's t, or normal where the noise is known (`freedom` is None).
     """
     require_confidence(confidence)
     place = (1 + confidence) / 2
@@ -199,5 +166,4 @@ def coverage_factor(confidence: float, freedom: int | None) -> float:
 def require_confidence(confidence: object) -> None:
     """Raise InputError where a confidence is not between 0 and 1."""
     if not (isinstance(confidence, float | np.floating) and 0 < confidence < 1):
-        message = f"confidence = {shown(confidence)} is not allowed; allowed: 0 < confidence < 1"
-        raise InputError(message)
+        refuse_value("confidence", confidence, "0 < confidence < 1")

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.errors import InputError
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
-from thud.studies.fitting.misfit import numbers, require_choice, require_positive
+from thud.studies.checks import refuse, require_choice
+from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -51,8 +51,8 @@ class LevelTarget:
 
     def misfit(self) -> LevelMisfit:
         """Return what the fit needs of the target."""
-        require_choice("bands", self.bands, tuple(BANDWIDTHS))
-        require_choice("force", self.force, FORCES)
+        require_choice("target: bands", self.bands, BANDWIDTHS)
+        require_choice("target: force", self.force, FORCES)
         nominal = get_bands(self.bands).nominal.tolist()
         asked = nominal
         if self.frequencies is not None:
@@ -60,11 +60,10 @@ class LevelTarget:
             asked = numbers("frequencies", self.frequencies, count).tolist()
         if not set(asked) <= set(nominal) or len(set(asked)) < len(asked):
             listed = ", ".join(f"{frequency:g}" for frequency in nominal)
-            message = (
-                f"target: frequencies = {self.frequencies!r} are not allowed; "
-                f"allowed: nominal mid frequencies of {self.bands} bands, {listed}"
+            refuse(
+                f"target: frequencies = {self.frequencies!r} are not allowed",
+                f"nominal mid frequencies of {self.bands} bands, {listed}",
             )
-            raise InputError(message)
         levels = numbers("levels", self.levels, len(asked))
         deviation = np.ones_like(levels)
         if self.uncertainty is not None:
@@ -75,8 +74,7 @@ class LevelTarget:
         extra = {"contact_time": self.contact_time, "restitution": self.restitution}
         known = {name: numbers(name, pair, 2) for name, pair in extra.items() if pair is not None}
         if known and self.uncertainty is None:
-            message = "target: uncertainty of the levels is missing; allowed: dB, above 0"
-            raise InputError(message)
+            refuse("target: uncertainty of the levels is missing", "dB, above 0")
         target = np.concatenate([levels, [pair[0] for pair in known.values()]])
         deviation = np.concatenate([deviation, [pair[1] for pair in known.values()]])
         for value in deviation.tolist():
@@ -84,11 +82,9 @@ class LevelTarget:
         return LevelMisfit(self, [nominal.index(f) for f in asked], target, deviation, list(known))
 
 
-class LevelMisfit:
-    """How far levels of an impact are from a target; see `Misfit`."""
+class LevelMisfit(Misfit):
+    """How far levels of an impact are from a target."""
 
-    free_shift = False
-    unit_deviation = 1.0
     deviation_unit = "dB"
 
     def __init__(
@@ -114,14 +110,6 @@ class LevelMisfit:
         """Return model minus target over standard deviation, shape (size,)."""
         return (self.values(impact) - self.target) / self.deviation
 
-    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:  # noqa: ARG002
-        """Return zeros: levels do not know of time."""
-        return np.zeros(self.size)
-
-    def first_shift(self, impact: Impact) -> float:  # noqa: ARG002
-        """Return zero: levels do not know of time."""
-        return 0.0
-
     def target_vector(self) -> NDArray[np.float64]:
         """Return the target over standard deviation, shape (size,)."""
         return self.target / self.deviation
@@ -138,7 +126,3 @@ class LevelMisfit:
             "model": model.tolist(),
             "residual": (model - self.target).tolist(),
         }
-
-    def doubt(self, impact: Impact, shift: float, count: int) -> str:  # noqa: ARG002
-        """Return nothing: levels do not tell where noise ends and the model's error begins."""
-        return ""

@@ -2,59 +2,68 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Protocol
+from abc import ABC, abstractmethod
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from thud.checks import require_number, shown
-from thud.errors import InputError
+from thud.checks import require_number
+from thud.studies.checks import refuse_value
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import NDArray
 
     from thud.impact import Impact
 
 
-class Misfit(Protocol):
-    """How far an impact is from the target, in standard deviations."""
+class Misfit(ABC):
+    """How far an impact is from the target, in standard deviations.
 
-    @property
-    def size(self) -> int:
-        """Number of residuals."""
+    Attributes
+    ----------
+    size : int
+        Number of residuals.
+    known_noise : bool
+        The standard deviations were given; else their common factor is estimated.
+    free_shift : bool
+        The time of first touch is not known.
+    unit_deviation : float
+        Unit of the residuals: the noise of forces, N; 1 for levels.
+    deviation_unit : str
+        Unit of an estimated standard deviation.
+    """
 
-    @property
-    def known_noise(self) -> bool:
-        """The standard deviations were given; else their common factor is estimated."""
+    size: int
+    known_noise: bool
+    free_shift: bool = False
+    unit_deviation: float = 1.0
+    deviation_unit: ClassVar[str]
 
-    @property
-    def free_shift(self) -> bool:
-        """The time of first touch is not known."""
-
-    @property
-    def unit_deviation(self) -> float:
-        """What residuals are measured in: the noise of forces, N; 1 for levels."""
-
-    @property
-    def deviation_unit(self) -> str:
-        """Unit of a standard deviation that is estimated."""
-
+    @abstractmethod
     def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:
         """Return model minus target over standard deviation, shape (size,)."""
 
-    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:
-        """Return the derivative of the residual with the time of first touch, 1/s."""
-
-    def first_shift(self, impact: Impact) -> float:
-        """Return a time of first touch to start from, s."""
-
+    @abstractmethod
     def target_vector(self) -> NDArray[np.float64]:
         """Return the target over standard deviation, shape (size,)."""
 
-    def columns(self, impact: Impact, shift: float) -> dict[str, list[object]]:
+    @abstractmethod
+    def columns(self, impact: Impact, shift: float) -> Mapping[str, Sequence[object]]:
         """Return target and model side by side, SI units, dB: columns by their names."""
 
-    def doubt(self, impact: Impact, shift: float, count: int) -> str:
-        """Return what speaks against the model with so many parameters, or nothing."""
+    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:
+        """Return the derivative of the residual by the time of first touch, 1/s."""
+        raise NotImplementedError
+
+    def first_shift(self, impact: Impact) -> float:
+        """Return a time of first touch to start from, s."""
+        raise NotImplementedError
+
+    def doubt(self, impact: Impact, shift: float, count: int) -> str:  # noqa: ARG002
+        """Return what `count` parameters cannot explain, or nothing."""
+        return ""
 
 
 def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
@@ -64,22 +73,12 @@ def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
     except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != (count,) or not np.isfinite(array).all():
-        message = f"target: {name} = {shown(values)} is not allowed; allowed: {count} real numbers"
-        raise InputError(message)
+        refuse_value(f"target: {name}", values, f"{count} real numbers")
     return array
-
-
-def require_choice(name: str, value: object, allowed: tuple[str, ...]) -> None:
-    """Raise InputError where a word is not one of those that are allowed."""
-    if value not in allowed:
-        listed = ", ".join(map(repr, allowed))
-        message = f"target: {name} = {value!r} is not known; allowed: {listed}"
-        raise InputError(message)
 
 
 def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - that is the question
     """Raise InputError where a value is no number above 0."""
     require_number(f"target: {name}", value)
     if not value > 0:
-        message = f"target: {name} = {value!r} is not allowed; allowed: numbers above 0, {unit}"
-        raise InputError(message)
+        refuse_value(f"target: {name}", value, f"numbers above 0, {unit}")

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
-# Relative step of the central differences. The forces are smooth to 1e-13, but samples at which
-# contact ends or begins bend them: 1e-3 would step over such bends, 1e-5 hardly ever does, and its
-# derivatives hold to 1e-7 (of a ball with rising loss factor, whose contact flickers, to 3e-3).
+# Relative step of the central differences. The forces are smooth to 1e-13, but have kinks where a
+# sample enters or leaves the contact: 1e-3 would step over these, 1e-5 rarely does, and derivatives
+# are accurate to 1e-7 (with a rising loss factor, where contact is intermittent, to 3e-3).
 STEP = 2e-5
-# What a shift in time is measured in, s.
+# Scale of a shift in time, s.
 SHIFT_SCALE = 1e-3
 
 
@@ -85,7 +85,7 @@ class Objective:
     def _column(
         self, place: NDArray[np.float64], i: int, step: float, here: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """Return the derivative with one parameter; of one side where the other is impossible."""
+        """Return the derivative by one parameter; one-sided where the other side is impossible."""
         ends = []
         for beside in (min(place[i] + step, self.high[i]), max(place[i] - step, self.low[i])):
             other = place.copy()

@@ -12,6 +12,7 @@ from thud._schema import KEYS
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.keys import limits, put
+from thud.studies.checks import refuse
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
     from thud.key import Key
     from thud.studies.parameter import Parameter
 
-# A start that lies on a limit is moved away from it by this part of itself.
+# A start at a limit is moved away from it by this part of itself.
 INSIDE = 0.01
-# A limit of the library that is this much larger than the start does not guide the search.
+# Limits of the library that exceed the start by this factor are ignored.
 FAR = 10.0
 # Other starts lie within this factor of the first where no limits are given.
 SPREAD = 2.0
@@ -29,18 +30,10 @@ SPREAD = 2.0
 
 @dataclass(frozen=True)
 class Range:
-    """A parameter with everything that the search needs, SI units.
+    """Start and limits of a parameter of a fit, SI units.
 
-    Attributes
-    ----------
-    name, unit : str
-        Name of the key, with the place in brackets where it takes a list; its unit.
-    start, low, high : float
-        Start and limits of the search.
-    scale : float
-        What the parameter is measured in: its start, or a tenth of the range where that is 0.
-    spread : tuple of float
-        Between these lie other starts.
+    `scale` divides it in the search: its start, or a tenth of the range where that is 0. Further
+    starts lie within `spread`.
     """
 
     name: str
@@ -53,14 +46,13 @@ class Range:
 
 
 def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
-    """Return key and value of everything that can be fitted, by name.
+    """Return key and value of all parameters that can be fitted, by name.
 
     Entries of lists are counted from 1, as in a namelist: ``"frequency(1)"``.
     """
     model = case.model
     if model is None:
-        message = "&model is missing; allowed: a case with a source model"
-        raise InputError(message)
+        refuse("&model is missing", "a case with a source model")
     found: dict[str, tuple[Key, float]] = {}
     for key in KEYS:
         if key.group not in {"ball", "drop"} and key.owner != model.name:
@@ -79,53 +71,33 @@ def with_values(case: Case, values: Mapping[str, float]) -> Case:
 
 
 def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
-    """Return a parameter of a fit.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be fitted; lists those that can.
-    """
+    """Return a parameter of a fit. Raises InputError where it cannot be fitted."""
     known = known_parameters(case)
     if name not in known:
         model = case.model.name if case.model else ""
-        message = (
-            f"[parameters] {name} is not a parameter of {model} that can be fitted; "
-            f"allowed: {', '.join(known)}"
+        refuse(
+            f"[parameters] {name} is not a parameter of {model} that can be fitted",
+            ", ".join(known),
         )
-        raise InputError(message)
     return fitted(name, given, case.model.name)  # type: ignore[union-attr]
 
 
 def bound_parameters(
     case: Case, parameters: Iterable[str] | Mapping[str, Parameter | float | None]
 ) -> tuple[Parameter, ...]:
-    """Return the parameters that a fit is called with.
-
-    Raises
-    ------
-    InputError
-        Where there is none, or one cannot be fitted.
-    """
+    """Return the parameters of a call of `thud.fit`."""
     require_kind("parameters", parameters, Iterable)
     if isinstance(parameters, str):
         parameters = [parameters]
     if not isinstance(parameters, Mapping):
         parameters = dict.fromkeys(parameters)
     if not parameters:
-        message = f"parameters: none is given; allowed: {', '.join(known_parameters(case))}"
-        raise InputError(message)
+        refuse("parameters: none is given", ", ".join(known_parameters(case)))
     return tuple(fitted_parameter(name, given, case) for name, given in parameters.items())
 
 
 def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
-    """Return start, limits and scale of the parameters of a fit.
-
-    Raises
-    ------
-    InputError
-        Where start and limits do not fit together.
-    """
+    """Return ranges of parameters. Raises InputError where start and limits do not fit together."""
     found = list(parameters)
     # Ends of ranges that are other keys are those at the start.
     begin = with_values(case, {p.name: p.start for p in found if p.start is not None})
@@ -133,7 +105,6 @@ def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
 
 
 def _get_range(case: Case, given: Parameter) -> Range:
-    """Return start, limits and scale of one parameter of a case that has the starts."""
     name, key = given.name, given.key
     start = float(known_parameters(case)[name][1])
     lower, upper = limits(key, case)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -29,11 +29,13 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
 
 SHIFT = "time_shift"
+# By parameter: name of a unit, and how many SI units it is.
+Units: TypeAlias = "Mapping[str, tuple[str, float]]"
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """Parameters of a model that fit a target best, and how well they are known; SI units.
+    """The best parameters of a model for a target, and their uncertainty; SI units.
 
     Attributes
     ----------
@@ -48,7 +50,7 @@ class Fit:
     limits : ndarray, shape (n, 2)
         Low and high limit of the search for each; infinite where there is none.
     singular_values : ndarray, shape (n,)
-        Singular values of the Jacobian with columns of unit length, the largest first.
+        Singular values of the Jacobian with columns of unit length, in descending order.
     confidence : float
         Confidence of the intervals in tables and files.
     noise : float
@@ -63,13 +65,13 @@ class Fit:
     converged : bool
         The search has converged.
     warnings : tuple of str
-        Parameters that are not identifiable or at their limits, and other doubts, as sentences.
+        Parameters that are not identifiable or at their limits, and a poor model, as sentences.
     case : Case
         The case with the fitted values.
     impact : Impact
         Its impact.
     misfit : Misfit
-        The target as the fit saw it.
+        The comparison of target and impact.
     """
 
     names: tuple[str, ...]
@@ -129,53 +131,29 @@ class Fit:
     def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
         """Return confidence intervals by name, Student's t where the noise is estimated.
 
-        They end at the limits of the search: values beyond were ruled out beforehand.
-
-        Parameters
-        ----------
-        confidence
-            By default that of the fit.
+        They end at the limits of the search. `confidence` is by default that of the fit.
         """
-        factor = self._coverage_factor(confidence)
-        return {
-            name: (max(value - factor * error, low), min(value + factor * error, high))
-            for (name, value), error, (low, high) in zip(
-                self.values.items(),
-                self.standard_errors.values(),
-                self.limits.tolist(),
-                strict=True,
-            )
-        }
-
-    def _coverage_factor(self, confidence: float | None = None) -> float:
-        """Return how many standard errors an interval reaches."""
         freedom = None if self.known_noise else self.degrees_of_freedom
-        return coverage_factor(self.confidence if confidence is None else confidence, freedom)
+        factor = coverage_factor(self.confidence if confidence is None else confidence, freedom)
+        half = factor * np.sqrt(np.diag(self.covariance))
+        low = np.maximum(self.estimate - half, self.limits[:, 0]).tolist()
+        high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()
+        return dict(zip(self.names, zip(low, high, strict=True), strict=True))
 
-    def table(self, units: Mapping[str, tuple[str, float]] | None = None) -> str:
-        """Return the fit as text.
-
-        Parameters
-        ----------
-        units
-            Other units by parameter: name, and how many SI units it is.
-        """
+    def table(self, units: Units | None = None) -> str:
+        """Return the fit as text; `units` as in `shown_units`."""
         rows = [("parameter", "value", "standard error", f"{self.confidence:.0%} interval", "unit")]
         intervals = self.intervals()
         for name, (shown, factor) in self.shown_units(units).items():
             value, error = self.values[name] / factor, self.standard_errors[name] / factor
             low, high = (end / factor for end in intervals[name])
             digits = _digits(value, error)
-            interval = f"{low:.{digits}g} to {high:.{digits}g}"
-            if not np.isfinite(error):
-                interval = "not known"
+            interval = f"{low:.{digits}g} to {high:.{digits}g}" if np.isfinite(error) else "unknown"
             rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
         return "\n".join([format_rows(rows), "", *self._remarks()])
 
-    def shown_units(
-        self, units: Mapping[str, tuple[str, float]] | None = None
-    ) -> dict[str, tuple[str, float]]:
-        """Return the units of tables and figures: name, and how many SI units it is."""
+    def shown_units(self, units: Units | None = None) -> dict[str, tuple[str, float]]:
+        """Return name and SI factor of the unit of each parameter; `units` override the default."""
         handy = {
             name: handy_unit(unit, value)
             for (name, value), unit in zip(self.values.items(), self.units, strict=True)
@@ -186,26 +164,22 @@ class Fit:
         """Return the quality of the fit, one sentence per line."""
         kind = "given" if self.known_noise else "estimated from the residuals"
         unit = self.misfit.deviation_unit
-        # Those that are given with levels may differ from one to the next.
+        # Those given with levels may differ.
         several = self.known_noise and unit == "dB"
         size = "deviations" if several else f"deviation {self.noise:.3g} {unit},"
         freedom = self.degrees_of_freedom
         quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
         failures = f", {self.failures} of them impossible" if self.failures else ""
-        return [
-            (
-                f"{len(self.residuals)} data, {freedom} degrees of freedom{quality}; "
-                f"standard {size} {kind}"
-            ),
-            f"{self.evaluations} impacts computed{failures}",
-        ]
+        data = f"{len(self.residuals)} data, {freedom} degrees of freedom{quality}"
+        noise = f"standard {size} {kind}"
+        return [f"{data}; {noise}", f"{self.evaluations} impacts computed{failures}"]
 
     def __str__(self) -> str:
         """Return the fit as text, with its warnings."""
         return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
 
     def summary(self) -> dict[str, Any]:
-        """Return the numbers of the fit as JSON can hold them: what is not finite is None."""
+        """Return the numbers of the fit for JSON: None where they are not finite."""
         intervals = self.intervals()
         return {
             "version": version(),
@@ -234,20 +208,14 @@ class Fit:
             "warnings": list(self.warnings),
         }
 
-    def figures(self, units: Mapping[str, tuple[str, float]] | None = None) -> dict[str, Figure]:
+    def figures(self, units: Units | None = None) -> dict[str, Figure]:
         """Return the figures by name; `units` as in `table`."""
         from thud.plot import draw_fit  # noqa: PLC0415 - matplotlib takes its time
 
         return draw_fit(self, self.shown_units(units))
 
     def files(self, **extra: object) -> dict[str, bytes]:
-        """Return the content of ``fit.json``, ``fit.csv`` and ``fitted.nml``.
-
-        Parameters
-        ----------
-        **extra
-            What ``fit.json`` is to hold besides.
-        """
+        """Return ``fit.json``, with further entries, ``fit.csv`` and ``fitted.nml`` by name."""
         content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
         columns = self.misfit.columns(self.impact, self.time_shift)
         rows = [columns, *zip(*columns.values(), strict=True)]
@@ -260,32 +228,15 @@ class Fit:
     def save(
         self,
         directory: str | os.PathLike[str],
-        units: Mapping[str, tuple[str, float]] | None = None,
+        units: Units | None = None,
         *,
         figures: bool = True,
     ) -> list[Path]:
         """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
 
-        Older files of these names are replaced.
-
-        Parameters
-        ----------
-        directory
-            Where they are written.
-        units
-            Other units of the figures by parameter, as in `table`; files have SI units.
-        figures
-            Draw the figures too.
-
-        Returns
-        -------
-        list of Path
-            What was written.
-
-        Raises
-        ------
-        OSError
-            Where a file cannot be written.
+        Older files of these names are replaced; their paths are returned. `units` are those of the
+        figures, as in `shown_units`; files have SI units. Raises OSError where a file cannot be
+        written.
         """
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
@@ -293,12 +244,11 @@ class Fit:
 
 
 def _digits(value: float, error: float) -> int:
-    """Return how many digits show a value to two digits of its error."""
+    """Return the number of digits that shows a value to two digits of its error."""
     if not (np.isfinite(error) and error > 0 and value):
         return 6
     return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))
 
 
 def _finite(value: float) -> float | None:
-    """Return a number, or None for what is not finite."""
     return float(value) if np.isfinite(value) else None

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
-# Where steps and gains are this small, relative, the search ends.
+# Relative steps and gains at which the search ends.
 TOLERANCE = 1e-8
-# A parameter this close to a limit, relative, lies at it.
+# A parameter closer to a limit than this, relative, lies at it.
 AT_LIMIT = 1e-4
-# Half an interval, relative, from which little is known of a parameter.
+# Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
-# Probability of a residual as large as it is, below which the model does not explain the data.
+# Probability of the residual below which the model does not explain the data.
 UNLIKELY = 1e-3
 
 
@@ -47,18 +47,7 @@ def search(
 ) -> Fit:
     """Return the best fit of the parameters of a case.
 
-    Parameters
-    ----------
-    case
-        Everything that is not fitted.
-    ranges
-        The parameters.
-    misfit
-        The target.
-    options
-        Confidence of the intervals, starts, seed and maximum number of steps.
-    progress
-        Show how many impacts were computed.
+    `options` are confidence, starts, seed and max_steps of `thud.fit`.
     """
     _require_data(misfit, len(ranges) + misfit.free_shift)
     with tqdm(unit="impact", disable=not progress, leave=False) as bar:
@@ -69,7 +58,6 @@ def search(
 
 
 def _require_data(misfit: Misfit, count: int) -> None:
-    """Raise InputError where there are fewer data than parameters."""
     minimum = count if misfit.known_noise else count + 1
     if misfit.size < minimum:
         message = (
@@ -92,7 +80,7 @@ def _spread(ranges: list[Range], count: int, seed: int) -> Iterator[NDArray[np.f
 def _search(
     objective: Objective, starts: Iterator[NDArray[np.float64]], max_steps: int
 ) -> tuple[NDArray[np.float64], bool]:
-    """Return the best place from all starts, and whether the search has converged there."""
+    """Return the best place from all starts, and whether the search converged there."""
     best: OptimizeResult | None = None
     failures: list[ThudError] = []
     for start in starts:
@@ -109,7 +97,6 @@ def _search(
 
 
 def _descend(objective: Objective, start: NDArray[np.float64], max_steps: int) -> OptimizeResult:
-    """Return where the search from one start ends."""
     first = objective.impact(start)
     if first is None:
         message = f"the start cannot be computed: {objective.error}"
@@ -134,7 +121,6 @@ def _descend(objective: Objective, start: NDArray[np.float64], max_steps: int) -
 def _conclude(
     objective: Objective, place: NDArray[np.float64], confidence: float, *, converged: bool
 ) -> Fit:
-    """Return the fit at the place that the search has found."""
     residual = objective.residual(place)
     impact = objective.impact(place)
     if impact is None:
@@ -184,7 +170,7 @@ def _doubts(
     known: Inference,
     covariance: NDArray[np.float64],
 ) -> list[str]:
-    """Return what is doubtful about a fit, as sentences; covariance of relative values."""
+    """Return warnings of a fit; `covariance` is that of relative values."""
     found = []
     if not answer.converged:
         found.append("the search has not converged; allow more steps, or start elsewhere")
