@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from functools import wraps
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec, TypeVar, get_args
 
 import numpy as np
 
@@ -29,46 +29,51 @@ LARGEST = 10**300
 LARGEST_SEED = 2**32 - 1
 
 
+def refuse(what: str, allowed: str, cause: Exception | None = None) -> NoReturn:
+    """Raise InputError: what cannot be used, and what is allowed."""
+    message = f"{what}; allowed: {allowed}"
+    raise InputError(message) from cause
+
+
+def refuse_value(place: str, value: object, allowed: str) -> NoReturn:
+    """Raise InputError for a value."""
+    refuse(f"{place} = {shown(value)} is not allowed", allowed)
+
+
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
     """Raise InputError where an argument is not of a kind."""
     if not isinstance(value, kind):
         expected = getattr(kind, "__name__", None) or " or ".join(
             k.__name__ for k in get_args(kind)
         )
-        message = f"{name} = {shown(value)} is not allowed; allowed: an object of {expected}"
-        raise InputError(message)
+        refuse_value(name, value, f"an object of {expected}")
 
 
 def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
     """Raise InputError where a word is not one of those that are allowed."""
     choices = list(allowed)
     if not isinstance(value, str) or value not in choices:
-        message = f"{name} = {shown(value)} is not known; allowed: {', '.join(map(repr, choices))}"
-        raise InputError(message)
+        refuse(f"{name} = {shown(value)} is not known", ", ".join(map(repr, choices)))
 
 
 def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
     """Return an array; raise InputError where it is ragged, masked or of other dimensions."""
-    allowed = "allowed: one dimension" + (", or a scalar" if 0 in dimensions else "")
+    allowed = "one dimension" + (", or a scalar" if 0 in dimensions else "")
     try:
         array = np.asarray(values)
     except (TypeError, ValueError) as error:  # rows of different length
-        message = f"{name} is not an array of numbers; {allowed}"
-        raise InputError(message) from error
+        refuse(f"{name} is not an array of numbers", allowed, error)
     if array.ndim not in dimensions:
-        message = f"{name} has {array.ndim} dimensions; {allowed}"
-        raise InputError(message)
+        refuse(f"{name} has {array.ndim} dimensions", allowed)
     if np.ma.is_masked(values):
-        message = f"{name} has masked entries; allowed: values only"
-        raise InputError(message)
+        refuse(f"{name} has masked entries", "values only")
     return array
 
 
 def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
     """Return an array as float64; raise InputError where it holds other than real numbers."""
     if array.size and array.dtype.kind not in kinds:
-        message = f"{name} is not an array of real numbers; allowed: one dimension of them"
-        raise InputError(message)
+        refuse(f"{name} is not an array of real numbers", "one dimension of them")
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
@@ -76,10 +81,7 @@ def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: 
     """Raise InputError where a value is not a whole number from low to high."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not whole or not low <= value <= high:
-        message = (
-            f"{name} = {shown(value)} is not allowed; allowed: whole numbers from {low} to {high}"
-        )
-        raise InputError(message)
+        refuse_value(name, value, f"whole numbers from {low} to {high}")
 
 
 def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
@@ -88,8 +90,7 @@ def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the
         value, bool
     )
     if not number or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:
-        message = f"{name} = {shown(value)} is not allowed; allowed: finite numbers"
-        raise InputError(message)
+        refuse_value(name, value, "finite numbers")
 
 
 def shown(value: object) -> str:
@@ -108,8 +109,7 @@ def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> Non
         if word not in allowed:
             new = OLD_WORDS.get(word)
             what = f"is now {new!r}" if new in allowed else "is not known"
-            message = f"{place}: {word!r} {what}; allowed: {', '.join(allowed)}"
-            raise InputError(message)
+            refuse(f"{place}: {word!r} {what}", ", ".join(allowed))
 
 
 def refuse_old_words(function: Callable[P, R]) -> Callable[P, R]:

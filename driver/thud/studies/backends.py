@@ -18,10 +18,9 @@ from multiprocessing import connection, get_context, parent_process
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-from thud.checks import require_whole, shown
+from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
 from thud.ensemble import MAX_THREADS
 from thud.errors import NumericalError, ThudError
-from thud.studies.checks import refuse, refuse_value, require_choice
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:

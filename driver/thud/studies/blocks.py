@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from thud.checks import refuse
 from thud.files import replace_file, uninterrupted
-from thud.studies.checks import refuse
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case
+from thud.checks import refuse
 from thud.keys import DENSITY
-from thud.studies.checks import refuse
 from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume

@@ -9,9 +9,9 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
+from thud.checks import refuse
 from thud.errors import InputError
 from thud.files import lock, replace_file
-from thud.studies.checks import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

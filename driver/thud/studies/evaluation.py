@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from thud import _schema as schema
 from thud._api import version
+from thud.checks import refuse
 from thud.ensemble import solve_many
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS
-from thud.studies.checks import refuse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

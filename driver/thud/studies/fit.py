@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, Any, Unpack
 from thud.case import Case
 from thud.checks import (
     LARGEST_SEED,
+    refuse,
     refuse_old_words,
+    refuse_value,
     require_kind,
     require_number,
     require_whole,
@@ -20,7 +22,6 @@ from thud.checks import (
 from thud.columns import read_table
 from thud.errors import FitWarning
 from thud.recording import Recording
-from thud.studies.checks import refuse, refuse_value
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence

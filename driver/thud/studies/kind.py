@@ -6,8 +6,7 @@ import dataclasses
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
 
-from thud.checks import require_words
-from thud.studies.checks import refuse
+from thud.checks import refuse, require_words
 from thud.studies.directory import save, take
 from thud.studies.study import Study, read_common, read_tables
 

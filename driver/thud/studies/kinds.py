@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.studies.checks import refuse, require_choice
+from thud.checks import refuse, require_choice
 
 if TYPE_CHECKING:
     from types import ModuleType

@@ -10,10 +10,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import ndtri
 
-from thud.checks import LARGEST, require_number, require_whole, require_words, shown
+from thud.checks import (
+    LARGEST,
+    refuse,
+    refuse_value,
+    require_choice,
+    require_number,
+    require_whole,
+    require_words,
+    shown,
+)
 from thud.key import Key
 from thud.keys import Value, find_key
-from thud.studies.checks import refuse, refuse_value, require_choice
 from thud.units import power_of, scaled
 
 if TYPE_CHECKING:

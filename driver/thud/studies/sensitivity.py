@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 import xarray as xr
 
+from thud.checks import refuse
 from thud.levels import get_bands
-from thud.studies.checks import refuse
 from thud.studies.dataset import coordinate
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind

@@ -13,10 +13,10 @@ from tqdm import tqdm
 
 from thud._api import version
 from thud._schema import KEYS
+from thud.checks import refuse, require_choice
 from thud.keys import OF_FILES
 from thud.studies.backends import checked_backend, run_blocks
 from thud.studies.blocks import Blocks, read_identity, read_sweep, result_names
-from thud.studies.checks import refuse, require_choice
 from thud.studies.dataset import disk_space, grid_of, new_dataset
 from thud.studies.designs import read_design
 from thud.studies.directory import FORMATS

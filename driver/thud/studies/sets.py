@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.case import check_case
-from thud.checks import require_words
+from thud.checks import refuse, require_words
 from thud.ensemble import get_cost
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE
-from thud.studies.checks import refuse
 from thud.studies.designs import makers, unit_sets
 from thud.studies.parameter import checked
 from thud.studies.study import SHARES, Study, wall_volume

@@ -18,10 +18,9 @@ import numpy as np
 from thud._api import version
 from thud._schema import MODELS
 from thud.case import Case, check_case, new_model, read_case
-from thud.checks import require_kind, require_words
+from thud.checks import refuse, refuse_value, require_kind, require_words
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
-from thud.studies.checks import refuse, refuse_value
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:

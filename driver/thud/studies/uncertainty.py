@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from scipy.stats import binomtest
 
+from thud.checks import refuse
 from thud.levels import get_bands, octave_limits
-from thud.studies.checks import refuse
 from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:

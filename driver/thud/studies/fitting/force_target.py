@@ -9,9 +9,9 @@ import numpy as np
 from scipy import stats
 from scipy.signal import ZoomFFT
 
+from thud.checks import refuse, refuse_value, require_choice
 from thud.impact import FORCES, Impact
 from thud.recording import MIN_ROWS, Recording
-from thud.studies.checks import refuse, refuse_value, require_choice
 from thud.studies.fitting.misfit import Misfit, require_positive
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.checks import refuse, require_choice
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
-from thud.studies.checks import refuse, require_choice
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
 if TYPE_CHECKING:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from thud.checks import require_number
-from thud.studies.checks import refuse_value
+from thud.checks import refuse_value, require_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

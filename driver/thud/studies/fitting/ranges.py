@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._schema import KEYS
-from thud.checks import require_kind
+from thud.checks import refuse, require_kind
 from thud.errors import InputError
 from thud.keys import limits, put
-from thud.studies.checks import refuse
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
