@@ -65,7 +65,7 @@ contains
       character(len=*), intent(in) :: text
       logical :: yes
 
-      yes = scan(text(1:1), '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
+      yes = scan(text, '0123456789+-.') == 1 .and. verify(trim(text), '0123456789+-.eEdD') == 0
    end function is_number
 
    !> Sets the ends that depend on other keys.

@@ -16,7 +16,7 @@ module thud_many
    use thud_sampling, only: get_sample_count
    use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
-   use thud_text, only: join_quoted, quoted
+   use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
    private
 
@@ -194,24 +194,30 @@ contains
       !> Forces are wanted too.
       logical, intent(in) :: forces
       type(many_type), intent(inout) :: many
-      !> A key of all drops has a value out of range, forces are wanted of records of different length, or there is no
-      !> space in memory.
+      !> The case has no impact, a key of all drops has a value out of range, forces are wanted of records of different
+      !> length, or there is no space in memory.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
       integer, allocatable :: left(:)
       integer :: n_drop, i
 
       n_drop = size(values, 2)
+      if (.not. case%has_impact) then
+         error = input_error('the case computes no impact; allowed: a case with &model')
+         return
+      end if
       allocate (fields, source=get_active_fields(case))
       ! What every drop takes over from the case.
       call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
          .and. [(all(columns%place /= i), i=1, size(fields))]), error)
       if (allocated(error)) return
-      if (forces .and. any(fields(columns%place)%group == 'sampling')) then
+      if (forces .and. any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
+         i=1, size(columns))])) then
          error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
          return
       end if
-      call set_size(many, n_drop, merge(get_sample_count(case%sampling), 0, forces))
+      call set_size(many, n_drop, merge(get_sample_count(case%sampling), 0, forces), error)
+      if (allocated(error)) return
       left = [(i, i=1, n_drop)]
       if (suits_batch(case, columns)) then
          call solve_batch(case, columns, values, threads, many, error)
@@ -233,6 +239,8 @@ contains
 
          own = case
          allocate (fields, source=get_active_fields(own))
+         ! Nobody reads the free modes of a drop.
+         own%has_modes = .false.
          !$omp do schedule(dynamic)
          do drop = 1, size(left)
             call solve_one(own, fields, columns, values(:, left(drop)), left(drop), many)
@@ -243,18 +251,27 @@ contains
    end subroutine solve_many
 
    !> Space for the results of a number of drops.
-   subroutine set_size(many, n_drop, n_sample)
+   subroutine set_size(many, n_drop, n_sample, error)
       type(many_type), intent(inout) :: many
       integer, intent(in) :: n_drop
       !> Samples of the forces that are wanted.
       integer, intent(in) :: n_sample
+      !> There is no space in memory.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=128) :: message
+      integer :: status
 
-      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms, many%margin, many%verdict)
-      if (allocated(many%outcome)) deallocate (many%outcome, many%level, many%force)
+      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms, many%margin, many%verdict, &
+         many%outcome, many%level)
+      if (allocated(many%force)) deallocate (many%force)
       allocate (many%status(n_drop), many%reason(n_drop), many%outcome(outcome_count, n_drop), &
          many%level(size(many%bands), force_count, n_drop), many%conforms(force_count, n_drop), many%margin(n_drop), &
-         many%verdict(n_drop), &
-         many%force(n_sample, force_count, merge(n_drop, 0, n_sample > 0)))
+         many%verdict(n_drop))
+      allocate (many%force(n_sample, force_count, merge(n_drop, 0, n_sample > 0)), stat=status, errmsg=message)
+      if (status /= 0) then
+         error = input_error('the forces of '//to_text(n_drop)//' drops have no space in memory; allowed: fewer at a time')
+         return
+      end if
       many%conforms = .false.
       many%verdict = .false.
       many%margin = not_a_number

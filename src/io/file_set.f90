@@ -97,11 +97,12 @@ contains
       ! A writer killed from here on leaves files that are listed, but no marker.
       call add_names(place, names, error)
       if (allocated(error)) return
-      order = [character(len=name_length) :: names(size(names)), listed, names]
+      allocate (order, source=[character(len=name_length) :: names(size(names)), listed, names])
       do i = 1, merge(0, size(order), same)
          call remove_file(place//'/'//trim(order(i)))
       end do
-      order = [character(len=name_length) :: names, manifest]
+      deallocate (order)
+      allocate (order, source=[character(len=name_length) :: names, manifest])
       do i = 1, size(order)
          call rename_file(workspace//'/'//trim(order(i)), place//'/'//trim(order(i)), done)
          if (done) cycle

@@ -51,13 +51,14 @@ contains
       integer, intent(in) :: first, last
       type(many_type), intent(in) :: many
       character(len=:), allocatable, intent(out) :: text
-      !> Width of a number with its comma, and of all that is none.
-      integer, parameter :: number_width = 26, rest_width = 1024
+      !> Width of a number with its comma.
+      integer, parameter :: number_width = 26
       character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
-      character(len=number_width*(size(table%names) + outcome_count + size(many%level(:, :, 1))) + rest_width) :: row
+      character(len=number_width*(size(table%names) + outcome_count + size(many%level(:, :, 1))) &
+         + get_rest_width(many)) :: row
       integer :: i, j, at, end_of_text
 
-      allocate (character(len=(len(row) - rest_width + 64)*max(0, last - first + 1)) :: text)
+      allocate (character(len=(len(row) - get_rest_width(many) + 64)*max(0, last - first + 1)) :: text)
       end_of_text = 0
       do i = first, last
          row = to_text(before + i)
@@ -89,6 +90,20 @@ contains
       end do
       text = text(:end_of_text)
    end subroutine get_set_rows
+
+   !> Width of all that is no number: names, verdicts, and the longest reason with its quotes doubled.
+   pure function get_rest_width(many) result(width)
+      !> The results.
+      type(many_type), intent(in) :: many
+      !> The width.
+      integer :: width
+      integer :: i
+
+      width = 1024
+      do i = 1, size(many%reason)
+         if (allocated(many%reason(i)%text)) width = max(width, 1024 + 2*len(many%reason(i)%text))
+      end do
+   end function get_rest_width
 
    !> A sentence as a cell.
    pure function in_quotes(sentence) result(cell)

@@ -212,7 +212,7 @@ def test_other_version_is_reported() -> None:
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ({"backend": "gpu"}, "backend = 'gpu' is not known; allowed: threads, processes, dask"),
+        ({"backend": "gpu"}, "backend = 'gpu' is not known; allowed: 'threads', 'processes'"),
         ({"backend": "dask"}, "allowed: the address of a scheduler for dask"),
         ({"backend": "threads", "scheduler": "tcp://x:1"}, "and only there"),
         ({"workers": 0}, "workers = 0 is not allowed; allowed: whole numbers from 1"),

@@ -169,6 +169,12 @@ def test_invalid_sets_are_marked_and_leave_the_others() -> None:
     assert_same_bits(clean, ensemble, good, good)
 
 
+def test_forces_are_kept_of_records_of_one_length() -> None:
+    ensemble = thud.solve_many({"substeps": [1, 2]}, forces=True)
+    assert ensemble.elastic_force is not None
+    assert ensemble.elastic_force.shape == (2, thud.solve().force("elastic").size)
+
+
 def test_forces_of_invalid_sets_are_nan() -> None:
     ensemble = thud.solve_many({"height": [1.0, 900.0]}, forces=True)
     assert ensemble.elastic_force is not None

@@ -72,13 +72,13 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             thud.LevelTarget([39.0] * 5, bands="half"),
             ["mass"],
             {},
-            r"target: bands = 'half' is not known; allowed: octave, third$",
+            r"target: bands = 'half' is not known; allowed: 'octave', 'third'$",
         ),
         (
             thud.LevelTarget([39.0] * 5, force="gas"),
             ["mass"],
             {},
-            r"target: force = 'gas' is not known; allowed: elastic, floor$",
+            r"target: force = 'gas' is not known; allowed: 'elastic', 'floor'$",
         ),
         (
             thud.LevelTarget([39.0] * 5, restitution=(0.8, 0.1)),

@@ -221,6 +221,19 @@ def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) 
         assert level == pytest.approx(impact.levels(force="floor")[2], abs=1e-9)
 
 
+def test_long_reasons_are_given_whole(run: Run, case: Path, tmp_path: Path) -> None:
+    ratio = ", ".join(f"{0.1 + 1e-15 * i:.17f}" for i in range(64))
+    modes = (
+        f"&measured_modes damping_ratio = {ratio}, frequency = {ratio}, effective_mass = {ratio} /"
+    )
+    case.write_text(CASE.replace("hollow_sphere", "measured_modes") + modes)
+    (tmp_path / "table.csv").write_text("damping_ratio(64)\n0.05\n-1\n0.05\n")
+    assert run(case, "--sets", "table.csv", "-o", "out", "-q").returncode == 0
+    rows = rows_of(tmp_path / "out/sets.csv")
+    assert [row["set"] for row in rows] == ["1", "2", "3"]
+    assert len(rows[1]["reason"]) > 1024
+
+
 def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:
     lines = ["\ufeffheight,mass\r\n", "#" * 9000 + "\n", "1, 2.5\r\n", "\r\n", "1.5,2.4"]
     (tmp_path / "table.csv").write_text("".join(lines), encoding="utf-8", newline="")
