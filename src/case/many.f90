@@ -176,11 +176,20 @@ contains
       !> The results, which are given up.
       type(many_type), allocatable, intent(inout) :: many
 
-      if (allocated(many%outcome)) deallocate (many%outcome, many%level, many%force)
+      call clear(many)
       !$omp critical (thud_many)
       call move_alloc(many, kept)
       !$omp end critical (thud_many)
    end subroutine leave_many
+
+   !> Gives up the results of drops.
+   subroutine clear(many)
+      type(many_type), intent(inout) :: many
+
+      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms, many%margin, many%verdict, &
+         many%outcome, many%level)
+      if (allocated(many%force)) deallocate (many%force)
+   end subroutine clear
 
    !> Computes drops.
    subroutine solve_many(case, columns, values, threads, forces, many, error)
@@ -194,28 +203,14 @@ contains
       !> Forces are wanted too.
       logical, intent(in) :: forces
       type(many_type), intent(inout) :: many
-      !> The case has no impact, a key of all drops has a value out of range, forces are wanted of records of different
-      !> length, or there is no space in memory.
+      !> As of `check_drops`, or there is no space in memory.
       type(error_type), allocatable, intent(out) :: error
-      type(field_type), allocatable :: fields(:)
       integer, allocatable :: left(:)
       integer :: n_drop, i
 
       n_drop = size(values, 2)
-      if (.not. case%has_impact) then
-         error = input_error('the case computes no impact; allowed: a case with &model')
-         return
-      end if
-      allocate (fields, source=get_active_fields(case))
-      ! What every drop takes over from the case.
-      call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
-         .and. [(all(columns%place /= i), i=1, size(fields))]), error)
+      call check_drops(case, columns, forces, error)
       if (allocated(error)) return
-      if (forces .and. any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
-         i=1, size(columns))])) then
-         error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
-         return
-      end if
       call set_size(many, n_drop, merge(get_sample_count(case%sampling), 0, forces), error)
       if (allocated(error)) return
       left = [(i, i=1, n_drop)]
@@ -250,6 +245,34 @@ contains
 
    end subroutine solve_many
 
+   !> Refuses drops that cannot be computed together.
+   subroutine check_drops(case, columns, forces, error)
+      type(case_type), intent(in), target :: case
+      !> In what the drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
+      !> Forces are wanted.
+      logical, intent(in) :: forces
+      !> The case has no impact, a key of all drops has a value out of range, or forces are wanted of records of
+      !> different length.
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type), allocatable :: fields(:)
+      integer :: i
+
+      if (.not. case%has_impact) then
+         error = input_error('the case computes no impact; allowed: a case with &model')
+         return
+      end if
+      allocate (fields, source=get_active_fields(case))
+      ! What every drop takes over from the case.
+      call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
+         .and. [(all(columns%place /= i), i=1, size(fields))]), error)
+      if (allocated(error)) return
+      if (forces .and. any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
+         i=1, size(columns))])) then
+         error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
+      end if
+   end subroutine check_drops
+
    !> Space for the results of a number of drops.
    subroutine set_size(many, n_drop, n_sample, error)
       type(many_type), intent(inout) :: many
@@ -261,9 +284,7 @@ contains
       character(len=128) :: message
       integer :: status
 
-      if (allocated(many%status)) deallocate (many%status, many%reason, many%conforms, many%margin, many%verdict, &
-         many%outcome, many%level)
-      if (allocated(many%force)) deallocate (many%force)
+      call clear(many)
       allocate (many%status(n_drop), many%reason(n_drop), many%outcome(outcome_count, n_drop), &
          many%level(size(many%bands), force_count, n_drop), many%conforms(force_count, n_drop), many%margin(n_drop), &
          many%verdict(n_drop))

@@ -332,7 +332,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters = 3", r"parameters = 3 .*allowed: a table"),
         ("name = 'a/b'\nparameters.height.values = [1]", "name = 'a/b'.*without folders"),
         ("name = '..'\nparameters.height.values = [1]", r"name = '\.\.' .*without folders"),
-        ("format = 'csv'\nparameters.height.values = [1]", "allowed: auto, netcdf, zarr"),
+        ("format = 'csv'\nparameters.height.values = [1]", "allowed: 'auto', 'netcdf', 'zarr'"),
         ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere; allowed: outer"),
         ("parameters.loss_factor.values = [1]", "allowed: outer_radius, wall_thickness, mass"),
