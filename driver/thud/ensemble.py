@@ -20,6 +20,8 @@ from thud.keys import find_key
 from thud.levels import BANDWIDTHS, get_bands
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import ArrayLike, NDArray
 
     from thud._api import Bundle
@@ -181,7 +183,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     content = case_text(base)
     # Without parameters there is one drop, that of the case.
     columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
-    sizes = call(ensemble_api.size_many, content)
+    sizes = _sizes(content, columns)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
     work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
@@ -251,7 +253,7 @@ def _compute(  # noqa: PLR0913 - those of the library
     given = numbers if count else np.zeros((1, numbers.shape[1]))
     status, outcome, level, conforms, margin, verdict, force, *left = ensemble_api.drop_many(
         content,
-        ",".join(columns).encode("ascii", "replace"),
+        _joined(columns),
         given.T,
         threads,
         int(judged),
@@ -262,8 +264,8 @@ def _compute(  # noqa: PLR0913 - those of the library
         len(given) if forces else 1,
     )
     reason = np.full(len(given), "", dtype=object)
-    for number, sentence in collect(*left).items():
-        reason[int(number) - 1] = text(sentence)
+    sentences = text(collect(*left)["reasons"]).split("\n")
+    reason[status != 0] = sentences[:-1]
     found = {
         "status": status,
         "reason": reason,
@@ -277,9 +279,20 @@ def _compute(  # noqa: PLR0913 - those of the library
     return {name: values[:count] for name, values in found.items()}
 
 
-def get_cost(case: Case) -> float:
-    """Return the estimated time of one drop of many on one core, s."""
-    return float(call(ensemble_api.size_many, case_text(case))["cost"])
+def _sizes(content: bytes, keys: Iterable[str]) -> Bundle:
+    """Return the sizes of the results of drops that differ in some keys, and what one costs."""
+    names = list(keys)
+    return call(ensemble_api.size_many, content, _joined(names), len(names))
+
+
+def _joined(names: Iterable[str]) -> bytes:
+    """Return names as the library reads them."""
+    return ",".join(names).encode("ascii", "replace")
+
+
+def get_cost(case: Case, keys: Iterable[str]) -> float:
+    """Return the estimated time of one of many drops that differ in some keys, on one core, s."""
+    return float(_sizes(case_text(case), keys)["cost"])
 
 
 def _columns(

@@ -8,7 +8,7 @@ module thud_ensemble_api
    use thud_kinds, only: int64, wp
    use thud_many, only: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
    use thud_sampling, only: get_sample_count
-   use thud_text, only: split, to_text
+   use thud_text, only: newline, split
    implicit none (type, external)
    private
 
@@ -16,23 +16,27 @@ module thud_ensemble_api
 
 contains
 
-   !> Sizes of the results of many drops.
-   subroutine size_many(text, status, handle, n_byte, n_value)
+   !> Sizes of the results of many drops, and the time that each takes.
+   subroutine size_many(text, names, n_column, status, handle, n_byte, n_value)
       !f2py threadsafe
-      !> Text of a namelist file.
-      character(len=*), intent(in) :: text
+      !> Text of a namelist file; names of the keys in which the drops differ, with commas between.
+      character(len=*), intent(in) :: text, names
+      !> Number of these keys.
+      integer, intent(in) :: n_column
       !> Status, handle and sizes as in `leave`.
       integer, intent(out) :: status, n_byte, n_value
       integer(int64), intent(out) :: handle
       type(bundle_type), pointer :: bundle
       type(case_type), target :: case
+      type(column_type), allocatable :: columns(:)
       type(many_type) :: many
       type(error_type), allocatable :: error
 
       allocate (bundle)
       call read_case(text, 'python', case, error, unchecked=.true.)
+      if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
-         call new_many(case, .true., many)
+         call new_many(case, columns, .true., many)
          call bundle%add_number('outcome', real(outcome_count, wp))
          call bundle%add_number('band', real(size(many%bands), wp))
          call bundle%add_number('first_band', real(many%first_band, wp))
@@ -83,14 +87,13 @@ contains
       type(column_type), allocatable :: columns(:)
       type(many_type), allocatable :: many
       type(error_type), allocatable :: error
-      integer :: i
 
       allocate (bundle)
       call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
          call take_many(many)
-         call new_many(case, judged /= 0, many)
+         call new_many(case, columns, judged /= 0, many)
          call solve_many(case, columns, values, threads, n_kept == n_drop .and. n_sample > 1, many, error)
       end if
       if (.not. allocated(error)) then
@@ -101,12 +104,30 @@ contains
          margin = many%margin
          verdict = merge(1, 0, many%verdict)
          if (size(many%force) > 0) force = many%force
-         do i = 1, n_drop
-            if (allocated(many%reason(i)%text)) call bundle%add_text(to_text(i), many%reason(i)%text)
-         end do
+         call bundle%add_text('reasons', join_reasons(many))
          call leave_many(many)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine drop_many
+
+   !> The sentences of all drops that failed, a line for each.
+   pure function join_reasons(many) result(text)
+      type(many_type), intent(in) :: many
+      !> The sentences.
+      character(len=:), allocatable :: text
+      integer :: i, n
+
+      n = 0
+      do i = 1, size(many%reason)
+         if (allocated(many%reason(i)%text)) n = n + len(many%reason(i)%text) + 1
+      end do
+      allocate (character(len=n) :: text)
+      n = 0
+      do i = 1, size(many%reason)
+         if (.not. allocated(many%reason(i)%text)) cycle
+         text(n + 1:n + len(many%reason(i)%text) + 1) = many%reason(i)%text//newline
+         n = n + len(many%reason(i)%text) + 1
+      end do
+   end function join_reasons
 
 end module thud_ensemble_api

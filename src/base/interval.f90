@@ -22,8 +22,14 @@ module thud_interval
       character(len=expression_length) :: lower_expression = '', upper_expression = ''
    contains
       procedure :: contains => contains_value
+      procedure :: contains_sets
       procedure :: resolve
    end type interval_type
+
+   !> Value of an expression: for one set of values, or for many.
+   interface evaluate
+      module procedure evaluate_one, evaluate_sets
+   end interface evaluate
 
 contains
 
@@ -80,8 +86,36 @@ contains
       if (self%upper_expression /= '') self%upper = evaluate(self%upper_expression, keys, values)
    end subroutine resolve
 
-   !> Value of a product or quotient of numbers and keys; not within any range where a key is unknown.
-   pure function evaluate(expression, keys, values) result(value)
+   !> Whether values of one key, in many sets of the values of all keys, lie in the interval.
+   pure function contains_sets(self, key, keys, values) result(inside)
+      class(interval_type), intent(in) :: self
+      !> Number of the key.
+      integer, intent(in) :: key
+      !> Names of the keys: [n_key].
+      character(len=*), intent(in) :: keys(:)
+      !> Their values: [n_set, n_key].
+      real(wp), intent(in) :: values(:, :)
+      !> Whether they lie in it: [n_set].
+      logical :: inside(size(values, 1))
+      type(interval_type) :: one
+      real(wp), allocatable :: lower(:), upper(:)
+      integer :: i
+
+      allocate (lower(size(inside)), upper(size(inside)))
+      lower = self%lower
+      upper = self%upper
+      if (self%lower_expression /= '') lower = evaluate(self%lower_expression, keys, values)
+      if (self%upper_expression /= '') upper = evaluate(self%upper_expression, keys, values)
+      one = self
+      do i = 1, size(inside)
+         one%lower = lower(i)
+         one%upper = upper(i)
+         inside(i) = one%contains(values(i, key))
+      end do
+   end function contains_sets
+
+   !> Value for one set of values.
+   pure function evaluate_one(expression, keys, values) result(value)
       !> Such as `static_harmonics/2`.
       character(len=*), intent(in) :: expression
       !> Names of the keys: [n_key].
@@ -89,7 +123,24 @@ contains
       !> Their values: [n_key].
       real(wp), intent(in) :: values(:)
       real(wp) :: value
-      real(wp) :: operand
+      real(wp) :: only(1)
+
+      only = evaluate_sets(expression, keys, reshape(values, [1, size(values)]))
+      value = only(1)
+   end function evaluate_one
+
+   !> Value of a product or quotient of numbers and keys; not within any range where a key is unknown.
+   pure function evaluate_sets(expression, keys, values) result(value)
+      !> Such as `static_harmonics/2`.
+      character(len=*), intent(in) :: expression
+      !> Names of the keys: [n_key].
+      character(len=*), intent(in) :: keys(:)
+      !> Their values: [n_set, n_key].
+      real(wp), intent(in) :: values(:, :)
+      !> The values: [n_set].
+      real(wp) :: value(size(values, 1))
+      real(wp) :: operand(size(values, 1))
+      real(wp) :: number
       integer :: start, length, place, status
       character(len=len(expression)) :: word
       character(len=128) :: message
@@ -103,10 +154,11 @@ contains
          word = adjustl(expression(start:start + length - 1))
          place = findloc(keys == word, .true., dim=1)
          if (place > 0) then
-            operand = values(place)
+            operand = values(:, place)
          else
-            read (word, *, iostat=status, iomsg=message) operand
-            if (status /= 0) operand = ieee_value(operand, ieee_quiet_nan)
+            read (word, *, iostat=status, iomsg=message) number
+            if (status /= 0) number = ieee_value(number, ieee_quiet_nan)
+            operand = number
          end if
          if (operator == '*') value = value*operand
          if (operator == '/') value = value/operand
@@ -114,7 +166,7 @@ contains
          if (start > len(expression)) exit
          operator = expression(start - 1:start - 1)
       end do
-   end function evaluate
+   end function evaluate_sets
 
    !> Whether a value lies in the interval; NaN never does.
    elemental function contains_value(self, value) result(inside)

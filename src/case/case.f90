@@ -15,7 +15,7 @@ module thud_case
    implicit none (type, external)
    private
 
-   public :: case_type, check_case, get_active_fields, get_fields, get_model_number, new_case
+   public :: case_type, check_case, check_name, get_active_fields, get_fields, get_model_number, new_case
 
    !> Input of one run.
    type :: case_type

@@ -13,7 +13,7 @@ module thud_many
    use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_sampling, only: get_sample_count
+   use thud_sampling, only: check_sampling, get_sample_count
    use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_text, only: join_quoted, quoted, to_text
@@ -102,17 +102,20 @@ contains
       do i = 1, size(names)
          call split_name(names(i), key, columns(i)%entry, known)
          columns(i)%place = findloc(possible .and. fields%key == key, .true., dim=1)
+         nullify (list)
          known = known .and. columns(i)%place > 0
-         if (known) then
+         if (columns(i)%place > 0) then
             list => fields(columns(i)%place)%list_value
             if (associated(list)) then
-               known = columns(i)%entry >= 1 .and. columns(i)%entry <= list%count
+               known = known .and. columns(i)%entry >= 1 .and. columns(i)%entry <= list%count
             else
-               known = key == names(i)
+               known = known .and. key == names(i)
             end if
          end if
          if (.not. known) then
-            error = input_error(quoted(names(i))//' is not a known key; allowed: '//join_quoted(pack(fields%key, possible)))
+            error = input_error(quoted(names(i))//' is not a key of drops; allowed: '//join_quoted(pack(fields%key, possible)))
+            if (columns(i)%place > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
+               //' is not an entry of the list; allowed: '//key//'(1) to '//key//'('//to_text(list%count)//')')
          else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
             error = input_error(quoted(names(i))//' is given twice; allowed: once')
          end if
@@ -143,24 +146,25 @@ contains
    end subroutine split_name
 
    !> Prepares for many drops of a case.
-   subroutine new_many(case, judged, many)
+   subroutine new_many(case, columns, judged, many)
       type(case_type), intent(in), target :: case
+      !> In what the drops differ: [n_column].
+      type(column_type), intent(in) :: columns(:)
       !> Levels and verdicts are wanted.
       logical, intent(in) :: judged
       !> What is kept from an earlier call serves again where it fits.
       type(many_type), intent(inout) :: many
       type(projections_type) :: wanted
-      type(column_type) :: no_columns(0)
 
       call get_level_bands(case%bands, many%bands, many%first_band)
       many%judged = judged
       many%cost = case%models(get_model_number(case))%model%get_cost()
-      if (suits_batch(case, no_columns)) many%cost = batch_cost
+      if (suits_batch(case, columns)) many%cost = batch_cost
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
    end subroutine new_many
 
-   !> Takes what an earlier call has left, or starts afresh.
+   !> Takes what an earlier call has left, or an empty one.
    subroutine take_many(many)
       !> The results of an earlier call, or none.
       type(many_type), allocatable, intent(out) :: many
@@ -173,7 +177,7 @@ contains
 
    !> Keeps what the next call can use.
    subroutine leave_many(many)
-      !> The results, which are given up.
+      !> The results, which are released.
       type(many_type), allocatable, intent(inout) :: many
 
       call clear(many)
@@ -182,7 +186,7 @@ contains
       !$omp end critical (thud_many)
    end subroutine leave_many
 
-   !> Gives up the results of drops.
+   !> Releases the results of drops.
    subroutine clear(many)
       type(many_type), intent(inout) :: many
 
@@ -266,10 +270,12 @@ contains
       ! What every drop takes over from the case.
       call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &
          .and. [(all(columns%place /= i), i=1, size(fields))]), error)
-      if (allocated(error)) return
-      if (forces .and. any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
+      if (allocated(error) .or. .not. forces) return
+      if (any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
          i=1, size(columns))])) then
          error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
+      else
+         call check_sampling(case%sampling, error)
       end if
    end subroutine check_drops
 

@@ -1,8 +1,8 @@
 !> Cases as namelist files: reading, writing, and the description of all keys.
 module thud_case_text
-   use thud_case, only: case_type, check_case, get_active_fields, get_fields, new_case
+   use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, new_case
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, name_length
+   use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
@@ -47,7 +47,10 @@ contains
          call assign_group(groups(i), fields, error)
       end do
       if (allocated(error)) return
-      call check_use(groups, case, error)
+      ! What is done with an unchecked case hangs on these.
+      call check_fields(pack(fields, fields%group == 'model'), error)
+      if (.not. allocated(error)) call check_name(case%name, error)
+      if (.not. allocated(error)) call check_use(groups, case, error)
       if (present(unchecked)) then
          if (unchecked) return
       end if
@@ -62,17 +65,16 @@ contains
       !> Names the group and its line.
       type(error_type), allocatable, intent(out) :: error
       type(field_type), allocatable :: fields(:)
+      character(len=:), allocatable :: where
       integer :: i
 
       allocate (fields, source=get_active_fields(case))
       do i = 1, size(groups)
          if (any(fields%group == groups(i)%name)) cycle
-         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing ')
-         if (case%has_impact) then
-            error%message = error%message//'with &model: name = '//quoted(case%model)//'; allowed: &'//trim(case%model)
-         else
-            error%message = error%message//'with &modes alone; allowed: '//join_quoted(distinct(fields%group))
-         end if
+         where = '&modes alone'
+         if (case%has_impact) where = '&model: name = '//quoted(case%model)
+         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing with '//where &
+            //'; allowed: '//join_quoted(distinct(fields%group)))
          return
       end do
    end subroutine check_use

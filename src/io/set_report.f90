@@ -37,7 +37,7 @@ contains
       do j = 1, force_count
          text = text//','//trim(force_names(j))//'_conforms'
       end do
-      text = text//',status,reason'//newline
+      text = text//',margin_dB,conforms,status,reason'//newline
    end subroutine get_set_header
 
    !> Lines of the results, 17 digits; what could not be computed is left out.
@@ -78,9 +78,10 @@ contains
             do j = 1, force_count
                row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%conforms(j, i)))
             end do
-            row(len_trim(row) + 1:) = ',0,'//newline
+            write (row(len_trim(row) + 1:), numbers_form) many%margin(i)
+            row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%verdict(i)))//',0,'//newline
          else
-            row(at:) = repeat(',', outcome_count + size(many%level(many%first_band:, :, i)) + force_count + 1) &
+            row(at:) = repeat(',', outcome_count + size(many%level(many%first_band:, :, i)) + force_count + 3) &
                //to_text(many%status(i))//','//trim(in_quotes(many%reason(i)%text))//newline
          end if
          at = index(row, newline)

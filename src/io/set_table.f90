@@ -62,7 +62,9 @@ contains
       if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
          //'first line and one set in each of the others')
       if (.not. allocated(error)) then
-         call split_line(line, table%names)
+         call split_line(table, line, table%names, error)
+      end if
+      if (.not. allocated(error)) then
          call find_columns(case, table%names, table%columns, error)
          if (allocated(error)) error = line_error(table, error%message)
       end if
@@ -81,7 +83,7 @@ contains
       real(wp), intent(out) :: values(:, :)
       !> Number of drops that were read; fewer than fit at the end of the table.
       integer, intent(out) :: n_set
-      !> A line has the wrong number of values, or a value is none.
+      !> A line has the wrong number of values, or a value is not a number.
       type(error_type), allocatable, intent(out) :: error
       character(len=line_length) :: line
       character(len=cell_length), allocatable :: cells(:)
@@ -92,7 +94,8 @@ contains
       do while (n_set < size(values, 2))
          call next_line(table, line, there, error)
          if (allocated(error) .or. .not. there) return
-         call split_line(line, cells)
+         call split_line(table, line, cells, error)
+         if (allocated(error)) return
          if (size(cells) /= size(table%names)) then
             error = line_error(table, 'it has '//to_text(size(cells))//' values and the first line ' &
                //to_text(size(table%names))//' keys; allowed: one value for each key, with commas, semicolons, tabs or ' &
@@ -135,10 +138,13 @@ contains
    end subroutine next_line
 
    !> Cells of a line: the first of tab, semicolon and comma that it holds separates them, else blanks.
-   pure subroutine split_line(line, cells)
+   subroutine split_line(table, line, cells, error)
+      type(set_table_type), intent(in) :: table
       character(len=*), intent(in) :: line
       !> The cells, without blanks and quotes around them: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
+      !> There are too many, or one is too long.
+      type(error_type), allocatable, intent(out) :: error
       character(len=1), parameter :: tab = achar(9)
       character(len=len(line)) :: rest
       character(len=1) :: separator
@@ -155,8 +161,13 @@ contains
       allocate (cells(max_columns))
       n = 0
       at = 1
-      do while (at <= last + merge(1, 0, separator /= ' ') .and. n < max_columns)
+      do while (at <= last + merge(1, 0, separator /= ' '))
          length = index(rest(at:last)//separator, separator) - 1
+         if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
+            error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
+               //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
+            return
+         end if
          n = n + 1
          cells(n) = adjustl(rest(at:at + length - 1))
          at = at + length + 1
@@ -178,7 +189,7 @@ contains
       character(len=*), intent(in) :: word
       !> The value; of a choice its number, of a flag 0 or 1.
       real(wp), intent(out) :: value
-      !> The value is none.
+      !> It is not what the key takes.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: wanted
       character(len=128) :: message

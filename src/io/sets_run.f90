@@ -26,11 +26,11 @@ module thud_sets_run
 
    !> Summary of many sets.
    type :: tally_type
-      !> Sets, those that were computed, and those that conform by the force of the case.
+      !> Sets, those that were computed, and those that conform.
       integer :: sets = 0, computed = 0, conforming = 0
       !> Why the first of those failed that did.
       character(len=1024) :: failure = ''
-      !> Minimum and maximum contact time, s, and octave levels of that force, dB: [octave_count + 1, 2].
+      !> Minimum and maximum contact time, s, and octave levels of the force of the case, dB: [octave_count + 1, 2].
       real(wp) :: span(octave_count + 1, 2) = spread([huge(1.0_wp), -huge(1.0_wp)], 1, octave_count + 1)
    end type tally_type
 
@@ -83,7 +83,7 @@ contains
       end if
       if (outcome%remark /= '') outcome%remark = path//': '//outcome%remark
       outcome%conforms = tally%conforming == tally%sets
-      call describe(case, tally, outcome%table)
+      call describe(case, table, tally, outcome%table)
    end subroutine run_sets
 
    !> Computes and writes chunk after chunk.
@@ -94,7 +94,7 @@ contains
       integer, intent(in) :: threads
       type(result_directory_type), intent(inout) :: results
       type(tally_type), intent(out) :: tally
-      !> What went wrong before; or a value is none, the sampling cannot be used, the file cannot be written.
+      !> What went wrong before; or a value is not a number, the sampling cannot be used, the file cannot be written.
       type(error_type), allocatable, intent(inout) :: error
       type(many_type) :: many
       type(text_file_type) :: parts(threads)
@@ -102,7 +102,7 @@ contains
       character(len=:), allocatable :: text
       integer :: n, i
 
-      call new_many(case, .true., many)
+      call new_many(case, table%columns, .true., many)
       allocate (values(size(table%columns), get_chunk_size(many%cost, threads)))
       call begin_file(results, result_file, error)
       call get_set_header(table, many, text)
@@ -142,7 +142,7 @@ contains
    pure subroutine add(tally, many, force)
       type(tally_type), intent(inout) :: tally
       type(many_type), intent(in) :: many
-      !> Number of the force that the verdict is on.
+      !> Number of the force whose levels are summed up.
       integer, intent(in) :: force
       real(wp) :: values(octave_count + 1)
       integer :: i
@@ -154,7 +154,7 @@ contains
             cycle
          end if
          tally%computed = tally%computed + 1
-         if (many%conforms(force, i)) tally%conforming = tally%conforming + 1
+         if (many%verdict(i)) tally%conforming = tally%conforming + 1
          values = [many%outcome(1, i), many%level(:octave_count, force, i)]
          tally%span(:, 1) = min(tally%span(:, 1), values)
          tally%span(:, 2) = max(tally%span(:, 2), values)
@@ -162,8 +162,9 @@ contains
    end subroutine add
 
    !> What the screen shows.
-   subroutine describe(case, tally, text)
+   subroutine describe(case, table, tally, text)
       type(case_type), intent(in) :: case
+      type(set_table_type), intent(in) :: table
       type(tally_type), intent(in) :: tally
       character(len=:), allocatable, intent(out) :: text
       type(band_type) :: octaves(octave_count)
@@ -171,7 +172,12 @@ contains
 
       text = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline &
          //'  '//to_text(tally%sets)//' sets, '//to_text(tally%computed)//' computed, '//to_text(tally%conforming) &
-         //' conform to the limits of the '//trim(case%source)//' by the '//trim(case%level_force)//' force.'//newline
+         //' conform to '
+      if (any(table%names == 'source') .or. any(table%names == 'force')) then
+         text = text//'their limits.'//newline
+      else
+         text = text//'the limits of the '//trim(case%source)//' by the '//trim(case%level_force)//' force.'//newline
+      end if
       if (tally%computed == 0) return
       octaves = get_octaves()
       text = text//'  contact time  '//fixed(1.0e3_wp*tally%span(1, 1), 3)//' to '//fixed(1.0e3_wp*tally%span(1, 2), 3) &

@@ -13,6 +13,7 @@ import pytest
 
 import thud
 from thud.keys import put
+from thud.levels import SOURCES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -116,8 +117,8 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("", "table.csv: the table is empty"),
         ("# nothing\n\n", "table.csv: the table is empty"),
         ("height\n", "table.csv: the table has no sets"),
-        ("hieght\n1\n", "line 1: 'hieght' is not a known key; allowed: 'outer_radius'"),
-        ("height,\n1,2\n", "line 1: '' is not a known key"),
+        ("hieght\n1\n", "line 1: 'hieght' is not a key of drops; allowed: 'outer_radius'"),
+        ("height,\n1,2\n", "line 1: '' is not a key of drops"),
         ("height,mass,height\n1,2,1\n", "line 1: 'height' is given twice"),
         ("height,mass\n1,2\n1\n", "line 3: it has 1 values and the first line 2 keys"),
         ("height,mass\n1,2,3\n", "line 2: it has 3 values and the first line 2 keys"),
@@ -128,6 +129,8 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("height,mass\n1,\n", "line 2: mass = '' is not a number"),
         ("height,mass\nnan,2\n", "line 2: height = 'nan' is not a number"),
         ("height,momentum_flux\n1,all\n", "line 2: momentum_flux = 'all' is not allowed"),
+        ("height\n1." + "0" * 70 + "e-1\n", "line 2: it has too many values or one that is too"),
+        ("height\n" + "1," * 300 + "1\n", "line 2: it has too many values or one that is too"),
         ("height\n1e400\n", "line 2: height = '1e400' is not a number"),
         ("height\n" + "1" * 5000 + "\n", "line 2: it is too long"),
         ("height,mass\n1" + " " * 5000 + ",99\n", "line 2: it is too long"),
@@ -232,6 +235,48 @@ def test_long_reasons_are_given_whole(run: Run, case: Path, tmp_path: Path) -> N
     rows = rows_of(tmp_path / "out/sets.csv")
     assert [row["set"] for row in rows] == ["1", "2", "3"]
     assert len(rows[1]["reason"]) > 1024
+
+
+def test_verdict_is_on_the_force_and_source_of_each_set(
+    run: Run, case: Path, tmp_path: Path
+) -> None:
+    # A rubber ball that conforms by its floor force alone.
+    ball = "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3"
+    rubber = "wall_thickness = 0.0244, youngs_modulus = 2.03e6"
+    case.write_text(CASE.replace("2.45", f"{ball}, {rubber}") + "&levels force = 'elastic' /\n")
+    lines = [f"{force},{source}" for force in ("elastic", "floor") for source in SOURCES]
+    (tmp_path / "table.csv").write_text("\n".join(["force,source", *lines]))
+    result = run(case, "--sets", "table.csv", "-o", "out")
+    rows = rows_of(tmp_path / "out/sets.csv")
+    base = thud.Case.from_text(case.read_text())
+    expected = []
+    for row in rows:
+        impact = thud.solve_case(base)
+        verdict = impact.conformity(row["source"], row["force"])
+        expected.append(verdict.conforms)
+        assert (float(row["margin_dB"]) >= 0) == verdict.conforms
+    assert [row["conforms"] == "yes" for row in rows] == expected
+    assert set(expected) == {True, False}
+    assert f"{sum(expected)} conform to their limits" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("&model name = 'foo' /", "&model: name = 'foo'"),
+        ("&model name = 'foo' / &hollow_sphere /", "&model: name = 'foo'"),
+        ("&model / &case name = '../x' /", "&case: name = '../x'"),
+    ],
+)
+def test_names_are_checked_before_any_set(
+    run: Run, case: Path, tmp_path: Path, text: str, sentence: str
+) -> None:
+    case.write_text(f"&ball / &drop / {text}")
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    result = run(case, "--sets", "table.csv")
+    assert result.returncode == 1
+    assert sentence in result.stderr
+    assert result.stderr.count("\n") == 1
 
 
 def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:

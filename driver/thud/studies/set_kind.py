@@ -181,7 +181,6 @@ def compute_sets(study: SetStudy, folder: Path | None, how: How) -> xr.Dataset:
 
 
 def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
-    case = study.valid_case
     for start in starts:
         columns = study.parameter_columns(start, min(start + size, study.count))
-        yield Block(start, case, study.key_columns(columns), version())
+        yield Block(start, study.case, study.key_columns(columns), version())

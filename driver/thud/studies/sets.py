@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.case import check_case
 from thud.checks import refuse, require_words
 from thud.ensemble import get_cost
-from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE
 from thud.studies.designs import makers, unit_sets
 from thud.studies.parameter import checked
-from thud.studies.study import SHARES, Study, wall_volume
+from thud.studies.study import Study, wall_volume
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.case import Case
     from thud.studies.parameter import Parameter
 
     Columns = dict[str, NDArray[Any]]
@@ -90,17 +86,8 @@ class SetStudy(Study):
     @property
     def block_size(self) -> int:
         """Number of sets that are computed together, the same for all backends."""
-        return max(1, round(_BLOCK_TIME / get_cost(self.valid_case)))
-
-    @property
-    def valid_case(self) -> Case:
-        """The case, or, if invalid without its parameters, the case with some values of them."""
-        for share in (None, *SHARES):
-            with suppress(InputError):
-                case = self.case if share is None else self.trial_case(share)
-                check_case(case)
-                return case
-        return self.case
+        keys = self.key_columns(self.parameter_columns(0, 1))
+        return max(1, round(_BLOCK_TIME / get_cost(self.case, keys)))
 
     def parameter_columns(self, start: int, stop: int) -> Columns:
         """Return sets `start` to `stop` - 1: values by parameter, units of keys, shape (n_set,)."""

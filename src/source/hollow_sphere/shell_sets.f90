@@ -9,7 +9,7 @@ module thud_shell_sets
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_error, only: error_type
-   use thud_field, only: field_type, key_length
+   use thud_field, only: field_type
    use thud_force_history, only: force_history_type, max_residual
    use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, &
       restitution_weights, solve_hollow_sphere
@@ -98,20 +98,10 @@ contains
       integer :: next(0:size(compression_weights)*max_class)
       integer :: class(size(sets))
       integer :: i, j
-      type(set_type), target :: any_set
-      type(field_type), allocatable :: fields(:)
-      type(interval_type), allocatable :: ranges(:)
-      character(len=key_length), allocatable :: keys(:)
-      logical, allocatable :: depends(:)
 
-      allocate (fields, source=get_set_fields(any_set))
-      ranges = [(new_interval(fields(i)%range), i=1, size(fields))]
-      keys = fields%key
-      ! Found here, because texts take longer to compare than numbers.
-      depends = ranges%lower_expression /= '' .or. ranges%upper_expression /= ''
+      call check_sets(sets, valid)
       next = 0
       do i = 1, size(sets)
-         valid(i) = is_valid(sets(i), keys, ranges, depends)
          if (.not. valid(i)) cycle
          class(i) = int(classes*(32 + log(get_rough_contact_time(sets(i)))/log(2.0_wp)))
          class(i) = min(max(class(i), 0), max_class - 1) + (sets(i)%flux - 1)*max_class
@@ -130,32 +120,29 @@ contains
       end do
    end subroutine get_blocks
 
-   !> Whether the values of a set lie inside their ranges.
-   pure function is_valid(set, keys, ranges, depends) result(inside)
-      type(set_type), intent(in) :: set
-      !> Names of its numbers: [n_key].
-      character(len=*), intent(in) :: keys(:)
-      !> Their ranges, whose ends may depend on the set: [n_key].
-      type(interval_type), intent(in) :: ranges(:)
-      !> The ends of a range depend on the set: [n_key].
-      logical, intent(in) :: depends(:)
-      logical :: inside
+   !> Whether the values of each set lie inside their ranges.
+   subroutine check_sets(sets, valid)
+      !> The sets: [n_set].
+      type(set_type), intent(in) :: sets(:)
+      !> Whether they do: [n_set].
+      logical, intent(out) :: valid(:)
+      type(set_type), target :: any_set
+      type(field_type), allocatable :: fields(:)
       type(interval_type) :: range
-      real(wp) :: values(size(keys))
+      real(wp), allocatable :: values(:, :)
       integer :: i
 
-      values = get_numbers(set)
-      inside = set%flux >= 1 .and. set%flux <= size(compression_weights)
-      do i = 1, size(keys)
-         if (depends(i)) then
-            range = ranges(i)
-            call range%resolve(keys, values)
-            inside = inside .and. range%contains(values(i))
-         else
-            inside = inside .and. ranges(i)%contains(values(i))
-         end if
+      allocate (fields, source=get_set_fields(any_set))
+      allocate (values(size(sets), size(fields)))
+      do i = 1, size(sets)
+         values(i, :) = get_numbers(sets(i))
       end do
-   end function is_valid
+      valid = sets%flux >= 1 .and. sets%flux <= size(compression_weights)
+      do i = 1, size(fields)
+         range = new_interval(fields(i)%range)
+         valid = valid .and. range%contains_sets(i, fields%key, values)
+      end do
+   end subroutine check_sets
 
    !> Half a period of the linear spring and the gas to third order, s: the amplitude from the energy,
    !> the period of a Duffing oscillator by harmonic balance. Good to 10 %, and alike for like sets.
