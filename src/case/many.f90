@@ -113,7 +113,8 @@ contains
             end if
          end if
          if (.not. known) then
-            error = input_error(quoted(names(i))//' is not a key of drops; allowed: '//join_quoted(pack(fields%key, possible)))
+            error = input_error(quoted(names(i))//' is not a key of drops; allowed: ' &
+               //join_quoted(pack(fields%key, possible)))
             if (columns(i)%place > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
                //' is not an entry of the list; allowed: '//key//'(1) to '//key//'('//to_text(list%count)//')')
          else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then

@@ -1,4 +1,4 @@
-!> The ball in motion: one step of explicit central differences after the other, and the books of
+!> The ball in motion: one step of explicit central differences after the other, and the balance of
 !> momentum and energy.
 module thud_impact_run
    use thud_ball, only: ball_type
@@ -48,7 +48,7 @@ module thud_impact_run
       real(wp) :: dissipated = 0.0_wp, stopped = 0.0_wp
       !> Time that the velocities have been driven for, s.
       real(wp) :: time = 0.0_wp
-      !> Energy lost by stopped nodes that the next step books, J.
+      !> Energy lost by stopped nodes that the next step adds, J.
       real(wp) :: half_stop = 0.0_wp
       !> Impulses of the floor on the nodes of the outer surface since the latest sample, N s: [0:n_polar].
       real(wp), allocatable :: node_impulse(:)

@@ -13,7 +13,7 @@ module thud_material
    private
 
    public :: check_material, get_material_fields, get_material_loss_factor, material_options_type, material_type, &
-      max_branches, new_material
+      new_material
 
    !> Maximum number of Maxwell branches.
    integer, parameter :: max_branches = 16

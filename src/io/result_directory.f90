@@ -324,7 +324,7 @@ contains
       character(len=*), intent(in) :: path
       type(error_type) :: error
 
-      error = input_error('--output '//path//' cannot be made; allowed: a directory that you may write to')
+      error = input_error('--output '//path//' cannot be used; allowed: a directory that you may write to')
    end function making_error
 
 end module thud_result_directory

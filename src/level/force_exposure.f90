@@ -90,11 +90,11 @@ contains
          error = input_error('the force has '//to_text(size(force))//' samples; allowed: 1 to '//to_text(max_samples))
       else if (.not. all(ieee_is_finite(force))) then
          error = input_error('the force holds a value that is not finite, first at sample ' &
-            //to_text(findloc(ieee_is_finite(force), .false., dim=1)))
+            //to_text(findloc(ieee_is_finite(force), .false., dim=1))//'; allowed: finite numbers')
       else if (.not. maxval(abs(force)) < sqrt(huge(1.0_wp)/real(size(force), wp))/sample_rate) then
-         error = input_error('the force is too large for its energy to be computed')
+         error = input_error('the force is too large for its energy to be computed; allowed: forces in N')
       else if (.not. sum(force**2) > min_energy) then
-         error = input_error('the force is zero throughout, or next to it, and has no level')
+         error = input_error('the force is zero throughout, or next to it, and has no level; allowed: a force that is not')
       end if
    end subroutine check_record
 

@@ -11,7 +11,7 @@ module thud_transform
 
    include 'fftw3.f03'
 
-   !> Lengths whose plans are kept, more only while more threads use them.
+   !> Lengths whose plans are kept, or as many as threads have used at once.
    integer, parameter :: kept_count = 16
 
    !> Maximum length of a transform whose plans are kept: longer ones take much memory.

@@ -7,7 +7,7 @@ module thud_force_history
    private
 
    public :: continue_to_zero, force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
-   public :: outcome_count, part_name_length, scalar_fields
+   public :: outcome_count, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.

@@ -16,7 +16,7 @@ module thud_hunt_crossley
    implicit none (type, external)
    private
 
-   public :: get_damping, get_stiffness, hunt_crossley_type
+   public :: get_damping, hunt_crossley_type
 
    !> Options of the model. Of stiffness and contact time one is given, of damping and
    !> restitution at most one; 0 means not given.

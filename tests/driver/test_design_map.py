@@ -175,7 +175,7 @@ def test_places_without_results_stay_empty() -> None:
     ],
 )
 def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
-    with pytest.raises(thud.InputError, match="are no map; allowed: two numeric ones"):
+    with pytest.raises(thud.InputError, match="do not make a map; allowed: two numeric ones"):
         thud.design_map({"parameters": parameters})
 
 

@@ -85,7 +85,7 @@ def test_changed_input_of_the_same_case_replaces_its_results(
 def test_directory_that_cannot_be_made_is_told(run: Run, case_file: CaseFile, place: str) -> None:
     result = run(case_file(MINIMAL), "-o", place)
     assert result.returncode == 1
-    assert f"--output {place} cannot be made; allowed: " in result.stderr
+    assert f"--output {place} cannot be used; allowed: " in result.stderr
 
 
 @pytest.mark.parametrize("place", ["deep/er/out", "out/", ".//out///", "link", "link/", "link/out"])
@@ -323,14 +323,14 @@ def test_unwritable_directories_are_told(run: Run, case_file: CaseFile, tmp_path
     (tmp_path / "locked").chmod(0o500)
     result = run(case, "-o", "locked/new")
     assert result.returncode == 1
-    assert "--output locked/new cannot be made" in result.stderr
+    assert "--output locked/new cannot be used" in result.stderr
     # The directory itself may be written to.
     assert run(case, "-o", "locked/out").returncode == 0
     (tmp_path / "locked").chmod(0o700)
     (tmp_path / "locked/out").chmod(0o500)
     result = run(case, "-o", "locked/out")
     assert result.returncode == 1
-    assert "--output locked/out cannot be made" in result.stderr
+    assert "--output locked/out cannot be used" in result.stderr
     assert read_bytes(tmp_path / "locked/out") == before
     assert names_in(tmp_path / "locked") == ["out"]
 

@@ -158,7 +158,7 @@ def test_bad_tables_are_refused(
         (["--sets", "table.csv", "--threads", "0"], "'0' is not allowed; allowed: 1 to 1024"),
         (["--sets", "table.csv", "--threads", "2x"], "--threads = '2x' is not allowed"),
         (["--sets", "table.csv", "-o", "."], "--output . holds files of something else"),
-        (["--sets", "table.csv", "-o", "table.csv"], "--output table.csv cannot be made"),
+        (["--sets", "table.csv", "-o", "table.csv"], "--output table.csv cannot be used"),
     ],
 )  # fmt: skip
 def test_bad_arguments_are_refused(

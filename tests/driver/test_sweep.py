@@ -336,7 +336,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere; allowed: outer"),
         ("parameters.loss_factor.values = [1]", "allowed: outer_radius, wall_thickness, mass"),
-        ("parameters.height = 1", r"height = 1 is no table; allowed: values, low"),
+        ("parameters.height = 1", r"height = 1 is not a table; allowed: values, low"),
         ("parameters.height.values = []", r"values = \[\] is empty"),
         ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
         ("parameters.height.values = [inf]", "allowed: finite numbers"),
@@ -538,7 +538,7 @@ def test_missing_packages_are_reported(tmp_path: Path) -> None:
     command = [sys.executable, "-c", code, "sweep", "study.toml"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    sentence = "xarray is not installed; allowed: studies with pip install 'thud[studies]'"
+    sentence = "xarray is not installed; allowed: studies with pip install '.[studies]'"
     assert done.stderr == f"thud-driver: {sentence}\n"
 
 

@@ -149,7 +149,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
         from distributed.comm.registry import get_backend  # noqa: PLC0415
     except ModuleNotFoundError as error:
-        refuse(f"{error.name} is not installed", "pip install 'thud[studies,dask]'", error)
+        refuse(f"{error.name} is not installed", "pip install '.[studies,dask]'", error)
     try:
         # A client of an unknown kind of address would fail again when deleted.
         get_backend(parse_address(address)[0])

@@ -77,7 +77,7 @@ class DesignMapKind(SetKind[DesignMap]):
         """Return a study of two numeric parameters."""
         found = super().complete(study, given, folder)
         if len(found.parameters) != _AXES or not all(map(_is_axis, found.parameters)):
-            refuse("[parameters] are no map", "two numeric ones of two values or more")
+            refuse("[parameters] do not make a map", "two numeric ones of two values or more")
         return found
 
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:

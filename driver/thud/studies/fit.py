@@ -265,7 +265,7 @@ def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarg
     if not isinstance(name, str) or not name.strip():
         refuse_value("[target] file", name, "text in quotes")
     samples = read_table(folder / name)
-    Recording.from_arrays(samples, str(folder / name))  # refuses what is no recording
+    Recording.from_arrays(samples, str(folder / name))  # refuses what is not a recording
     return ForceTarget((samples[:, 0], samples[:, 1]), **options)
 
 

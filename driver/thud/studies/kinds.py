@@ -57,7 +57,7 @@ def load(module: str) -> ModuleType:
     try:
         return importlib.import_module(f"thud.studies.{module}")
     except ModuleNotFoundError as error:
-        refuse(f"{error.name} is not installed", "studies with pip install 'thud[studies]'", error)
+        refuse(f"{error.name} is not installed", "studies with pip install '.[studies]'", error)
 
 
 def get_kind(name: str) -> Kind[Any, Any]:

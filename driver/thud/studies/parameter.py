@@ -218,7 +218,7 @@ def _begin(
     if key.kind == "list" and entry is None:
         refuse(f"{place} is a list", f"one entry of it, such as {name + '(1)'!r}")
     if not isinstance(given, Mapping):
-        refuse(f"{place} = {shown(given)} is no table", f"{', '.join(words)}, unit")
+        refuse(f"{place} = {shown(given)} is not a table", f"{', '.join(words)}, unit")
     require_words(place, given, (*words, "unit"))
     unit = key.unit or "1" if given.get("unit") is None else given["unit"]
     return place, key, given, power_of(unit, key.unit, place)

@@ -126,7 +126,7 @@ def _text(source: Mapping[str, Any]) -> str:
     try:
         return json.dumps(source, default=_plain)
     except (TypeError, ValueError, RecursionError) as error:
-        refuse(f"the study is no text ({error})", "tables, lists, numbers and text", error)
+        refuse(f"the study is not a text ({error})", "tables, lists, numbers and text", error)
 
 
 def _plain(value: object) -> object:

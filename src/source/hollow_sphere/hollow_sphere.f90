@@ -201,15 +201,15 @@ contains
    end function get_flux_weight
 
    !> Whether a state is so far outside that not the shell has reached it but too long a step.
-   pure function is_wild(shell, state) result(wild)
+   pure function is_diverged(shell, state) result(diverged)
       class(shell_type), intent(in) :: shell
       !> State: [4].
       real(wp), intent(in) :: state(:)
       !> It is, or is not a number.
-      logical :: wild
+      logical :: diverged
 
-      wild = .not. abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp
-   end function is_wild
+      diverged = .not. abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp
+   end function is_diverged
 
    !> Error of a drop that closes the shell.
    function get_failure(self, drop, time, state) result(error)
@@ -221,7 +221,7 @@ contains
       real(wp), intent(in) :: state(:)
       type(error_type) :: error
 
-      if (is_wild(self, state)) then
+      if (is_diverged(self, state)) then
          error = coarse_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if

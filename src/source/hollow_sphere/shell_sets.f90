@@ -56,7 +56,7 @@ module thud_shell_sets
    end type set_outcome_type
 
    !> Residual of the balances of impulse and energy above which the single solver decides: the sums that
-   !> are taken here err by up to some twenty times as much as the single solver's.
+   !> are taken here have up to some twenty times the error of the single solver's.
    real(wp), parameter :: doubtful = 0.1_wp*max_residual
 
 contains

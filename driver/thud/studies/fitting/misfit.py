@@ -77,7 +77,7 @@ def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:
 
 
 def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - that is the question
-    """Raise InputError where a value is no number above 0."""
+    """Raise InputError where a value is not a number above 0."""
     require_number(f"target: {name}", value)
     if not value > 0:
         refuse_value(f"target: {name}", value, f"numbers above 0, {unit}")
