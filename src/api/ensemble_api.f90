@@ -87,6 +87,7 @@ contains
       type(column_type), allocatable :: columns(:)
       type(many_type), allocatable :: many
       type(error_type), allocatable :: error
+      character(len=:), allocatable :: reasons
 
       allocate (bundle)
       call read_case(text, 'python', case, error, unchecked=.true.)
@@ -104,17 +105,17 @@ contains
          margin = many%margin
          verdict = merge(1, 0, many%verdict)
          if (size(many%force) > 0) force = many%force
-         call bundle%add_text('reasons', join_reasons(many))
+         call join_reasons(many, reasons)
+         call bundle%add_text('reasons', reasons)
          call leave_many(many)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine drop_many
 
    !> The sentences of all drops that failed, a line for each.
-   pure function join_reasons(many) result(text)
+   pure subroutine join_reasons(many, text)
       type(many_type), intent(in) :: many
-      !> The sentences.
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       integer :: i, n
 
       n = 0
@@ -128,6 +129,6 @@ contains
          text(n + 1:n + len(many%reason(i)%text) + 1) = many%reason(i)%text//newline
          n = n + len(many%reason(i)%text) + 1
       end do
-   end function join_reasons
+   end subroutine join_reasons
 
 end module thud_ensemble_api

@@ -459,8 +459,8 @@ def test_numbers_of_numpy_are_numbers() -> None:
     ("study", "words"),
     [
         ({"fixed": {"mass": np.ones((9, 9))}}, r"mass = an object of list is not allowed"),
-        ({"fixed": {"mass": {1, 2}}}, r"no text \(an object of set\); allowed: tables"),
-        ({"fixed": {"mass": 10**5000}}, r"no text .*; allowed: tables"),
+        ({"fixed": {"mass": {1, 2}}}, r"not a text \(an object of set\); allowed: tables"),
+        ({"fixed": {"mass": 10**5000}}, r"not a text .*; allowed: tables"),
     ],
 )
 def test_bad_tables_are_reported(study: dict[str, Any], words: str) -> None:
