@@ -55,6 +55,10 @@ module thud_modal_ball
       real(wp) :: speed
       !> Energy that damping has taken, J.
       real(wp) :: loss = 0.0_wp
+      !> Workspace of a step: motion at its beginning, push of the floor on the modes: [n_mode].
+      real(wp), allocatable, dimension(:) :: old_q, old_v, push
+      !> Gaps between rings and floor, m: [n_ring].
+      real(wp), allocatable :: gap(:)
    end type state_type
 
 contains
@@ -209,7 +213,8 @@ contains
 
       height = ball%outer_radius*cos(get_ring_angles(size(height)))
       radius = ball%outer_radius*sin(get_ring_angles(size(radius)))
-      allocate (state%q, state%v, source=0*step%omega)
+      allocate (state%q, state%v, state%old_q, state%old_v, state%push, source=0*step%omega)
+      allocate (state%gap, mold=height)
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
       ! The ball has left for good when nothing touched for half a period of its slowest mode: its
@@ -263,12 +268,11 @@ contains
       real(wp), intent(out) :: impulse
       !> The contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
-      real(wp), dimension(size(step%omega)) :: old_q, old_v, push
-      real(wp) :: gap(size(height))
       integer :: n_mode
 
       n_mode = size(step%omega)
-      associate (q => state%q, v => state%v)
+      associate (q => state%q, v => state%v, old_q => state%old_q, old_v => state%old_v, push => state%push, &
+         gap => state%gap)
          old_q = q
          old_v = v
          q = step%qq*old_q + step%qv*old_v
