@@ -166,6 +166,9 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     require_kind("case", base, Case)
     if bands is not None:
         get_bands(bands)
+    if base.model is None and base.modes is not None and model is None:
+        message = "the case computes no impact; allowed: a case with a model, or model = its name"
+        raise InputError(message)
     sampling = base.sampling
     base = replace(
         base,
@@ -179,7 +182,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         limits=Limits(str(source)) if source is not None else base.limits,
     )
     if base.model is None or (model is not None and model != base.model.name):
-        base = replace(base, model=new_model(model or HollowSphere.name, {}))
+        base = replace(base, model=new_model(HollowSphere.name if model is None else model, {}))
     content = case_text(base)
     # Without parameters there is one drop, that of the case.
     columns, numbers = _columns(parameters or {"height": base.drop.height}, base)

@@ -116,7 +116,7 @@ contains
             error = input_error(quoted(names(i))//' is not a key of drops; allowed: ' &
                //join_quoted(pack(fields%key, possible)))
             if (columns(i)%place > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
-               //' is not an entry of the list; allowed: '//key//'(1) to '//key//'('//to_text(list%count)//')')
+               //' is not an entry of the list; allowed: '//trim(key)//'(1) to '//trim(key)//'('//to_text(list%count)//')')
          else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
             error = input_error(quoted(names(i))//' is given twice; allowed: once')
          end if
@@ -274,7 +274,7 @@ contains
       if (allocated(error) .or. .not. forces) return
       if (any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
          i=1, size(columns))])) then
-         error = input_error('forces of records of different length cannot be kept; allowed: one sampling for all')
+         error = input_error('forces are wanted of drops with their own sampling; allowed: one sampling for all, that of the case')
       else
          call check_sampling(case%sampling, error)
       end if

@@ -126,6 +126,8 @@ contains
       end do
       if (.not. allocated(error) .and. tally%sets == 0) error = input_error(trim(table%path) &
          //': the table has no sets; allowed: one in each line below the keys')
+      if (.not. allocated(error) .and. tally%computed == 0) error = input_error(trim(table%path)//': none of ' &
+         //to_text(tally%sets)//' sets has results, such as: '//trim(tally%failure))
    end subroutine write_sets
 
    !> Sets that are read, computed and written at a time: about half a second of work for each thread.

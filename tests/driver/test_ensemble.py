@@ -175,6 +175,12 @@ def test_forces_are_kept_of_records_of_one_length() -> None:
     assert ensemble.elastic_force.shape == (2, thud.solve().force("elastic").size)
 
 
+def test_case_without_impact_is_refused() -> None:
+    case = thud.Case(modes=thud.Modes(), model=None)
+    with pytest.raises(thud.InputError, match="the case computes no impact; allowed: a case with"):
+        thud.solve_many({"height": [1.0]}, case)
+
+
 def test_forces_of_invalid_sets_are_nan() -> None:
     ensemble = thud.solve_many({"height": [1.0, 900.0]}, forces=True)
     assert ensemble.elastic_force is not None
@@ -234,7 +240,7 @@ def test_scalars_and_defaults() -> None:
         ({}, {"substeps": 1.5}, "&sampling: substeps = 1.5 is not a whole number"),
         ({"density": 1.0}, {}, "'density' is a parameter of studies"),
         ({"bands": "third"}, {}, "bands"),
-        ({"duration": [0.05, 0.1]}, {"forces": True}, "records of different length"),
+        ({"duration": [0.05, 0.1]}, {"forces": True}, "with their own sampling"),
         ({}, {"bands": "fifth"}, "bands = 'fifth' is not known"),
         ({}, {"sample_rate": 10}, "&sampling: sample_rate = 10.0"),
         (

@@ -91,6 +91,17 @@ def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
     assert "nan" not in (tmp_path / "outputs/ball_sets/sets.csv").read_text().lower()
 
 
+def test_results_are_kept_where_no_set_has_any(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n0.5\n")
+    assert run(case, "--sets", "table.csv", "-o", "out", "-q").returncode == 0
+    before = (tmp_path / "out/sets.csv").read_bytes()
+    case.write_text(CASE.replace("2.45", "-1"))
+    result = run(case, "--sets", "table.csv", "-o", "out", "-q", "--check")
+    assert result.returncode == 1
+    assert "none of 2 sets has results, such as: &ball: mass = -1.0 is not" in result.stderr
+    assert (tmp_path / "out/sets.csv").read_bytes() == before
+
+
 def test_conforming_sets_are_counted(run: Run, case: Path, tmp_path: Path) -> None:
     case.write_text(CASE.replace("2.45", "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3")
                     + "&levels force = 'floor' /\n")  # fmt: skip
@@ -226,9 +237,8 @@ def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) 
 
 def test_long_reasons_are_given_whole(run: Run, case: Path, tmp_path: Path) -> None:
     ratio = ", ".join(f"{0.1 + 1e-15 * i:.17f}" for i in range(64))
-    modes = (
-        f"&measured_modes damping_ratio = {ratio}, frequency = {ratio}, effective_mass = {ratio} /"
-    )
+    modes = f"&measured_modes allow_mass_mismatch = .true., damping_ratio = {ratio}, "
+    modes += f"effective_mass = {ratio}, frequency = {', '.join(map(str, range(20, 84)))} /"
     case.write_text(CASE.replace("hollow_sphere", "measured_modes") + modes)
     (tmp_path / "table.csv").write_text("damping_ratio(64)\n0.05\n-1\n0.05\n")
     assert run(case, "--sets", "table.csv", "-o", "out", "-q").returncode == 0
