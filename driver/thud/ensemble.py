@@ -13,8 +13,14 @@ from tqdm import tqdm
 from thud._api import call, collect, ensemble_api, text
 from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
-from thud.checks import require_array, require_choice, require_kind, require_real, require_whole
-from thud.errors import InputError
+from thud.checks import (
+    refuse,
+    require_array,
+    require_choice,
+    require_kind,
+    require_real,
+    require_whole,
+)
 from thud.impact import FORCES
 from thud.keys import find_key
 from thud.levels import BANDWIDTHS, get_bands
@@ -167,8 +173,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     if bands is not None:
         get_bands(bands)
     if base.model is None and base.modes is not None and model is None:
-        message = "the case computes no impact; allowed: a case with a model, or model = its name"
-        raise InputError(message)
+        refuse("the case computes no impact", "a case with a model, or model = its name")
     sampling = base.sampling
     base = replace(
         base,
@@ -185,7 +190,19 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         base = replace(base, model=new_model(HollowSphere.name if model is None else model, {}))
     content = case_text(base)
     # Without parameters there is one drop, that of the case.
-    columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
+    try:
+        columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
+    except MemoryError as error:
+        refuse("the parameters do not fit in memory", "fewer sets", error)
+    shared = {
+        "sample_rate": sample_rate,
+        "duration": duration,
+        "substeps": substeps,
+        "source": source,
+    }
+    for name in columns:
+        if shared.get(name) is not None:
+            refuse(f"{name!r} is given twice", "once, as a parameter or as a keyword")
     sizes = _sizes(content, columns)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
@@ -206,8 +223,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         )
     except MemoryError as error:
         size = f"{len(numbers)} sets" + (f" of {sizes['sample']:.0f} samples" if forces else "")
-        message = f"forces = {forces} for {size} does not fit in memory; allowed: fewer sets"
-        raise InputError(message) from error
+        refuse(f"forces = {forces} for {size} does not fit in memory", "fewer sets", error)
     force = results["force"]
     return Ensemble(
         columns,
@@ -303,14 +319,12 @@ def _columns(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return one array per key, all of one length, and their numbers for the library."""
     if not isinstance(parameters, Mapping):
-        message = f"parameters = {parameters!r} is not allowed; allowed: arrays by their keys"
-        raise InputError(message)
+        refuse(f"parameters = {parameters!r} is not allowed", "arrays by their keys")
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, case.model.name)[0] for name in parameters]
     for key in keys:
         if key not in KEYS:
-            message = f"{key.name!r} is a parameter of studies; allowed: keys of the input"
-            raise InputError(message)
+            refuse(f"{key.name!r} is a parameter of studies", "keys of the input")
     given = [require_array(name, values, (0, 1)) for name, values in parameters.items()]
     numbers = [_numbers(key, array) for key, array in zip(keys, given, strict=True)]
     try:
@@ -318,8 +332,7 @@ def _columns(
         found = np.stack(np.broadcast_arrays(*map(np.atleast_1d, numbers)), axis=1)
     except ValueError as error:
         shapes = ", ".join(f"{name} {a.shape}" for name, a in zip(parameters, given, strict=True))
-        message = f"the arrays differ in length: {shapes}; allowed: one length, or scalars"
-        raise InputError(message) from error
+        refuse(f"the arrays differ in length: {shapes}", "one length, or scalars", error)
     return {name: a.copy() for name, a in zip(parameters, arrays, strict=True)}, found
 
 

@@ -47,7 +47,7 @@ def find_key(name: str, model: str) -> tuple[Key, int | None]:
         Where the model has no such key; lists its keys.
     """
     known = known_keys(model)
-    match = re.fullmatch(r"(\w+)(?:\(([1-9]\d{0,3})\))?", name)
+    match = re.fullmatch(r"(\w+)(?:\(([1-9]\d{0,3})\))?", str(name))
     key = known.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
         message = f"{name!r} is not a key of {model}; allowed: {', '.join(known)}"
