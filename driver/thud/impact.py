@@ -88,9 +88,10 @@ class Impact:
     contact_time : float
         Time from first touch to release, s.
     peak_force : float
-        Maximum elastic force, N.
-    peak_floor_force : float
-        Maximum force on the floor, N.
+        Maximum force on the floor, N; of finite elements of its part below 1.25 kHz, which a force
+        plate records.
+    peak_elastic_force : float
+        Maximum elastic force, N, likewise.
     max_deflection : float
         Maximum deflection, m.
     restitution : float
@@ -119,7 +120,7 @@ class Impact:
     impact_velocity: float
     contact_time: float
     peak_force: float
-    peak_floor_force: float
+    peak_elastic_force: float
     max_deflection: float
     restitution: float
     impulse: float
@@ -133,7 +134,7 @@ class Impact:
         model = self.case.model.name if self.case.model else ""
         return (
             f"<Impact, {model}: contact {1e3 * self.contact_time:.2f} ms, "
-            f"e {self.restitution:.3f}, peak {self.peak_floor_force:.0f} N>"
+            f"e {self.restitution:.3f}, peak {self.peak():.0f} N>"
         )
 
     @property
@@ -157,10 +158,21 @@ class Impact:
             raise AttributeError(message)
         return self.parts[name]
 
-    def force(self, kind: str = "elastic") -> NDArray[np.float64]:
-        """Return the ``"elastic"`` or the ``"floor"`` force, N, shape (n_sample,)."""
-        require_choice("force", kind, FORCES)
-        return self.elastic_force if kind == "elastic" else self.floor_force
+    def force(self, kind: str | None = None) -> NDArray[np.float64]:
+        """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
+
+        By default that which the case judges.
+        """
+        return self.elastic_force if self._is_elastic(kind) else self.floor_force
+
+    def peak(self, force: str | None = None) -> float:
+        """Return the maximum of a force, N; see `force` and `peak_force`."""
+        return self.peak_elastic_force if self._is_elastic(force) else self.peak_force
+
+    def _is_elastic(self, kind: str | None) -> bool:
+        chosen = kind or self.case.levels.force
+        require_choice("force", chosen, FORCES)
+        return chosen == "elastic"
 
     def levels(
         self, bands: str = "octave", method: str | None = None, force: str | None = None
@@ -174,10 +186,10 @@ class Impact:
         method
             ``"exact"`` or ``"fft"``; by default that of the case.
         force
-            ``"elastic"`` or ``"floor"``; by default that of the case.
+            ``"floor"`` or ``"elastic"``; by default that of the case.
         """
         return force_exposure_levels(
-            self.force(force or self.case.levels.force),
+            self.force(force),
             self.sample_rate,
             bands,
             method or self.case.levels.method,
@@ -191,14 +203,13 @@ class Impact:
         source
             ``"rubber_ball"`` or ``"tyre"``; by default that of the case.
         force
-            ``"elastic"`` or ``"floor"``; by default that of the case.
+            ``"floor"`` or ``"elastic"``; by default that of the case.
         """
-        kind = force or self.case.levels.force
         return judge(
-            self.levels(force=kind),
+            self.levels(force=force),
             self.contact_time,
             self.restitution,
-            peak_count(self.force(kind), self.sample_rate),
+            peak_count(self.force(force), self.sample_rate),
             self.case.ball.mass,
             self.case.drop.height,
             source or self.case.limits.source,

@@ -412,7 +412,7 @@ contains
       do i = 1, size(sets)
          associate (found => outcomes(i))
             many%status(i) = merge(0, 1, found%computed)
-            many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_floor_force, found%max_deflection, &
+            many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_elastic_force, found%max_deflection, &
                found%restitution, found%impulse]
          end associate
          if (many%judged .and. many%status(i) == 0) call judge(case, i, many)

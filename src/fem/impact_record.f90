@@ -112,7 +112,7 @@ contains
       ! Nodes that touch one by one make spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
-      history%peak_floor_force = history%peak_force
+      history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)

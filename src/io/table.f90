@@ -38,8 +38,8 @@ contains
             //scalar_row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
             //scalar_row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
             //scalar_row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp) &
-            //scalar_row('peak elastic force', history%peak_force, 1, 'N') &
-            //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
+            //scalar_row('peak elastic force', history%peak_elastic_force, 1, 'N') &
+            //scalar_row('peak floor force', history%peak_force, 1, 'N') &
             //scalar_row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
             //scalar_row('impulse', history%impulse, 3, 'N s') &
             //facts(history)//newline &

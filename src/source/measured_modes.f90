@@ -251,7 +251,7 @@ contains
       history%impulse_residual = abs(impulse - history%impulse)/history%impulse
       energy = sum(modes%mass)/2*history%impact_velocity**2
       history%energy_residual = abs(stored + loss - energy)/energy
-      history%peak_floor_force = history%peak_force
+      history%peak_elastic_force = history%peak_force
    end subroutine finish
 
 end module thud_measured_modes

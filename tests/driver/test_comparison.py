@@ -89,7 +89,7 @@ def test_recording_stands_beside_its_model(tmp_path: Path) -> None:
     assert recording.sample_rate == pytest.approx(44100)
     # The first percent of the force takes a few samples at either end.
     assert recording.contact_time == pytest.approx(impact.contact_time, abs=0.3e-3)
-    assert recording.peak_force == pytest.approx(impact.peak_floor_force, abs=3)
+    assert recording.peak_force == pytest.approx(impact.peak_force, abs=3)
     np.testing.assert_allclose(recording.levels(), impact.levels(force="floor"), atol=0.1)
     rows = thud.compare({"model": impact, "plate": recording}).table()
     assert rows[1][3] == "not known"

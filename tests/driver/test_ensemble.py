@@ -76,7 +76,7 @@ def test_equals_the_single_solver() -> None:
             thirds = impact.levels("third", force=force)
             np.testing.assert_allclose(getattr(ensemble, f"{force}_octaves")[i], levels, atol=1e-6)
             np.testing.assert_allclose(ensemble.levels[force, "third"][i], thirds, atol=1e-6)
-        for name in ("contact_time", "peak_force", "peak_floor_force", "max_deflection",
+        for name in ("contact_time", "peak_force", "peak_elastic_force", "max_deflection",
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
         assert ensemble.conforms[i] == bool(impact.conformity())

@@ -63,7 +63,7 @@ def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> N
     assert [row["momentum_flux"] for row in rows] == list(flux)
     for name, values in {
         "contact_time_s": expected.contact_time,
-        "peak_force_N": expected.peak_force,
+        "peak_elastic_force_N": expected.peak_elastic_force,
         "impulse_N_s": expected.impulse,
         "elastic_octave_31.5_Hz_dB": expected.elastic_octaves[:, 0],
         "floor_octave_500_Hz_dB": expected.floor_octaves[:, 4],

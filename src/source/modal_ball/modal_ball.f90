@@ -315,7 +315,7 @@ contains
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
       history%peak_force = maxval(history%floor_force)
-      history%peak_floor_force = history%peak_force
+      history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
       history%restitution = state%speed/history%impact_velocity
       associate (momentum => mass*(history%impact_velocity + state%speed), initial => mass/2*history%impact_velocity**2)
