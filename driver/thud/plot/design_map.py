@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
 from thud.plot.look import FORCE_WORDS, SIZE, empty_axes, legend_above
 from thud.plot.parameter_axis import show_parameter
@@ -72,7 +72,7 @@ def _draw_margin(
     inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
     if inside.size:
         lines = axes.contour(*place, margin, inside, colors="0.25", linewidths=0.4, linestyles="-")
-        axes.clabel(lines, fontsize=SIZE - 2, fmt="%g")
+        axes.clabel(lines, fontsize=SIZE - 2, fmt=StrMethodFormatter("{x:g}"))
     if margin.min() < 0 < margin.max():
         axes.contour(*place, margin, levels=[0.0], colors="black", linewidths=1.2)
         axes.plot([], [], color="black", linewidth=1.2, label="Octave limits")

@@ -76,7 +76,7 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     if np.median(np.abs(record - target)) > VISIBLE * target.max():
         above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
     above.plot(
-        time, target / 1e3, color=COLOURS[0], linewidth=2.2, alpha=0.6, label=f"Record {band}"
+        time, target / 1e3, color=COLOURS[5], linewidth=2.8, alpha=0.6, label=f"Record {band}"
     )
     above.plot(
         time, column["model_N"] / 1e3, color=COLOURS[1], linestyle="--", linewidth=1.1, label="Fit"
