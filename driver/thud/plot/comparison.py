@@ -30,13 +30,13 @@ def comparison_page(
     """
     head, *body = table
     letters = [
-        2 + max(min(len(name), _LETTERS), *map(len, column))
+        2 + max([min(len(name), _LETTERS), *map(len, column)])
         for name, *column in zip(*table, strict=True)
     ]
     names = [fill(name, length) for name, length in zip(head, letters, strict=True)]
     lines = [1 + max(name.count("\n") for name in names), *(1 for _ in body)]
     below = _LINE * (sum(lines) + 1)
-    width = max(2 * WIDTH, _LETTER * sum(letters))
+    width = max(2 * WIDTH, 0.8 + _LETTER * sum(letters))
     figure = new_figure(5.8 + below, width)
     rows = figure.add_gridspec(3, 2, height_ratios=[2.7, 2.7, below])
     draw_forces(dress(figure.add_subplot(rows[0, :])), impacts, force)
@@ -57,5 +57,6 @@ def comparison_page(
     cells.set_fontsize(SIZE - 1)
     for (row, column), cell in cells.get_celld().items():
         cell.set(height=lines[row] / sum(lines), linewidth=0.5)
+        cell.PAD = 0.05
         cell.set_text_props(ha="left" if column == 0 else "right")
     return figure

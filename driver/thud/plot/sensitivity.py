@@ -24,7 +24,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     parameters = [str(name) for name in indices["parameter"].values]
     outputs = [str(name) for name in indices["output"].values]
     thickness = 0.84 / len(parameters)
-    figure, axes = empty_axes(1.1 + 0.075 * len(outputs) * (len(parameters) + 1))
+    figure, axes = empty_axes(0.8 + 0.075 * len(outputs) * (len(parameters) + 1))
     place = np.arange(len(outputs), dtype=float)
     for i, name in enumerate(parameters):
         row = indices.sel(parameter=name)
