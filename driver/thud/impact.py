@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import api, call, text
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_choice, require_kind
-from thud.errors import InputError
+from thud.errors import InputError, PlausibilityWarning
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
 
 if TYPE_CHECKING:
@@ -79,6 +80,8 @@ class Impact:
         Other histories of the model, such as the contact radius; the names end with units.
     facts : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
+    remarks : tuple of str
+        What is possible but not plausible, such as a wall with the density of no rubber.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
     sample_rate : float
@@ -115,6 +118,7 @@ class Impact:
     parts: dict[str, NDArray[np.float64]]
     channels: dict[str, NDArray[np.float64]]
     facts: dict[str, float]
+    remarks: tuple[str, ...]
     motion: Motion | None
     sample_rate: float
     impact_velocity: float
@@ -169,8 +173,18 @@ class Impact:
         """Return the maximum of a force, N; see `force` and `peak_force`."""
         return self.peak_elastic_force if self._is_elastic(force) else self.peak_force
 
+    @property
+    def judged_force(self) -> str:
+        """Force that the case judges, ``"floor"`` or ``"elastic"``."""
+        return self.case.levels.force
+
+    @property
+    def level_method(self) -> str:
+        """Method of the levels, ``"exact"`` or ``"fft"``."""
+        return self.case.levels.method
+
     def _is_elastic(self, kind: str | None) -> bool:
-        chosen = kind or self.case.levels.force
+        chosen = kind or self.judged_force
         require_choice("force", chosen, FORCES)
         return chosen == "elastic"
 
@@ -192,7 +206,7 @@ class Impact:
             self.force(force),
             self.sample_rate,
             bands,
-            method or self.case.levels.method,
+            method or self.level_method,
         )
 
     def conformity(self, source: str | None = None, force: str | None = None) -> Conformity:
@@ -256,19 +270,34 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Names group, key, value and allowed range.
     NumericalError
         Where the drop leaves the range of the model or the steps are too coarse.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `Impact.remarks`.
     """
-    return solve_case(
-        Case(
-            ball=Ball() if ball is None else ball,
-            drop=Drop() if drop is None else drop,
-            model=new_model(model, options),
-            sampling=Sampling(sample_rate, duration, substeps),
-        )
+    case = Case(
+        ball=Ball() if ball is None else ball,
+        drop=Drop() if drop is None else drop,
+        model=new_model(model, options),
+        sampling=Sampling(sample_rate, duration, substeps),
     )
+    return _warned(compute(case))
 
 
 def solve_case(case: Case) -> Impact:
     """Compute the impact of a case; see `solve`."""
+    return _warned(compute(case))
+
+
+def _warned(impact: Impact) -> Impact:
+    for remark in impact.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
+    return impact
+
+
+def compute(case: Case) -> Impact:
+    """Compute the impact of a case without warnings."""
     require_kind("case", case, Case)
     if case.model is None:
         message = "&model is missing; allowed: a case with a source model"
@@ -287,6 +316,7 @@ def new_impact(case: Case, found: Bundle) -> Impact:
         parts=found["parts"],
         channels=found.get("channels", {}),
         facts=found.get("facts", {}),
+        remarks=tuple(map(text, found.get("remarks", {}).values())),
         motion=_motion(**found["motion"]) if "motion" in found else None,
         **scalars,
     )

@@ -19,6 +19,8 @@ module thud_case
 
    !> Input of one run.
    type :: case_type
+      !> Groups that were left out of the text of the case, whose defaults hold: ` &drop &model`.
+      character(len=32) :: left_out = ''
       !> Name of the case, also of its output directory.
       character(len=name_length) :: name = ''
       !> An impact is asked for, by the group `&model`.

@@ -80,7 +80,7 @@ def test_equals_the_single_solver() -> None:
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
         assert ensemble.conforms[i] == bool(impact.conformity())
-        assert ensemble.floor_conforms[i] == bool(impact.conformity(force="floor"))
+        assert ensemble.elastic_conforms[i] == bool(impact.conformity(force="elastic"))
 
 
 def test_fails_where_the_single_solver_fails() -> None:
@@ -110,8 +110,8 @@ def test_a_conforming_source_conforms() -> None:
     for i in range(count):
         ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
         impact = thud.solve(ball)
-        assert ensemble.conforms[i] == bool(impact.conformity(force="elastic"))
-        assert ensemble.floor_conforms[i] == bool(impact.conformity(force="floor"))
+        assert ensemble.conforms[i] == bool(impact.conformity())
+        assert ensemble.elastic_conforms[i] == bool(impact.conformity(force="elastic"))
 
 
 def test_forces_beyond_the_memory_are_refused() -> None:

@@ -69,7 +69,7 @@ def test_known_parameters_come_back() -> None:
 def test_every_model_can_be_fitted(
     case: thud.Case, truth: dict[str, float], starts: dict[str, float]
 ) -> None:
-    target = thud.solve_case(with_values(case, truth))
+    target = thud.compute(with_values(case, truth))
     fit = thud.fit(target, starts or list(truth), case)
     assert fit.values == pytest.approx(truth, rel=SOLVED)
     assert not fit.warnings
@@ -78,7 +78,7 @@ def test_every_model_can_be_fitted(
 def test_finite_element_loss_factor_from_noisy_force() -> None:
     case = thud.Case(model=COARSE)
     truth = {"youngs_modulus": 2.08e6, "loss_factor": 0.25}
-    record = noisy_record(thud.solve_case(with_values(case, truth)), 5.0, seed=1)
+    record = noisy_record(thud.compute(with_values(case, truth)), 5.0, seed=1)
     fit = thud.fit(record, list(truth), case)
     for name, value in truth.items():
         # A miss by four standard errors has a probability of 6e-5.
@@ -116,7 +116,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, cou
     confidence = 0.9
     truth = {"youngs_modulus": 1.8e6, "height": 1.1, "time_shift": 220 / RATE - 0.1}
     case = thud.Case(sampling=thud.Sampling(duration=0.026))
-    impact = thud.solve_case(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
+    impact = thud.compute(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
     impact = replace(impact, floor_force=np.append(impact.floor_force, np.zeros(2000)))
     starts = {"youngs_modulus": 1.8e6, "height": 1.1}
     covered = dict.fromkeys(truth, 0)
@@ -192,13 +192,13 @@ def test_parameters_that_are_not_identifiable_are_named(
 def test_parameter_without_effect_is_named() -> None:
     case = thud.Case(model=thud.ModalBall())
     with pytest.warns(thud.FitWarning, match="loss_frequency has no effect on what is compared"):
-        fit = thud.fit(thud.solve_case(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
+        fit = thud.fit(thud.compute(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
     assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
     assert np.isfinite(fit.standard_errors["youngs_modulus"])
 
 
 def test_modulus_and_wall_are_hardly_identifiable_from_low_octaves() -> None:
-    impact = thud.solve_case(MODAL)
+    impact = thud.compute(MODAL)
     names = ["youngs_modulus", "wall_thickness"]
     low = thud.LevelTarget(impact.levels(force="floor")[:2], 0.5, frequencies=[31.5, 63])
     with pytest.warns(thud.FitWarning, match=f"{names[0]} and {names[1]} are hardly identif"):
@@ -212,7 +212,7 @@ def test_modulus_and_wall_are_hardly_identifiable_from_low_octaves() -> None:
 @pytest.mark.parametrize("bands", ["octave", "third"])
 def test_levels_and_what_else_is_known(bands: str) -> None:
     truth = {"youngs_modulus": 1.75e6, "loss_factor": 0.18}
-    impact = thud.solve_case(with_values(MODAL, truth))
+    impact = thud.compute(with_values(MODAL, truth))
     target = thud.LevelTarget(
         impact.levels(bands, force="floor"),
         uncertainty=0.2,
@@ -236,7 +236,7 @@ def test_contact_time_is_reported_between_samples() -> None:
 
 
 def test_model_that_cannot_follow_is_reported() -> None:
-    record = noisy_record(thud.solve_case(MODAL), 5.0, 1)
+    record = noisy_record(thud.compute(MODAL), 5.0, 1)
     with pytest.warns(thud.FitWarning, match="the model does not follow the force"):
         thud.fit(record, ["youngs_modulus"])
     with pytest.warns(thud.FitWarning, match="times what the given uncertainty lets expect"):
@@ -276,7 +276,7 @@ def test_table_says_what_the_standard_deviations_are() -> None:
 
 
 def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = objective.solve_case
+    solve = objective.compute
 
     def with_a_gap(case: thud.Case) -> thud.Impact:
         if 0.95e6 < case.ball.youngs_modulus < 1.1e6:
@@ -284,7 +284,7 @@ def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "solve_case", with_a_gap)
+    monkeypatch.setattr(objective, "compute", with_a_gap)
     # The first step, of the length of the start, leads into the gap.
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 0.5e6})
     assert fit.failures
@@ -298,7 +298,7 @@ def test_one_parameter_far_from_its_start() -> None:
 
 
 def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = objective.solve_case
+    solve = objective.compute
 
     def only_here(case: thud.Case) -> thud.Impact:
         if case.ball.youngs_modulus != 2e6:
@@ -306,7 +306,7 @@ def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch)
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "solve_case", only_here)
+    monkeypatch.setattr(objective, "compute", only_here)
     with pytest.raises(thud.NumericalError, match=r"youngs_modulus: .* around 2e\+06 \(out of"):
         thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
 
@@ -315,7 +315,7 @@ def test_best_of_several_starts_counts() -> None:
     case = thud.Case(model=COARSE)
     names = {"youngs_modulus": thud.Parameter(5e6, 1e6, 6e6), "loss_factor": None}
     once, often = (
-        quiet_fit(thud.solve_case(case), names, case, max_steps=2, starts=starts, seed=4)
+        quiet_fit(thud.compute(case), names, case, max_steps=2, starts=starts, seed=4)
         for starts in (1, 4)
     )
     assert often.noise <= once.noise
@@ -327,7 +327,7 @@ def test_best_of_several_starts_counts() -> None:
 def test_start_around_which_the_model_fails_leaves_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    solve = objective.solve_case
+    solve = objective.compute
 
     def below_or_here(case: thud.Case) -> thud.Impact:
         if case.ball.youngs_modulus > 1.95e6 and case.ball.youngs_modulus != 2e6:
@@ -335,7 +335,7 @@ def test_start_around_which_the_model_fails_leaves_the_others(
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "solve_case", below_or_here)
+    monkeypatch.setattr(objective, "compute", below_or_here)
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6}, starts=4)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 

@@ -165,7 +165,7 @@ def level_label(impacts: Mapping[str, Curve], force: str | None, what: str = LEV
 
 def _kind(impact: Curve, force: str | None) -> str:
     """Return the kind of force that is shown; a recording is of the floor."""
-    return force or impact.case.levels.force if isinstance(impact, Impact) else "floor"
+    return force or impact.judged_force if isinstance(impact, Impact) else "floor"
 
 
 def octave_axis(axes: Axes, bands: str = "octave") -> None:

@@ -41,6 +41,7 @@ module thud_modal_ball
    contains
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
+      procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
 
    !> Motion of the ball.
@@ -71,6 +72,15 @@ contains
 
       cost = 6.0e-3_wp*(options%rings/44.0_wp)
    end function get_cost
+
+   !> Modulus of elasticity of the paper's ball, Pa (section 2.3; of linear modes an effective modulus).
+   function get_paper_modulus(options) result(modulus)
+      class(modal_ball_type), intent(in) :: options
+      !> The modulus, Pa.
+      real(wp) :: modulus
+
+      modulus = 1.6e6_wp
+   end function get_paper_modulus
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
