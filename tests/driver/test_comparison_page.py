@@ -11,6 +11,7 @@ import pytest
 from test_figure_look import assert_clean
 
 import thud
+from thud.comparison import _cell
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 
@@ -107,3 +108,8 @@ def test_table_of_any_rows_fits_on_the_picture(count: int) -> None:
             assert box.x0 <= text.x0
             assert text.x1 <= box.x1
             assert box.height >= text.height
+
+
+def test_no_cell_is_minus_zero() -> None:
+    criterion = thud.Criterion("level", "dB", -0.001, -1.0, 1.0, conforms=True)
+    assert _cell(criterion, 1.0, 2) == "0.00"

@@ -110,6 +110,7 @@ def _row(cells: Sequence[str], tag: str) -> str:
     return "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
 
+# Styles that plotly writes into the plots give way to the colours of the page.
 # A click on the legend of the forces hides the curve in all plots.
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
@@ -118,9 +119,11 @@ _PAGE = Template("""<!DOCTYPE html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>thud: comparison</title>
 <style>
-:root { color-scheme: light dark; --text: #1a1a1a; --page: #ffffff; --line: #dddddd; }
+:root { color-scheme: light dark; --text: #1a1a1a; --page: #ffffff; --line: #dddddd;
+  --band: #cccccc; }
 @media (prefers-color-scheme: dark) {
-  :root { --text: #e8e8e8; --page: #17191c; --line: #45484d; }
+  :root { --text: #e8e8e8; --page: #17191c; --line: #3a3d42;
+    --band: #55595f; }
 }
 body { font-family: sans-serif; margin: 1.5em auto; max-width: 80em; padding: 0 0.8em;
   color: var(--text); background: var(--page); }
@@ -141,7 +144,7 @@ th:first-child, td:first-child { text-align: left; position: sticky; left: 0;
 }
 .plots text:not(.hoverlayer *) { fill: var(--text) !important; }
 .plots .gridlayer path { stroke: var(--line) !important; }
-.plots .barlayer path { opacity: 0.6 !important; }
+.plots [style*="fill: rgb(187, 187, 187)"] { fill: var(--band) !important; }
 .plots [style*="stroke: rgb(0, 0, 0)"] { stroke: var(--text) !important; }
 .plots .points [style*="fill: rgb(0, 0, 0)"] { fill: var(--text) !important; }
 </style>
