@@ -165,7 +165,7 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
     """Show the size of a round velocity beside the label of the colours."""
     velocity = float(f"{impact.impact_velocity:.1g}")
     key = QuiverKey(
-        arrows, WIDTH - 0.35, 0.11, velocity, f"{velocity:g} m/s", labelpos="W",
+        arrows, WIDTH - 0.5, 0.11, velocity, f"{velocity:g} m/s", labelpos="E",
         coordinates="inches", fontproperties={"size": SIZE},
     )  # fmt: skip
     axes.add_artist(key)
