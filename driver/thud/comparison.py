@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import html
 import time
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import chain, count, repeat
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 from tqdm import tqdm
 
 from thud.case import Case, read_case
@@ -21,9 +18,10 @@ from thud.checks import refuse, refuse_value, require_kind
 from thud.errors import InputError, PlausibilityWarning, ThudError
 from thud.files import replace_file
 from thud.impact import Impact, compute
-from thud.levels import SOURCES, get_bands, octave_limits
+from thud.levels import SOURCES, get_bands
 from thud.plot.comparison import comparison_page
-from thud.plot.look import COLOURS, save_all
+from thud.plot.comparison_html import comparison_html
+from thud.plot.look import save_all
 from thud.recording import Recording
 
 if TYPE_CHECKING:
@@ -105,59 +103,7 @@ class Comparison:
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        figure = make_subplots(
-            rows=2,
-            cols=2,
-            specs=[[{"colspan": 2}, None], [{}, {}]],
-            subplot_titles=("Blocked force", "Octaves", "Third octaves"),
-            vertical_spacing=0.12,
-        )
-        lower, upper = octave_limits(self.source)
-        names = {kind: [f"{f:g}" for f in get_bands(kind).nominal] for kind in ("octave", "third")}
-        figure.add_trace(
-            go.Bar(
-                x=names["octave"],
-                y=upper - lower,
-                base=lower,
-                marker_color="lightgrey",
-                name=f"tolerance, {self.source.replace('_', ' ')}",
-            ),
-            row=2,
-            col=1,
-        )
-        for i, (name, impact) in enumerate(self.impacts.items()):
-            look = {"color": COLOURS[i % len(COLOURS)]}
-            group = {"name": html.escape(name), "legendgroup": str(i)}
-            force = impact.force(self.force)
-            # The long free flight after the contact is not drawn.
-            since = impact.time - impact.touch_time
-            shown = (since >= 0) & (since < 1.5 * impact.contact_time)
-            figure.add_trace(
-                go.Scatter(x=1e3 * since[shown], y=force[shown], line=look, **group),
-                row=1,
-                col=1,
-            )
-            for column, kind in enumerate(names, start=1):
-                values = impact.levels(kind, "exact", self.force)
-                figure.add_trace(
-                    go.Scatter(
-                        x=names[kind], y=values, line=look, marker=look, showlegend=False, **group
-                    ),
-                    row=2,
-                    col=column,
-                )
-        figure.update_xaxes(title_text="Time since first touch, ms", row=1, col=1)
-        figure.update_yaxes(title_text="Force, N", row=1, col=1)
-        for column in (1, 2):
-            figure.update_xaxes(title_text="Band, Hz", type="category", row=2, col=column)
-            figure.update_yaxes(title_text="Force exposure level, dB re 1 N", row=2, col=column)
-        figure.update_layout(height=850, template="simple_white")
-        plots = figure.to_html(full_html=False, include_plotlyjs=True)
-        cells = [
-            "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row) + "</tr>"
-            for tag, row in zip(chain(["th"], repeat("td")), self.table(), strict=False)
-        ]
-        return _PAGE.format(force=self.force, table="\n".join(cells), plots=plots)
+        return comparison_html(self.impacts, self.force, self.source, self.table())
 
     def save(self, directory: str | os.PathLike[str]) -> list[Path]:
         """Write ``comparison.png``, ``.svg`` and ``.html`` and return their paths.
@@ -180,7 +126,7 @@ def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
     if np.isnan(criterion.value):
         return "not known"
     word = "" if criterion.conforms else "low" if criterion.value < criterion.lower else "high"
-    return f"{criterion.value / unit:.{decimals}f} {word}".rstrip()
+    return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
 
 
 def compare(
@@ -301,28 +247,3 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
             raise InputError(message)
         found[name] = given
     return found
-
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>thud: comparison</title>
-<style>
-body {{ font-family: sans-serif; margin: 2em auto; max-width: 75em; padding: 0 1em; }}
-table {{ border-collapse: collapse; }}
-th, td {{ padding: 0.3em 0.9em; text-align: right; border-bottom: 1px solid #ccc; }}
-th:first-child, td:first-child {{ text-align: left; }}
-</style>
-</head>
-<body>
-<h1>Comparison of models and recordings</h1>
-<p>Blocked force ({force} force), its levels over the tolerance of the standards; level
-deviations from the nominal values in the octaves 31.5 to 500 Hz.</p>
-<table>
-{table}
-</table>
-{plots}
-</body>
-</html>
-"""
