@@ -78,7 +78,7 @@ class Comparison:
         octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *(self.force or impact.judged_force for impact in impacts), ""),
+            ("force", *map(self._force_of, impacts), ""),
             ("levels", *(impact.level_method for impact in impacts), ""),
         ]
         together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
@@ -96,6 +96,11 @@ class Comparison:
             times = (self.run_times.get(name) for name in self.impacts)
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
         return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
+
+    def _force_of(self, impact: Impact | Recording) -> str:
+        """Return the force of an impact that is compared; a recording has only one."""
+        chosen = self.force if isinstance(impact, Impact) else None
+        return chosen or impact.judged_force
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
