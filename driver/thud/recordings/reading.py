@@ -1,0 +1,1 @@
+"""Files of recorded channels as signals in newtons."""
