@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     import numpy as np
     from numpy.typing import NDArray
+    from typing_extensions import Buffer
 
 # Maximum size of files that are read as a whole, bytes.
 WHOLE = 2**28
@@ -134,17 +135,18 @@ class BoundedFile:
         """Return the next bytes."""
         left = max(0, self.size - self.file.tell())
         wanted = left if count is None or count < 0 else int(count)
-        if wanted > max(AT_ONCE, 0) or (wanted > left and wanted > MIB):
+        if wanted > AT_ONCE or (wanted > left and wanted > MIB):
             refuse(
                 f"{self.name}: a piece of {wanted / MIB:.0f} MiB, {left / MIB:.0f} MiB are left",
                 f"pieces of up to {AT_ONCE // MIB} MiB inside the file",
             )
         return self.file.read(wanted)
 
-    def readinto(self, buffer: bytearray) -> int:
+    def readinto(self, buffer: Buffer) -> int:
         """Fill a buffer with the next bytes."""
-        data = self.read(len(buffer))
-        buffer[: len(data)] = data
+        view = memoryview(buffer).cast("B")
+        data = self.read(len(view))
+        view[: len(data)] = data
         return len(data)
 
     def seek(self, offset: int, whence: int = 0) -> int:

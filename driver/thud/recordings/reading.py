@@ -86,7 +86,7 @@ def open_signals(  # noqa: PLR0913 - the keys of the configuration
     channels = read_channels(file)
     return [
         _signal(file, one, given, several=len(channels) > 1)
-        for one in _choose(channels, channel, shown_path(file))
+        for one in choose_channels(channels, channel, shown_path(file))
     ]
 
 
@@ -133,7 +133,7 @@ def _stored(descriptor: int, size: int) -> int:
     return size
 
 
-def _choose(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
+def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
     """Return the channels that are meant; raise InputError where that is not clear."""
     listed = ", ".join(
         f"{one.number}" + (f" {shown_text(one.name)!r}" if one.name else "")

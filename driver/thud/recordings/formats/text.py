@@ -106,13 +106,12 @@ def _read_header(lines: Iterator[str], table: _Table) -> list[str]:
     above: list[str] = []
     line = next(lines, "")
     while line and len(above) <= LONGEST_HEADER:
-        text = line.partition("#")[0].strip().rstrip(";").rstrip()
-        separator, comma = _separator(text)
+        separator, comma = _separator(line.partition("#")[0].strip())
         probe = _Table(table.name, separator, comma)
         cells = probe.cells(probe.clean(line))
         found = [_number(cell) for cell in cells]
         # Beside the numbers a table may have words, such as a state.
-        if found[0] is not None and found.count(None) < len(found) / 2:
+        if found and found[0] is not None and found.count(None) < len(found) / 2:
             table.separator, table.decimal_comma = separator, comma
             table.first = len(above) + 1
             _sort_header(above, table, len(cells))
