@@ -90,7 +90,8 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
     except MemoryError as error:
         refuse(f"{shown_path(path)}: asks for too much memory", f"an undamaged {kind} file", error)
     except Exception as error:  # noqa: BLE001 - libraries raise anything on damaged files
-        reason = shown_text(error) or type(error).__name__
+        # soundfile repeats the path.
+        reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__
         refuse(
             f"{shown_path(path)}: cannot be read as {kind} ({reason})",
             f"a complete, undamaged {kind} file",

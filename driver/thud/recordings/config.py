@@ -107,9 +107,14 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
     _require_known(given, [one.name for one in fields(Config)], name)
     values = {key: _checked(key, value, f"{name}: {key}") for key, value in given.items()}
-    text, uncertainty = values.get("calibration"), values.get("calibration_uncertainty", 0.0)
-    if isinstance(text, str):
-        values["calibration"] = Calibration(text, uncertainty)
+    chain, uncertainty = values.get("calibration"), values.get("calibration_uncertainty", 0.0)
+    if isinstance(chain, float) and "unit" in values:
+        chain = f"{chain!r} N/{values['unit']}"
+    if isinstance(chain, str):
+        values["calibration"] = Calibration(chain, uncertainty)
+    elif uncertainty:
+        what = f"{name}: calibration_uncertainty stands without calibration and unit"
+        refuse(what, 'calibration = 250 with unit = "V", or "250 N/V"')
     return Config(**values)
 
 

@@ -66,7 +66,7 @@ class Hdf5Samples:
                 axis, place = self.column
                 piece = (place, piece) if axis == 0 else (piece, place)
             values = np.asarray(file[self.dataset][piece], dtype=np.float64)
-        return values * self.scale + self.offset
+            return values * self.scale + self.offset
 
 
 @dataclass(frozen=True)
