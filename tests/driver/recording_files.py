@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import struct
+import warnings
 from typing import TYPE_CHECKING
 
 import h5py
@@ -83,7 +85,10 @@ def _universal(binary: int) -> Writer:
             "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0,
             "abscissa_axis_units_lab": "s", "ordinate_axis_units_lab": unit,
         }  # fmt: skip
-        pyuff.UFF(str(path)).write_sets([entry], "add")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ResourceWarning)  # the writer leaves a file open
+            pyuff.UFF(str(path)).write_sets([entry], "add")
+            gc.collect()
 
     return write
 

@@ -122,7 +122,7 @@ def _require_known(given: Mapping[str, object], known: list[str], place: str) ->
     """Raise InputError where a key is not known, with the one that is probably meant."""
     for key in given:
         if key not in known:
-            close = difflib.get_close_matches(key, known, n=1)
+            close = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
             hint = f", did you mean {close[0]}?" if close else ""
             refuse(f"{place}: {shown_text(key)!r} is not known{hint}", ", ".join(known))
 

@@ -39,7 +39,8 @@ class Excursions:
 
     def peak(self, scale: float) -> float:
         """Return the largest excursion from the quiet level in the positive direction, N."""
-        return max((self.high - self.quiet) * scale, (self.low - self.quiet) * scale)
+        # Never -0.
+        return max((self.high - self.quiet) * scale, (self.low - self.quiet) * scale) + 0.0
 
 
 def scan(samples: Callable[[int, int], NDArray[np.float64]], count: int, name: str) -> Excursions:

@@ -99,16 +99,17 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
     name = shown_path(file)
     try:
         found = file.stat()
-        if not stat.S_ISREG(found.st_mode):
-            kind = "a directory" if stat.S_ISDIR(found.st_mode) else "no regular file"
-            refuse(f"{name!r}: is {kind}", "a file")
-        with file.open("rb") as opened:
-            stored = _stored(opened.fileno(), found.st_size)
-    except (OSError, ValueError) as error:
-        if isinstance(error, OSError):
-            reason = os.strerror(error.errno or errno.EIO)
-            refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
-        raise
+        if stat.S_ISREG(found.st_mode):
+            with file.open("rb") as opened:
+                stored = _stored(opened.fileno(), found.st_size)
+    except OSError as error:
+        reason = os.strerror(error.errno or errno.EIO)
+        refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
+    except ValueError as error:  # a zero byte
+        refuse(f"{name!r}: cannot be read", "the path of a file", error)
+    if not stat.S_ISREG(found.st_mode):
+        kind = "a directory" if stat.S_ISDIR(found.st_mode) else "no regular file"
+        refuse(f"{name}: is {kind}", "a file")
     if found.st_size > MIB and stored < STORED * found.st_size:
         refuse(
             f"{name}: {found.st_size / MIB:.0f} MiB of which {stored / MIB:.1f} MiB are stored",

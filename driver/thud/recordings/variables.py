@@ -35,16 +35,16 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
     Scalars and texts are the header; a vector of times gives the rate of those of its length.
     """
     header = [(key, text_of(value)) for key, value in values.items() if np.size(value) == 1]
-    columns = {
-        key + (f"[{i + 1}]" if matrix.shape[1] > 1 else ""): matrix[:, i].astype(np.float64)
+    columns = [
+        (key, f"[{i + 1}]" * (matrix.shape[1] > 1), matrix[:, i].astype(np.float64))
         for key, value in values.items()
         if (matrix := _as_columns(value)) is not None
         for i in range(matrix.shape[1])
-    }
-    times = {key: column for key, column in columns.items() if is_time(key)}
+    ]
+    times = {key: column for key, _, column in columns if is_time(key)}
     rate = find_rate(header)
     channels = []
-    for number, (key, column) in enumerate(columns.items(), start=1):
+    for number, (key, index, column) in enumerate(columns, start=1):
         if key in times and len(columns) > 1:
             continue
         own: float | None = rate
@@ -56,7 +56,7 @@ def channels_of_variables(values: dict[str, NDArray[np.generic]], name: str) -> 
             own = 1 / step
         channels.append(
             Channel(
-                name=key,
+                name=key + index,
                 number=number,
                 n_sample=len(column),
                 samples=ArraySamples(column),

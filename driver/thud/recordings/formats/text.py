@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import itertools
 import re
 from dataclasses import dataclass, field
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 # The first of these that a line contains separates its columns; otherwise blanks do.
 SEPARATORS = ("\t", ";", ",")
-COMMENTS = "#%!*\"'/"
+COMMENTS = "#%!*'/;"
 # Maximum lengths of a line, of a header in lines, and of a table in numbers.
 LONGEST = 2**16
 LONGEST_HEADER = 1000
@@ -70,6 +71,14 @@ class _Table:
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line."""
         return [cell.strip() for cell in line.split(self.separator)]
+
+    def titles_of(self, line: str, columns: int) -> list[str]:
+        """Return the cells of a line of words, which may hold separators in quotes."""
+        if columns == 1:
+            return [line.strip()]
+        if self.separator and '"' in line:
+            return next(csv.reader([line], delimiter=self.separator))
+        return self.cells(line)
 
     def clean(self, line: str) -> str:
         """Return a line without its comment and what ends it, with decimal points."""
@@ -115,10 +124,22 @@ def _read_header(lines: Iterator[str], table: _Table) -> list[str]:
             table.separator, table.decimal_comma = separator, comma
             table.first = len(above) + 1
             _sort_header(above, table, len(cells))
+            if separator == "," and _is_one_column(line.strip(), table):
+                table.separator, table.decimal_comma = ";", True
+                _sort_header(above, table, 1)
             return [line]
         above.append(line)
         line = next(lines, "")
     return refuse(f"{table.name}: cannot be read (no numbers)", ALLOWED)
+
+
+def _is_one_column(text: str, table: _Table) -> bool:
+    """Whether a comma is a decimal point: there is a rate, no time, and no title for each side."""
+    return (
+        DECIMAL_COMMA.fullmatch(text) is not None
+        and not table.titles
+        and find_rate(table.header) is not None
+    )
 
 
 def _separator(text: str) -> tuple[str | None, bool]:
@@ -134,7 +155,7 @@ def _sort_header(above: list[str], table: _Table, columns: int) -> None:
     """Find names and values, and the titles of the columns, in the lines above the numbers."""
     texts = [text for line in above if (text := line.strip().lstrip(COMMENTS).strip())]
     for place, text in enumerate(texts):
-        cells = table.cells(text.rstrip(";"))
+        cells = table.titles_of(text.rstrip(";"), columns)
         words = plain(split_title(re.split(PAIR, text, maxsplit=1)[0])[0])
         is_pair = words in RATE | STEP | DATE | UNIT and columns < 3  # noqa: PLR2004
         is_near = place >= len(texts) - MOST_TITLES and len(cells) == columns and not is_pair
