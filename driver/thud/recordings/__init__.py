@@ -1,0 +1,1 @@
+"""Recordings of drops: files of force plates and loggers, read piecewise in newtons."""
