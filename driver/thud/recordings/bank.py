@@ -101,9 +101,7 @@ def _filters(bands: str, sample_rate: float) -> tuple[NDArray[np.float64], NDArr
     for band, (lower, upper) in enumerate(zip(edges.lower, edges.upper, strict=True)):
         if MIN_RATIO * upper > sample_rate * (1 + 1e-12):
             continue
-        zeros, poles, gain = butter(
-            ORDER, (lower, upper), "bandpass", fs=sample_rate, output="zpk"
-        )
+        zeros, poles, gain = butter(ORDER, (lower, upper), "bandpass", fs=sample_rate, output="zpk")
         sections[band] = zpk2sos(zeros, poles, gain)
         radius = np.abs(poles).max()
         # The energy of what rings decays at least as radius**(2 n).
