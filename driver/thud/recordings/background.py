@@ -63,7 +63,7 @@ def noise_energies(
 def _frequencies(rate: float, count: int) -> NDArray[np.float64]:
     """Return the frequencies at which the noise counts, Hz."""
     frequency = np.fft.rfftfreq(PADDING * count, 1 / rate)
-    return frequency[frequency <= HIGHEST]
+    return np.asarray(frequency[frequency <= HIGHEST], dtype=np.float64)
 
 
 def _density(drop: Drop, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -78,12 +78,12 @@ def _quiet_time(drop: Drop) -> float:
     """Return the duration of the quiet parts from which the noise is known, s."""
     step = 1 / drop.sample_rate
     before = -float(drop.time[0])
-    end = drop.bounces[0] if drop.bounces else float(drop.time[-1]) + step
+    end = float(drop.bounces[0] if drop.bounces else drop.time[-1] + step)
     after = end - float(drop.contact_time)
     source = drop.noise.source
     times = {"before": before, "after": after}
     used = [time for word, time in times.items() if word in source] or [before]
-    return max(sum(max(time, 0.0) for time in used), step)
+    return float(max(sum(max(time, 0.0) for time in used), step))
 
 
 @lru_cache(maxsize=4)

@@ -36,9 +36,7 @@ def band_filters(bands: str, sample_rate: float) -> NDArray[np.float64]:
     Second-order sections need no decimation: the lowest band at 1 MHz still keeps its attenuation
     to 1e-6 dB.
     """
-    require_number("sample_rate", sample_rate)
-    if sample_rate <= 0:
-        refuse(f"sample_rate = {sample_rate} is not allowed", "sample_rate > 0")
+    _require_rate(sample_rate)
     return _filters(bands, float(sample_rate))[0].copy()
 
 
@@ -71,7 +69,7 @@ def filter_levels(
     record = require_real("force", require_array("force", force, dimensions=(1,)))
     if not np.isfinite(record).all() or not record.any():
         refuse("force is empty, zero throughout or not finite", "a force record, N")
-    require_number("sample_rate", sample_rate)
+    _require_rate(sample_rate)
     edges = get_bands(bands)
     inside = edges.upper < sample_rate / 2
     levels = np.full(len(inside), np.nan)
@@ -90,6 +88,13 @@ def filter_levels(
         filtered = sosfilt(sections[band], padded)
         levels[band] = 10 * np.log10(filtered @ filtered / rate)
     return levels
+
+
+def _require_rate(sample_rate: float) -> None:
+    """Raise InputError where a sample rate is not a positive number."""
+    require_number("sample_rate", sample_rate)
+    if sample_rate <= 0:
+        refuse(f"sample_rate = {sample_rate} is not allowed", "sample_rate > 0")
 
 
 @lru_cache(maxsize=8)

@@ -27,7 +27,7 @@ METHODS = ("exact", "fft", "filter")
 # background is subtracted (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
 # Minimum of the silence that the gate holds before and after the contact, s: what the low-pass
-# spreads beyond it is 90 dB below the levels.
+# spreads beyond it moves no octave by more than 2e-4 dB at 8 kHz and above, 2e-3 dB below.
 MARGIN = 3e-3
 # Gates are rounded up to this, s, so that drops share the quadrature.
 STEP = 1e-3
@@ -228,10 +228,10 @@ def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[st
     contact, doubt = float(drop.contact_time), drop.contact_time.uncertainty
     if not math.isfinite(contact) or contact <= 0:
         refuse(f"{drop.name}: the contact time is not known", "a drop with one contact")
-    force, steps = drop.force, ()
+    force, steps = drop.force, list[str]()
     if low_pass:
         force, sentence = low_pass_force(force, drop.sample_rate)
-        steps = (sentence,)
+        steps.append(sentence)
     margin = max(MARGIN, 3 * doubt if math.isfinite(doubt) else MARGIN)
     count = math.ceil(math.ceil((contact + 2 * margin) / STEP) * STEP * drop.sample_rate)
     start = round(float((-margin - drop.time[0]) * drop.sample_rate))

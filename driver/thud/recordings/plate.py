@@ -157,7 +157,7 @@ def correct_plate(
     room = math.ceil(20 * sample_rate / reach)
     padded = np.pad(force, room, mode="edge")
     length = next_fast_len(len(padded) + room, real=True)
-    frequency = np.fft.rfftfreq(length, 1 / sample_rate)
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate), dtype=np.float64)
     fall = np.cos(np.pi / 2 * np.clip(np.log2(np.maximum(frequency, 1e-9) / reach), 0, 1)) ** 2
     # About the first value, so that the end that wraps around is no step.
     origin = padded[0]
@@ -226,7 +226,7 @@ def _check_high(plate: Plate | None, *, corrected: bool) -> PlateCheck:
     demand, high = "flat below", FLAT[1]
     if plate is None:
         return PlateCheck(demand, None, f"the response up to {high:g} Hz is not known (resonance)")
-    frequency = np.linspace(0, high, 1001)
+    frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     if corrected:
         # Expanded uncertainty of the resonance, both ways.
