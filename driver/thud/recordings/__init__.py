@@ -1,1 +1,1 @@
-"""Recordings of drops: files of force plates and loggers, read piecewise in newtons."""
+"""Recordings of drops: from the files of a laboratory to levels, verdict and report."""
