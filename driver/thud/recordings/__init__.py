@@ -1,0 +1,1 @@
+"""Recordings of a force plate: reading, drops, levels and the verdict."""
