@@ -1,0 +1,389 @@
+"""A recording: drops of one source, measured, and what the standards say of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.checks import refuse, require_number
+from thud.levels import peak_count, record_force
+from thud.recordings.config import Config, read_config
+from thud.recordings.drops import find_windows
+from thud.recordings.estimates import measure_drop
+from thud.recordings.levels import (
+    AverageLevels,
+    average_levels,
+    compare_methods,
+    measure_levels,
+)
+from thud.recordings.plate import Plate, correct_plate
+from thud.recordings.reading import open_signals
+from thud.recordings.verdict import (
+    Contribution,
+    Quantity,
+    Verdict,
+    average_estimates,
+    decide,
+    level_quantities,
+)
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+    from thud.recordings.estimates import Drop, Estimate
+    from thud.recordings.signal import Signal
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where drops come from.
+
+    Attributes
+    ----------
+    name, path, checksum, date, calibration : str
+        As those of a `Signal`; the checksum is SHA-256.
+    sample_rate : float
+        Samples per second, Hz.
+    drops : int
+        Number of drops that were found.
+    steps, remarks : tuple of str
+        What reading has done, and what is doubtful; a sentence each.
+    """
+
+    name: str
+    path: str
+    checksum: str
+    date: str
+    calibration: str
+    sample_rate: float
+    drops: int
+    steps: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Recorded drops of one source.
+
+    Where one force is asked for (`time`, `force`, comparisons, fits) it is that of the first drop;
+    levels and the other numbers are averages over all drops.
+
+    Attributes
+    ----------
+    name : str
+        Name of the recording, also of its results.
+    drops : tuple of Drop
+        The drops in order.
+    origins : tuple of Origin
+        The files.
+    config : Config
+        What the laboratory says; mass, kg, and height, m, may be None.
+    calibration_uncertainty : float
+        Relative standard uncertainty of the force.
+    """
+
+    name: str
+    drops: tuple[Drop, ...]
+    origins: tuple[Origin, ...]
+    config: Config = field(default_factory=Config)
+    calibration_uncertainty: float = 0.0
+
+    def __repr__(self) -> str:
+        """Return the main numbers of the recording, without its samples."""
+        number = len(self.drops)
+        return (
+            f"<Recording {self.name}: {number} drop{'s' * (number != 1)}, "
+            f"contact {1e3 * self.contact_time:.2f} ms, peak {self.peak():.0f} N>"
+        )
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time of the first drop since first touch, s, shape (n_sample,)."""
+        return self.drops[0].time
+
+    @property
+    def record(self) -> NDArray[np.float64]:
+        """Force of the first drop, corrected, N, shape (n_sample,)."""
+        return self.drops[0].force
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second of the first drop, Hz."""
+        return self.drops[0].sample_rate
+
+    @property
+    def touch_time(self) -> float:
+        """Time of first touch, s: 0."""
+        return 0.0
+
+    @property
+    def origin(self) -> float:
+        """Time of first touch of the first drop in its file, s."""
+        return self.drops[0].onset
+
+    @property
+    def judged_force(self) -> str:
+        """Force that a force plate measures: ``"floor"``."""
+        return "floor"
+
+    @property
+    def level_method(self) -> str:
+        """Method of the levels: ``"exact"``."""
+        return "exact"
+
+    @property
+    def contact_time(self) -> float:
+        """Mean contact time, s."""
+        return self.quantities["contact_time"].value
+
+    @property
+    def restitution(self) -> float:
+        """Mean coefficient of restitution; NaN where it is not known."""
+        return self.quantities["restitution"].value
+
+    @property
+    def peak_force(self) -> float:
+        """Mean maximum force below 1.25 kHz, N."""
+        return float(np.mean([drop.peak_force.value for drop in self.drops]))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is doubtful: of files, drops and levels; a sentence each."""
+        found = [remark for one in self.origins for remark in one.remarks]
+        found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
+        found += [str(outlier) for outlier in self.average().outliers]
+        return tuple(dict.fromkeys(found))
+
+    @property
+    def steps(self) -> tuple[str, ...]:
+        """What was done to the signals; a sentence each."""
+        found = [f"{one.name}: {step}" for one in self.origins for step in one.steps]
+        found += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
+        return tuple(dict.fromkeys(found))
+
+    def force(self, kind: str | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
+        """Return the force of the first drop, N, shape (n_sample,), for any `kind`."""
+        return self.record
+
+    def peak(self, force: str | None = None) -> float:  # noqa: ARG002 - there is one
+        """Return the mean maximum force, N."""
+        return self.peak_force
+
+    def average(self, bands: str = "octave", method: str = "exact") -> AverageLevels:
+        """Return the energy average of the levels of the drops, with its uncertainty.
+
+        Parameters
+        ----------
+        bands
+            ``"octave"`` or ``"third"``.
+        method
+            ``"exact"``, ``"fft"`` or ``"filter"``.
+        """
+        known = self._averages
+        if (bands, method) not in known:
+            drops = [measure_levels(drop, bands, method) for drop in self.drops]
+            known[bands, method] = average_levels(drops)
+        return known[bands, method]
+
+    @cached_property
+    def _averages(self) -> dict[tuple[str, str], AverageLevels]:
+        return {}
+
+    def levels(
+        self,
+        bands: str = "octave",
+        method: str | None = None,
+        force: str | None = None,  # noqa: ARG002 - there is one
+    ) -> NDArray[np.float64]:
+        """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
+        return self.average(bands, method or self.level_method).level
+
+    def agreement(self, bands: str = "octave") -> dict[str, NDArray[np.float64]]:
+        """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
+        found = [compare_methods(drop, bands) for drop in self.drops]
+        return {
+            method: np.max([np.abs(one[method] - one["exact"]) for one in found], axis=0)
+            for method in found[0]
+        }
+
+    @cached_property
+    def quantities(self) -> dict[str, Quantity]:
+        """Contact time, restitution, peaks, mass and drop height with their budgets."""
+        scale = self.calibration_uncertainty
+        known = [drop.restitution.value for drop in self.drops]
+        known = [value for value in known if math.isfinite(value)]
+        # Restitution from the impulse: I/(M v0) - 1 - g t/v0.
+        share = scale * (1 + float(np.mean(known))) if known else 0.0
+        by_impulse = any("impulse" in drop.restitution_by for drop in self.drops)
+        peaks = max(peak_count(drop.force[slice(*drop.gate)], drop.sample_rate) for drop in self.drops)
+        config = self.config
+        return {
+            "contact_time": average_estimates([drop.contact_time for drop in self.drops]),
+            "restitution": average_estimates(
+                [drop.restitution for drop in self.drops],
+                *([Contribution("calibration", share)] if by_impulse and share else []),
+            ),
+            "peaks": Quantity(float(peaks)),
+            "mass": Quantity(math.nan if config.mass is None else config.mass),
+            "drop_height": Quantity(math.nan if config.height is None else config.height),
+        }
+
+    def conformity(self, source: str | None = None, force: str | None = None) -> Verdict:  # noqa: ARG002
+        """Return the verdict of the standards at 95 %.
+
+        Parameters
+        ----------
+        source
+            ``"rubber_ball"`` or ``"tyre"``; by default that of the configuration.
+        force
+            Not used: a force plate measures the force on the floor.
+        """
+        plate = _plate(self.config)
+        return decide(
+            level_quantities(
+                self.average(),
+                self.calibration_uncertainty,
+                plate.level_uncertainty() if plate else None,
+            ),
+            source=source or self.config.source,
+            **self.quantities,
+        )
+
+    def to_force_history(self, drop: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return time since first touch, s, and force, N, of one contact, shape (n_sample,).
+
+        The force is zero before and after: it may drive another program's floor.
+
+        Parameters
+        ----------
+        drop
+            Number of the drop, from 1.
+        """
+        if not 1 <= drop <= len(self.drops):
+            refuse(f"drop = {drop} does not exist", f"1 to {len(self.drops)}")
+        one = self.drops[drop - 1]
+        gate = slice(*one.gate)
+        return one.time[gate], one.force[gate]
+
+
+def read_recording(  # noqa: PLR0913 - the keys of the configuration
+    paths: str | os.PathLike[str] | Iterable[str | os.PathLike[str]],
+    *,
+    height: float | None = None,
+    mass: float | None = None,
+    source: str | None = None,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    calibration: float | str | None = None,
+    polarity: str | None = None,
+    sample_rate: float | None = None,
+    config: Config | str | os.PathLike[str] | None = None,
+    progress: bool = False,
+) -> Recording:
+    """Read recorded drops of one source, from any number of files with one or many drops each.
+
+    Parameters
+    ----------
+    paths
+        Files; see docs/recordings_reading.md for the formats.
+    height
+        Drop height, m.
+    mass
+        Mass of the source, kg. With both, restitution follows from the impulse.
+    source
+        Source whose limits apply, ``"rubber_ball"`` or ``"tyre"``.
+    channel, unit, calibration, polarity, sample_rate
+        As `open_signals` takes them.
+    config
+        Configuration of the laboratory, or its file; the other arguments come first.
+    progress
+        Show a progress bar.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    InputError
+        One sentence: what cannot be read or measured.
+    """
+    known = config if isinstance(config, Config) else read_config(config) if config else Config()
+    given = {
+        "height": height, "mass": mass, "source": source, "channel": channel, "unit": unit,
+        "calibration": calibration, "polarity": polarity, "sample_rate": sample_rate,
+    }  # fmt: skip
+    known = replace(known, **{key: value for key, value in given.items() if value is not None})
+    for key in ("height", "mass"):
+        value = getattr(known, key)
+        if value is None:
+            continue
+        require_number(key, value)
+        if value <= 0:
+            refuse(f"{key} = {value:g} is not allowed", f"{key} > 0")
+    files = [paths] if isinstance(paths, str | Path) or hasattr(paths, "__fspath__") else paths
+    drops: list[Drop] = []
+    origins: list[Origin] = []
+    uncertainty = 0.0
+    for path in files:  # type: ignore[union-attr]
+        for signal in _signals(path, known):
+            found = [_measure(window, known) for window in find_windows(signal, progress=progress)]
+            drops += found
+            uncertainty = max(uncertainty, signal.calibration_uncertainty)
+            origins.append(_origin(signal, len(found)))
+    if not drops:
+        refuse("there are no recordings", "one file or more")
+    name = Path(origins[0].path or origins[0].name).stem
+    return Recording(name, tuple(drops), tuple(origins), known, uncertainty)
+
+
+def _signals(path: str | os.PathLike[str], config: Config) -> list[Signal]:
+    return open_signals(
+        path,
+        channel=config.channel,
+        unit=config.unit,
+        calibration=config.calibration,
+        polarity=config.polarity,
+        sample_rate=config.sample_rate,
+    )
+
+
+def _plate(config: Config) -> Plate | None:
+    """Return the resonance of the plate that is corrected."""
+    given = config.plate
+    return None if given is None else Plate(given.f0, given.Q, added_mass=given.added_mass)
+
+
+def _measure(window: Window, config: Config) -> Drop:
+    """Return the drop in a window, the plate's resonance taken out before."""
+    plate = _plate(config)
+    if plate is None:
+        return measure_drop(window, height=config.height, mass=config.mass)
+    force, step = correct_plate(window.force, window.sample_rate, plate)
+    drop = measure_drop(
+        replace(window, force=force, full_scale=None), height=config.height, mass=config.mass
+    )
+    return replace(drop, steps=(step, *drop.steps))
+
+
+def _origin(signal: Signal, count: int) -> Origin:
+    return Origin(
+        signal.name,
+        signal.path,
+        signal.checksum,
+        signal.date,
+        signal.calibration,
+        signal.sample_rate,
+        count,
+        signal.steps,
+        signal.remarks,
+    )
