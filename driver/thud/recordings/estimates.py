@@ -1,23 +1,305 @@
-"""A value with its standard uncertainty."""
+"""Contact time, restitution, peak, impulse and noise of a drop, with their uncertainties.
+
+Derivations: docs/recordings_theory.md.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+
+from thud.levels import record_force
+from thud.recordings.contact import Contact, Estimate, find_contact
+from thud.recordings.faults import repair
+from thud.recordings.noise import Noise
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+
+__all__ = ["Drop", "Estimate", "measure_drop"]
+
+# Bounces that are measured.
+MAX_BOUNCES = 3
+# Edge of the low-pass of the peak force, Hz (paper, section 3).
+RECORDED_BAND = 1250.0
+# Quiet below which it is told, s.
+SHORT_QUIET = 0.005
+# Standard deviations that make a difference worth telling.
+NOTABLE = 3.0
 
 
-@dataclass(frozen=True)
-class Estimate:
-    """A value and its standard uncertainty, in the same unit; NaN where not known."""
+@dataclass(frozen=True, eq=False)
+class Drop:
+    """One drop, corrected, and what it tells.
 
-    value: float
-    uncertainty: float
+    Attributes
+    ----------
+    name : str
+        Name of the drop, as ``"file.wav, drop 3"``.
+    time : ndarray, shape (n,)
+        Time since first touch, s.
+    force : ndarray, shape (n,)
+        Force without offset, drift, hum and slow noise, N.
+    sample_rate : float
+        Samples per second, Hz.
+    onset : float
+        Time of first touch in the file, s.
+    gate : tuple of int
+        First sample of the contact with its margins, and the one behind it: levels are computed
+        over ``force[gate[0]:gate[1]]`` and the expected energy of the noise is subtracted.
+    contact_time, restitution, peak_force, impulse, effective_mass : Estimate
+        In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+    restitution_by : str
+        ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
+    restitutions : dict of str to Estimate
+        The restitution by each way.
+    noise : Noise
+        Noise of the quiet parts.
+    bounces : tuple of float
+        Times of first touch of later bounces since the onset, s.
+    steps, remarks : tuple of str
+        What was done to the signal, and what is doubtful; a sentence each.
+    """
 
-    def __float__(self) -> float:
-        """Return the value."""
-        return float(self.value)
+    name: str
+    time: NDArray[np.float64]
+    force: NDArray[np.float64]
+    sample_rate: float
+    onset: float
+    gate: tuple[int, int]
+    contact_time: Estimate
+    restitution: Estimate
+    restitution_by: str
+    restitutions: dict[str, Estimate]
+    peak_force: Estimate
+    impulse: Estimate
+    effective_mass: Estimate
+    noise: Noise
+    bounces: tuple[float, ...]
+    steps: tuple[str, ...]
+    remarks: tuple[str, ...]
+    contact: Contact
 
-    @classmethod
-    def unknown(cls) -> Estimate:
-        """Return the estimate of what is not known."""
-        return cls(math.nan, math.nan)
+    def band_energy(self, lower: float, upper: float) -> tuple[float, float, float]:
+        """Return the energy of the force in a band, N2 s, that of the noise, and a deviation.
+
+        The energy is that of the gate less the expected energy of the noise in it; the last is
+        its standard deviation (docs/recordings_theory.md, section 4).
+        """
+        first, stop = self.gate
+        force, time = self.force[first:stop], self.time[first:stop]
+        # A record of this length has about time times band width degrees of freedom in the band.
+        nodes, weights = leggauss(12 + int(2 * (upper - lower) * (time[-1] - time[0])))
+        frequency = (lower + upper) / 2 + (upper - lower) / 2 * nodes
+        phase = 2 * np.pi * frequency[:, None] * time
+        scale = np.sqrt((upper - lower) * weights)[:, None] / self.sample_rate
+        functionals = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
+        value = functionals @ force
+        covariance = self.contact.covariance_of(functionals)
+        noise = float(np.trace(covariance))
+        variance = 4 * float(value @ covariance @ value)
+        # The mean of the first term is too large by twice the second.
+        variance = max(variance - 4 * float((covariance**2).sum()), 0.0)
+        variance += 2 * float((covariance**2).sum()) + (noise * self.contact.noise_doubt) ** 2
+        return float(value @ value) - noise, noise, math.sqrt(variance)
+
+
+def measure_drop(
+    window: Window, *, height: float | None = None, mass: float | None = None, gravity: float = 9.81
+) -> Drop:
+    """Return what one drop tells.
+
+    Parameters
+    ----------
+    window
+        The part of the signal around the drop.
+    height
+        Drop height of the lowest point, m.
+    mass
+        Mass of the source, kg.
+    gravity
+        Acceleration of free fall, m/s2.
+
+    Raises
+    ------
+    InputError
+        Where the pulse is clipped, cut, doubled or full of dropouts.
+    """
+    force, steps, remarks = repair(window)
+    contact = find_contact(replace(window, force=force))
+    steps += _told_background(contact)
+    for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
+        if quiet < SHORT_QUIET:
+            remarks += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
+    rate = window.sample_rate
+    landings = _landings(window)
+    touch, release = contact.touch, contact.release
+    contact_time = Estimate(
+        release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
+    )
+    impulse = _impulse(contact)
+    flights = []
+    leaving = release
+    for landing, again in landings:
+        flights.append(
+            Estimate(landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty))
+        )
+        leaving = again
+    ways, told = _restitutions(impulse, contact_time, flights, height, mass, gravity)
+    time = (np.arange(*contact.span)) / rate - touch.value
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    return Drop(
+        name=window.name,
+        time=time,
+        force=contact.force,
+        sample_rate=rate,
+        onset=window.start / rate + touch.value,
+        gate=(first, stop),
+        contact_time=contact_time,
+        restitution=_mean(list(ways.values())),
+        restitution_by=" and ".join(ways),
+        restitutions=ways,
+        peak_force=_peak(contact),
+        impulse=impulse,
+        effective_mass=_effective_mass(impulse, contact_time, ways.get("bounces"), height, gravity),
+        noise=_noise(contact),
+        bounces=tuple(landing.value - touch.value for landing, _ in landings),
+        steps=steps,
+        remarks=(*window.remarks, *remarks, *told),
+        contact=contact,
+    )
+
+
+def _landings(window: Window) -> list[tuple[Estimate, Estimate]]:
+    """Return first touch and release of the bounces, s from the first sample of the window."""
+    found = []
+    for bounce in window.bounces[:MAX_BOUNCES]:
+        first, stop = bounce.contact
+        if first < 2 or stop > len(bounce.force) - 2:
+            break
+        contact = find_contact(bounce)
+        late = (bounce.start - window.start) / window.sample_rate
+        found.append((
+            Estimate(late + contact.touch.value, contact.touch.uncertainty),
+            Estimate(late + contact.release.value, contact.release.uncertainty),
+        ))
+    return found
+
+
+def _impulse(contact: Contact) -> Estimate:
+    """Return the time integral of the force, N s: the sum over the gate."""
+    ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
+    variance = contact.covariance_of(ones)[0, 0]
+    return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
+
+
+def _peak(contact: Contact) -> Estimate:
+    """Return the maximum of the force below 1.25 kHz, N."""
+    low = record_force(np.pad(contact.gated, 2), contact.sample_rate)
+    place = int(np.argmax(low)) * len(contact.covariance) // len(low)
+    variance = contact.background.variances[0] * min(RECORDED_BAND, contact.sample_rate / 2)
+    variance += contact.covariance[place, place]
+    return Estimate(float(low.max()), math.sqrt(variance))
+
+
+def _noise(contact: Contact) -> Noise:
+    """Return the noise of the quiet parts."""
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
+    deviation = 1.4826 * float(np.median(np.abs(quiet - np.median(quiet))))
+    white, pink, brown = map(float, contact.background.variances[:3])
+    return Noise(deviation, "before and after", white, pink, brown)
+
+
+def _told_background(contact: Contact) -> tuple[str, ...]:
+    """Return what was removed, a sentence each."""
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    offset = float(contact.under[first:stop].mean())
+    steps = [f"an offset of {offset:.3g} N was removed"]
+    drift, deviation = contact.background.drift
+    if abs(drift) > NOTABLE * deviation:
+        steps.append(f"a drift of {drift:.3g} N/s was removed")
+    frequency, amplitude, deviation = contact.background.hum
+    if amplitude > NOTABLE * deviation:
+        steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
+    return tuple(steps)
+
+
+def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formula
+    impulse: Estimate,
+    contact_time: Estimate,
+    flights: list[Estimate],
+    height: float | None,
+    mass: float | None,
+    gravity: float,
+) -> tuple[dict[str, Estimate], tuple[str, ...]]:
+    """Return the restitution by each way, and remarks (docs/recordings_theory.md, section 5)."""
+    ways: dict[str, Estimate] = {}
+    speed = math.sqrt(2 * gravity * height) if height else math.nan
+    if height and mass:
+        value = impulse.value / (mass * speed) - 1 - gravity * contact_time.value / speed
+        ways["impulse"] = Estimate(
+            value,
+            math.hypot(
+                impulse.uncertainty / (mass * speed), gravity * contact_time.uncertainty / speed
+            ),
+        )
+    if height and flights:
+        scale = gravity / (2 * speed)
+        ways["bounces"] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
+    elif len(flights) > 1:
+        one, two = flights[:2]
+        value = two.value / one.value
+        spread = math.hypot(two.uncertainty / two.value, one.uncertainty / one.value)
+        ways["bounces"] = Estimate(value, value * spread)
+        return ways, ("the restitution is that of the first bounce: the drop height is not known",)
+    if len(ways) > 1:
+        by, other = ways["impulse"], ways["bounces"]
+        difference = by.value - other.value
+        deviation = math.hypot(by.uncertainty, other.uncertainty)
+        if abs(difference) > NOTABLE * deviation:
+            return ways, (
+                f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
+                f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
+                "check mass, height and calibration",
+            )
+    return ways, ()
+
+
+def _mean(values: list[Estimate]) -> Estimate:
+    """Return the mean, weighted by 1/uncertainty2; its uncertainty grows with disagreement."""
+    if not values:
+        return Estimate(math.nan, math.nan)
+    weight = np.array([1 / max(v.uncertainty, 1e-12) ** 2 for v in values])
+    value = np.array([v.value for v in values])
+    mean = float(weight @ value / weight.sum())
+    # Birge's ratio.
+    spread = float(weight @ (value - mean) ** 2) / max(len(values) - 1, 1)
+    return Estimate(mean, math.sqrt(max(1.0, spread) / weight.sum()))
+
+
+def _effective_mass(
+    impulse: Estimate,
+    contact_time: Estimate,
+    restitution: Estimate | None,
+    height: float | None,
+    gravity: float,
+) -> Estimate:
+    """Return impulse over (v0 (1 + e) + g t_c), kg, e from bounces."""
+    if restitution is None or not height:
+        return Estimate(math.nan, math.nan)
+    speed = math.sqrt(2 * gravity * height)
+    change = speed * (1 + restitution.value) + gravity * contact_time.value
+    value = impulse.value / change
+    parts = (
+        impulse.uncertainty / change,
+        value * speed * restitution.uncertainty / change,
+        value * gravity * contact_time.uncertainty / change,
+    )
+    return Estimate(value, math.hypot(*parts))
