@@ -16,18 +16,15 @@ if TYPE_CHECKING:
 # MEAN_SLOPE, a parabola, and a random walk. Standard deviations of each class, from the flanks of
 # the models: smooth as a half sine, with a jump as the shell, rough as modes and finite elements.
 MEAN_SLOPE = 0.17
-KNOTS = np.array(
-    [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0]
-)
+KNOTS = np.array([0.0, 0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0, 4.0])
 CLASSES = np.array([
     # jump, line, parabola, walk in 1 ms
     [0.0, 0.12, 0.06, 0.02],
     [0.2, 0.12, 0.06, 0.02],
     [0.2, 0.12, 0.06, 0.02],  # the same through an anti-aliasing filter
-    [0.0, 0.12, 0.06, 0.12],
-    [0.0, 0.12, 0.06, 0.5],
+    [0.0, 0.12, 0.06, 0.15],
 ])  # fmt: skip
-PRIOR = np.log([0.4, 0.2, 0.1, 0.2, 0.1])
+PRIOR = np.log([0.4, 0.2, 0.1, 0.3])
 FILTERED = 2
 # Times of one search, and searches, each within REACH standard deviations of the one before.
 N_TIME = 41
