@@ -16,7 +16,7 @@ from thud._schema import *  # noqa: F403 - the groups and models that the librar
 from thud._schema import __all__ as _groups
 from thud.case import Case, read_case, write_case
 from thud.ensemble import Ensemble, solve_many
-from thud.errors import FitWarning, InputError, NumericalError, ThudError
+from thud.errors import FitWarning, InputError, NumericalError, PlausibilityWarning, ThudError
 from thud.free_modes import FreeModes, free_modes, loss_factors
 from thud.impact import Impact, Motion, solve, solve_case
 from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
@@ -39,6 +39,7 @@ __all__ = [  # noqa: PLE0604 - the first are strings too
     "InputError",
     "Motion",
     "NumericalError",
+    "PlausibilityWarning",
     "Recording",
     "ThudError",
     "force_exposure_levels",

@@ -106,12 +106,12 @@ class Levels:
     bands : str
         Bands of levels.csv; "octave", "third", "both".
     force : str
-        Force that the verdict is on; "elastic", "floor".
+        Force whose levels, peak and verdict count; "floor", "elastic".
     """
 
     method: str = "exact"
     bands: str = "octave"
-    force: str = "elastic"
+    force: str = "floor"
 
 
 @dataclass(frozen=True)
@@ -339,8 +339,8 @@ GROUPS = {
 # Unit and meaning of the numbers that describe an impact.
 SCALARS = {
     "contact_time": ("s", "contact time"),
-    "peak_force": ("N", "maximum elastic force"),
-    "peak_floor_force": ("N", "maximum force on the floor"),
+    "peak_force": ("N", "maximum force on the floor"),
+    "peak_elastic_force": ("N", "maximum elastic force"),
     "max_deflection": ("m", "maximum deflection"),
     "restitution": ("", "coefficient of restitution"),
     "impulse": ("N s", "time integral of the force on the floor"),
@@ -413,6 +413,6 @@ KEYS = (
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),
     Key("", "levels", "method", "choice", "", "method of the levels", ('exact', 'fft')),
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
-    Key("", "levels", "force", "choice", "", "force that the verdict is on", ('elastic', 'floor')),
+    Key("", "levels", "force", "choice", "", "force whose levels, peak and verdict count", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
 )

@@ -2,34 +2,43 @@
 
 from __future__ import annotations
 
-import html
 import time
+import warnings
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import require_kind
-from thud.errors import InputError, ThudError
+from thud.checks import refuse, refuse_value, require_kind
+from thud.errors import InputError, PlausibilityWarning, ThudError
 from thud.files import replace_file
-from thud.impact import Impact, solve_case
-from thud.levels import get_bands, octave_limits
+from thud.impact import Impact, compute
+from thud.levels import SOURCES, get_bands
 from thud.plot.comparison import comparison_page
-from thud.plot.look import COLOURS, save_all
+from thud.plot.comparison_html import comparison_html
+from thud.plot.look import save_all
 from thud.recording import Recording
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
 
     from matplotlib.figure import Figure
 
-HEADER = ("", "contact, ms", "peak, N", "restitution", "level - nominal, dB", "conforms", "run, ms")
+    from thud.levels import Criterion
+
+# Criteria after the octaves: name and unit, size of the unit, decimals.
+_ROWS = (
+    ("contact time, ms", 1e-3, 2),
+    ("restitution", 1.0, 3),
+    ("peaks of the force", 1.0, 0),
+    ("mass, kg", 1.0, 3),
+    ("drop height, m", 1.0, 3),
+)
 
 
 @dataclass(frozen=True)
@@ -42,99 +51,64 @@ class Comparison:
         What is compared, by its name.
     run_times : dict of str to float
         Computing time of each model, s.
-    force : str
-        ``"elastic"`` or ``"floor"``: the force that is compared.
+    force : str or None
+        ``"floor"`` or ``"elastic"``: the force that is compared; None: that of each case.
     source : str
         Source of the limits.
     """
 
     impacts: dict[str, Impact | Recording]
     run_times: dict[str, float]
-    force: str = "floor"
+    force: str | None = None
     source: str = "rubber_ball"
 
+    @property
+    def remarks(self) -> list[str]:
+        """What is possible but not plausible, with the names of the impacts."""
+        solved = {n: i for n, i in self.impacts.items() if isinstance(i, Impact)}
+        return [f"{name}: {remark}" for name, i in solved.items() for remark in i.remarks]
+
     def table(self) -> list[tuple[str, ...]]:
-        """Return one row of text per impact, in the order of `HEADER`."""
-        lower, upper = octave_limits(self.source)
-        nominal, tolerance = (lower + upper) / 2, (upper - lower) / 2
-        rows: list[tuple[str, ...]] = []
-        for name, impact in self.impacts.items():
-            difference = impact.levels(method="exact", force=self.force) - nominal
-            met = int(np.sum(np.abs(difference) <= tolerance))
-            bounce = impact.restitution
-            spent = self.run_times.get(name)
+        """Return rows of text: names, force, method, criteria, peaks, times, verdicts.
+
+        Columns are the impacts and, in the last, the limits.
+        """
+        impacts = self.impacts.values()
+        verdicts = [impact.conformity(self.source, self.force) for impact in impacts]
+        octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
+        rows = [
+            ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
+            ("force", *map(self._force_of, impacts), ""),
+            ("levels", *(impact.level_method for impact in impacts), ""),
+        ]
+        together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
+        for (title, unit, decimals), criteria in zip([*octaves, *_ROWS], together, strict=True):
+            ends = [f"{end / unit:g}" for end in (criteria[0].lower, criteria[0].upper)]
             rows.append(
                 (
-                    name,
-                    f"{1e3 * impact.contact_time:.2f}",
-                    f"{impact.force(self.force).max():.0f}",
-                    "not known" if np.isnan(bounce) else f"{bounce:.3f}",
-                    "  ".join(f"{value:+.1f}" for value in difference),
-                    f"{met} of 5 octaves",
-                    "" if spent is None else f"{1e3 * spent:.1f}",
+                    title,
+                    *(_cell(criterion, unit, decimals) for criterion in criteria),
+                    " to ".join(dict.fromkeys(ends)),
                 )
             )
-        return rows
+        rows.append(("peak force, N", *(f"{i.peak(self.force):.1f}" for i in impacts), ""))
+        if self.run_times:
+            times = (self.run_times.get(name) for name in self.impacts)
+            rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
+        return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
+
+    def _force_of(self, impact: Impact | Recording) -> str:
+        """Return the force of an impact that is compared; a recording has only one."""
+        chosen = self.force if isinstance(impact, Impact) else None
+        return chosen or impact.judged_force
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        return comparison_page(self.impacts, self.force, self.source, [HEADER, *self.table()])
+        return comparison_page(self.impacts, self.force, self.source, self.table())
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        figure = make_subplots(
-            rows=2,
-            cols=2,
-            specs=[[{"colspan": 2}, None], [{}, {}]],
-            subplot_titles=("Blocked force", "Octaves", "Third octaves"),
-            vertical_spacing=0.12,
-        )
-        lower, upper = octave_limits(self.source)
-        names = {kind: [f"{f:g}" for f in get_bands(kind).nominal] for kind in ("octave", "third")}
-        figure.add_trace(
-            go.Bar(
-                x=names["octave"],
-                y=upper - lower,
-                base=lower,
-                marker_color="lightgrey",
-                name=f"tolerance, {self.source.replace('_', ' ')}",
-            ),
-            row=2,
-            col=1,
-        )
-        for i, (name, impact) in enumerate(self.impacts.items()):
-            look = {"color": COLOURS[i % len(COLOURS)]}
-            group = {"name": html.escape(name), "legendgroup": str(i)}
-            force = impact.force(self.force)
-            # The long free flight after the contact is not drawn.
-            since = impact.time - impact.touch_time
-            shown = (since >= 0) & (since < 1.5 * impact.contact_time)
-            figure.add_trace(
-                go.Scatter(x=1e3 * since[shown], y=force[shown], line=look, **group),
-                row=1,
-                col=1,
-            )
-            for column, kind in enumerate(names, start=1):
-                values = impact.levels(kind, "exact", self.force)
-                figure.add_trace(
-                    go.Scatter(
-                        x=names[kind], y=values, line=look, marker=look, showlegend=False, **group
-                    ),
-                    row=2,
-                    col=column,
-                )
-        figure.update_xaxes(title_text="Time since first touch, ms", row=1, col=1)
-        figure.update_yaxes(title_text="Force, N", row=1, col=1)
-        for column in (1, 2):
-            figure.update_xaxes(title_text="Band, Hz", type="category", row=2, col=column)
-            figure.update_yaxes(title_text="Force exposure level, dB re 1 N", row=2, col=column)
-        figure.update_layout(height=850, template="simple_white")
-        plots = figure.to_html(full_html=False, include_plotlyjs=True)
-        cells = [
-            "<tr>" + "".join(f"<{tag}>{html.escape(cell)}</{tag}>" for cell in row) + "</tr>"
-            for tag, row in [("th", HEADER), *(("td", row) for row in self.table())]
-        ]
-        return _PAGE.format(force=self.force, table="\n".join(cells), plots=plots)
+        return comparison_html(self.impacts, self.force, self.source, self.table())
 
     def save(self, directory: str | os.PathLike[str]) -> list[Path]:
         """Write ``comparison.png``, ``.svg`` and ``.html`` and return their paths.
@@ -152,10 +126,18 @@ class Comparison:
         return [*pictures, page]
 
 
+def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
+    """Return the value of a criterion, and how it misses its limits."""
+    if np.isnan(criterion.value):
+        return "not known"
+    word = "" if criterion.conforms else "low" if criterion.value < criterion.lower else "high"
+    return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
+
+
 def compare(
-    impacts: Mapping[str, Case | Impact | Recording],
-    force: str = "floor",
-    source: str = "rubber_ball",
+    impacts: Mapping[str, Case | Impact | Recording] | Iterable[Case | Impact | Recording],
+    force: str | None = None,
+    source: str | None = None,
     *,
     progress: bool = False,
 ) -> Comparison:
@@ -164,11 +146,12 @@ def compare(
     Parameters
     ----------
     impacts
-        Cases (which are solved), impacts and recordings by name; one or more.
+        Cases (which are solved), impacts and recordings, one or more: by name, or in a row, where
+        cases and impacts have the names of their cases.
     force
-        ``"elastic"`` or ``"floor"``.
+        ``"floor"`` or ``"elastic"``; by default that of each case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: source of the limits.
+        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases.
     progress
         Show a progress bar.
 
@@ -180,19 +163,21 @@ def compare(
     Raises
     ------
     InputError
-        Where there is nothing to compare, or the drops differ.
+        Where there is nothing to compare, or the drops or the limits of the cases differ.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `Comparison.remarks`.
     """
-    if not impacts:
-        message = "impacts is empty; allowed: one or more cases, impacts or recordings by name"
-        raise InputError(message)
+    named = _named(impacts)
     solved: dict[str, Impact | Recording] = {}
     run_times = {}
-    for name, given in tqdm(impacts.items(), unit="case", disable=not progress, leave=False):
-        require_kind(name, given, Case | Impact | Recording)
+    for name, given in tqdm(named.items(), unit="case", disable=not progress, leave=False):
         if isinstance(given, Case):
             start = time.perf_counter()
             try:
-                solved[name] = solve_case(given)
+                solved[name] = compute(given)
             except ThudError as error:
                 message = f"{name}: {error}"
                 raise type(error)(message) from error
@@ -208,7 +193,42 @@ def compare(
         listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
         message = f"&drop: height or gravity differs ({listed}); allowed: cases of the same drop"
         raise InputError(message)
-    return Comparison(solved, run_times, force, source)
+    sources = {i.case.limits.source for i in solved.values() if isinstance(i, Impact)}
+    if source is None and len(sources) > 1:
+        refuse(
+            f"&limits: source differs ({', '.join(sorted(sources))})",
+            "cases with one source, or the choice of one",
+        )
+    found = Comparison(solved, run_times, force, source or next(iter(sources), SOURCES[0]))
+    for remark in found.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    return found
+
+
+def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
+    """Return what is compared by name, checked."""
+    allowed = "one or more cases, impacts or recordings, by name or in a list"
+    if isinstance(impacts, Mapping):
+        pairs = list(impacts.items())
+    else:
+        row = [impacts] if isinstance(impacts, Case | Impact | Recording) else impacts
+        if not isinstance(row, Iterable):
+            refuse_value("impacts", row, allowed)
+        pairs = [(_name(given), given) for given in row]
+    if not pairs:
+        refuse("impacts is empty", allowed)
+    named: dict[str, Case | Impact | Recording] = {}
+    for name, given in pairs:
+        require_kind(name, given, Case | Impact | Recording)
+        # Cases from Python often share their name.
+        names = chain([name], (f"{name} ({n})" for n in count(2)))
+        named[next(free for free in names if free not in named)] = given
+    return named
+
+
+def _name(given: object) -> str:
+    case = given.case if isinstance(given, Impact) else given
+    return case.name if isinstance(case, Case) else "recording"
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:
@@ -232,28 +252,3 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
             raise InputError(message)
         found[name] = given
     return found
-
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>thud: comparison</title>
-<style>
-body {{ font-family: sans-serif; margin: 2em auto; max-width: 75em; padding: 0 1em; }}
-table {{ border-collapse: collapse; }}
-th, td {{ padding: 0.3em 0.9em; text-align: right; border-bottom: 1px solid #ccc; }}
-th:first-child, td:first-child {{ text-align: left; }}
-</style>
-</head>
-<body>
-<h1>Comparison of models and recordings</h1>
-<p>Blocked force ({force} force), its levels over the tolerance of the standards; level
-deviations from the nominal values in the octaves 31.5 to 500 Hz.</p>
-<table>
-{table}
-</table>
-{plots}
-</body>
-</html>
-"""

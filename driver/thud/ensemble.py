@@ -54,8 +54,8 @@ class Ensemble:
         The sentence of the error.
     contact_time : ndarray, shape (n_set,)
         Time from first touch to release, s.
-    peak_force, peak_floor_force : ndarray, shape (n_set,)
-        Maximum of the elastic force and of the force on the floor, N.
+    peak_force, peak_elastic_force : ndarray, shape (n_set,)
+        Maximum of the force on the floor and of the elastic force, N.
     max_deflection : ndarray, shape (n_set,)
         Maximum deflection, m.
     restitution : ndarray, shape (n_set,)
@@ -82,7 +82,7 @@ class Ensemble:
     reason: NDArray[np.object_]
     contact_time: NDArray[np.float64]
     peak_force: NDArray[np.float64]
-    peak_floor_force: NDArray[np.float64]
+    peak_elastic_force: NDArray[np.float64]
     max_deflection: NDArray[np.float64]
     restitution: NDArray[np.float64]
     impulse: NDArray[np.float64]

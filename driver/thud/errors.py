@@ -17,6 +17,10 @@ class FitWarning(UserWarning):
     """A fit has a result that is not reliable in every respect."""
 
 
+class PlausibilityWarning(UserWarning):
+    """What was computed is possible but not plausible."""
+
+
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 

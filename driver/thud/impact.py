@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import api, call, text
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_choice, require_kind
-from thud.errors import InputError
+from thud.errors import InputError, PlausibilityWarning
 from thud.levels import Conformity, force_exposure_levels, judge, peak_count
 
 if TYPE_CHECKING:
@@ -79,6 +80,8 @@ class Impact:
         Other histories of the model, such as the contact radius; the names end with units.
     facts : dict of str to float
         Other numbers of the model, such as the bulk modulus; SI units.
+    remarks : tuple of str
+        What is possible but not plausible, such as a wall with the density of no rubber.
     motion : Motion or None
         Snapshots of the deformed ball; None where the model has none.
     sample_rate : float
@@ -88,9 +91,10 @@ class Impact:
     contact_time : float
         Time from first touch to release, s.
     peak_force : float
-        Maximum elastic force, N.
-    peak_floor_force : float
-        Maximum force on the floor, N.
+        Maximum force on the floor, N; of finite elements of its part below 1.25 kHz, which a force
+        plate records.
+    peak_elastic_force : float
+        Maximum elastic force, N, likewise.
     max_deflection : float
         Maximum deflection, m.
     restitution : float
@@ -114,12 +118,13 @@ class Impact:
     parts: dict[str, NDArray[np.float64]]
     channels: dict[str, NDArray[np.float64]]
     facts: dict[str, float]
+    remarks: tuple[str, ...]
     motion: Motion | None
     sample_rate: float
     impact_velocity: float
     contact_time: float
     peak_force: float
-    peak_floor_force: float
+    peak_elastic_force: float
     max_deflection: float
     restitution: float
     impulse: float
@@ -133,7 +138,7 @@ class Impact:
         model = self.case.model.name if self.case.model else ""
         return (
             f"<Impact, {model}: contact {1e3 * self.contact_time:.2f} ms, "
-            f"e {self.restitution:.3f}, peak {self.peak_floor_force:.0f} N>"
+            f"e {self.restitution:.3f}, peak {self.peak():.0f} N>"
         )
 
     @property
@@ -157,10 +162,31 @@ class Impact:
             raise AttributeError(message)
         return self.parts[name]
 
-    def force(self, kind: str = "elastic") -> NDArray[np.float64]:
-        """Return the ``"elastic"`` or the ``"floor"`` force, N, shape (n_sample,)."""
-        require_choice("force", kind, FORCES)
-        return self.elastic_force if kind == "elastic" else self.floor_force
+    def force(self, kind: str | None = None) -> NDArray[np.float64]:
+        """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
+
+        By default that which the case judges.
+        """
+        return self.elastic_force if self._is_elastic(kind) else self.floor_force
+
+    def peak(self, force: str | None = None) -> float:
+        """Return the maximum of a force, N; see `force` and `peak_force`."""
+        return self.peak_elastic_force if self._is_elastic(force) else self.peak_force
+
+    @property
+    def judged_force(self) -> str:
+        """Force that the case judges, ``"floor"`` or ``"elastic"``."""
+        return self.case.levels.force
+
+    @property
+    def level_method(self) -> str:
+        """Method of the levels, ``"exact"`` or ``"fft"``."""
+        return self.case.levels.method
+
+    def _is_elastic(self, kind: str | None) -> bool:
+        chosen = kind or self.judged_force
+        require_choice("force", chosen, FORCES)
+        return chosen == "elastic"
 
     def levels(
         self, bands: str = "octave", method: str | None = None, force: str | None = None
@@ -174,13 +200,13 @@ class Impact:
         method
             ``"exact"`` or ``"fft"``; by default that of the case.
         force
-            ``"elastic"`` or ``"floor"``; by default that of the case.
+            ``"floor"`` or ``"elastic"``; by default that of the case.
         """
         return force_exposure_levels(
-            self.force(force or self.case.levels.force),
+            self.force(force),
             self.sample_rate,
             bands,
-            method or self.case.levels.method,
+            method or self.level_method,
         )
 
     def conformity(self, source: str | None = None, force: str | None = None) -> Conformity:
@@ -191,14 +217,13 @@ class Impact:
         source
             ``"rubber_ball"`` or ``"tyre"``; by default that of the case.
         force
-            ``"elastic"`` or ``"floor"``; by default that of the case.
+            ``"floor"`` or ``"elastic"``; by default that of the case.
         """
-        kind = force or self.case.levels.force
         return judge(
-            self.levels(force=kind),
+            self.levels(force=force),
             self.contact_time,
             self.restitution,
-            peak_count(self.force(kind), self.sample_rate),
+            peak_count(self.force(force), self.sample_rate),
             self.case.ball.mass,
             self.case.drop.height,
             source or self.case.limits.source,
@@ -245,19 +270,34 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Names group, key, value and allowed range.
     NumericalError
         Where the drop leaves the range of the model or the steps are too coarse.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `Impact.remarks`.
     """
-    return solve_case(
-        Case(
-            ball=Ball() if ball is None else ball,
-            drop=Drop() if drop is None else drop,
-            model=new_model(model, options),
-            sampling=Sampling(sample_rate, duration, substeps),
-        )
+    case = Case(
+        ball=Ball() if ball is None else ball,
+        drop=Drop() if drop is None else drop,
+        model=new_model(model, options),
+        sampling=Sampling(sample_rate, duration, substeps),
     )
+    return _warned(compute(case))
 
 
 def solve_case(case: Case) -> Impact:
     """Compute the impact of a case; see `solve`."""
+    return _warned(compute(case))
+
+
+def _warned(impact: Impact) -> Impact:
+    for remark in impact.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
+    return impact
+
+
+def compute(case: Case) -> Impact:
+    """Compute the impact of a case without warnings."""
     require_kind("case", case, Case)
     if case.model is None:
         message = "&model is missing; allowed: a case with a source model"
@@ -276,6 +316,7 @@ def new_impact(case: Case, found: Bundle) -> Impact:
         parts=found["parts"],
         channels=found.get("channels", {}),
         facts=found.get("facts", {}),
+        remarks=tuple(map(text, found.get("remarks", {}).values())),
         motion=_motion(**found["motion"]) if "motion" in found else None,
         **scalars,
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -89,6 +90,18 @@ class Conformity:
     def conforms(self) -> bool:
         """Whether all criteria are met."""
         return all(criterion.conforms for criterion in self.criteria)
+
+    @property
+    def verdict(self) -> str:
+        """``"conforms"``, ``"does not conform"`` or ``"cannot be decided"``.
+
+        The last where all criteria are met but those whose value, NaN, is not known.
+        """
+        if self.conforms:
+            return "conforms"
+        missed = [criterion for criterion in self.criteria if not criterion.conforms]
+        known = any(not math.isnan(criterion.value) for criterion in missed)
+        return "does not conform" if known else "cannot be decided"
 
     def __bool__(self) -> bool:
         """Return whether all criteria are met."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from thud.columns import read_table
 from thud.errors import InputError
-from thud.levels import force_exposure_levels
+from thud.levels import Conformity, force_exposure_levels, judge, peak_count
 
 if TYPE_CHECKING:
     import os
@@ -111,16 +112,45 @@ class Recording:
         """Not known from one impact: NaN."""
         return float("nan")
 
-    def force(self, kind: str = "floor") -> NDArray[np.float64]:  # noqa: ARG002 - there is one
+    @property
+    def judged_force(self) -> str:
+        """Force that a force plate measures: ``"floor"``."""
+        return "floor"
+
+    @property
+    def level_method(self) -> str:
+        """Method of the levels: ``"exact"``."""
+        return "exact"
+
+    def force(self, kind: str | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
         """Return the force, N, shape (n_sample,), for any `kind`."""
         return self.record
+
+    def peak(self, force: str | None = None) -> float:  # noqa: ARG002 - there is one
+        """Return the maximum force, N."""
+        return self.peak_force
 
     def levels(
         self, bands: str = "octave", method: str | None = None, force: str | None = None
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, dB, shape (n_band,); see `Impact.levels`."""
         return force_exposure_levels(
-            self.force(force or "floor"), self.sample_rate, bands, method or "exact"
+            self.force(force), self.sample_rate, bands, method or self.level_method
+        )
+
+    def conformity(self, source: str = "rubber_ball", force: str | None = None) -> Conformity:
+        """Return the verdict of the standards; see `Impact.conformity`.
+
+        Restitution, mass and drop height are not known from one record: NaN.
+        """
+        return judge(
+            self.levels(force=force),
+            self.contact_time,
+            self.restitution,
+            peak_count(self.record, self.sample_rate),
+            math.nan,
+            math.nan,
+            source,
         )
 
 

@@ -62,9 +62,15 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         {name: values for name, values in named.items() if name != "velocity_m_per"},
         {name: values for name, values in found.items() if name != "time_s"},
         dict(numbers.get("facts", {})),
+        _texts(numbers.get("remarks", {}).get("remark", [])),
         motion,
         **{name: numbers["summary"][name] for name in SCALARS},
     )
+
+
+def _texts(value: str | list[str]) -> tuple[str, ...]:
+    """Return the texts of a key; f90nml gives one text without its list."""
+    return (value,) if isinstance(value, str) else tuple(value)
 
 
 def _table(path: Path) -> dict[str, NDArray[np.float64]]:

@@ -17,6 +17,7 @@ module thud_api
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: load_case, outcome_type, run_case
    use thud_system, only: begin_call, end_call, end_all_calls => end_calls
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
@@ -146,6 +147,9 @@ contains
       do i = 1, size(history%part_name)
          call bundle%add_array('parts.'//history%part_name(i), n, history%part(:, i))
       end do
+      do i = 1, size(history%remark)
+         call bundle%add_text('remarks.'//to_text(i), trim(history%remark(i)))
+      end do
       if (allocated(history%channel)) then
          do i = 1, size(history%channel_name)
             call bundle%add_array('channels.'//history%channel_name(i), n, history%channel(:, i))
@@ -244,6 +248,7 @@ contains
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
       character(len=:), allocatable :: text
+      integer :: i
 
       allocate (bundle)
       call begin_call()
@@ -255,7 +260,9 @@ contains
          call bundle%add_text('case', text)
          call bundle%add_text('directory', outcome%directory)
          call bundle%add_text('table', outcome%table)
-         call bundle%add_text('remark', outcome%remark)
+         do i = 1, outcome%n_remark
+            call bundle%add_text('run_remarks.'//to_text(i), outcome%remarks(i)%text)
+         end do
          call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
          if (case%has_impact) call add_history(bundle, results%history)
          if (case%has_modes) call add_modes(bundle, results%modes)

@@ -9,6 +9,7 @@ module thud_command_line
    use thud_run, only: outcome_type, run_case
    use thud_schema, only: get_schema
    use thud_sets_run, only: run_sets
+   use thud_suggestion, only: get_suggestion
    use thud_system, only: get_system_message, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted
    implicit none (type, external)
@@ -22,6 +23,10 @@ module thud_command_line
    !> Maximum number of threads, and the allowed range as text.
    integer, parameter :: max_threads = 1024
    character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
+
+   !> Options by their long names.
+   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--sets', '--threads', '--check', &
+      '--quiet', '--keys', '--schema', '--help', '--version']
 
    !> What the command line asks for.
    type :: request_type
@@ -52,6 +57,7 @@ contains
       type(results_type) :: results
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
+      integer :: i
 
       exit_code = 0
       call prepare_process()
@@ -74,7 +80,9 @@ contains
             exit_code = error%code
             return
          end if
-         if (outcome%remark /= '') call write_line(standard_error, 'thud: '//outcome%remark, exit_code)
+         do i = 1, outcome%n_remark
+            call write_line(standard_error, 'thud: '//outcome%remarks(i)%text, exit_code)
+         end do
          if (.not. request%quiet) call write_line(standard_output, outcome%table//'  Results: ' &
             //outcome%directory, exit_code)
          if (exit_code == 0 .and. request%check .and. .not. outcome%conforms) exit_code = not_conforming
@@ -102,7 +110,7 @@ contains
       type(request_type), intent(out) :: request
       !> An argument is unknown, missing or given twice.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: argument, number
+      character(len=:), allocatable :: argument, number, suggestion
       integer :: i
 
       request%output = ''
@@ -136,8 +144,9 @@ contains
             if (.not. allocated(error)) call take_threads(number, request%threads, error)
          case default
             if (index(argument, '-') == 1) then
-               error = input_error(quoted(argument)//' is not a known option; allowed: --output DIR, --sets TABLE, ' &
-                  //'--threads N, --check, --quiet, --keys, --schema, --help, --version')
+               call get_suggestion(argument, known_options, suggestion)
+               error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
+                  //'--sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else

@@ -4,6 +4,7 @@ module thud_field
    use thud_error, only: error_type, input_error
    use thud_interval, only: get_range_text, interval_type, new_interval
    use thud_kinds, only: wp
+   use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, lower_case, quoted, to_text
    implicit none (type, external)
    private
@@ -84,16 +85,18 @@ contains
       !> Names group, key, value and allowed range.
       type(error_type), allocatable, intent(out) :: error
       type(interval_type) :: interval
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, suggestion
       logical :: inside
       integer :: i
 
       do i = 1, size(fields)
          associate (field => fields(i))
             inside = .true.
+            suggestion = ''
             interval = get_interval(fields, i)
             if (field%n_choice > 0) then
                inside = any(field%choices(:field%n_choice) == field%text_value)
+               if (.not. inside) call get_suggestion(trim(field%text_value), field%choices(:field%n_choice), suggestion)
             else if (associated(field%list_value)) then
                associate (entries => field%list_value%values(:field%list_value%count))
                   inside = all(interval%contains(entries))
@@ -104,7 +107,7 @@ contains
             end if
             if (inside) cycle
             call field%get_text(text)
-            error = field%get_error(text, 'is not allowed', interval)
+            error = field%get_error(text, 'is not allowed'//suggestion, interval)
             return
          end associate
       end do

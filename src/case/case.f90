@@ -19,6 +19,8 @@ module thud_case
 
    !> Input of one run.
    type :: case_type
+      !> Groups that were left out of the text of the case, whose defaults hold: ` &drop &model`.
+      character(len=32) :: left_out = ''
       !> Name of the case, also of its output directory.
       character(len=name_length) :: name = ''
       !> An impact is asked for, by the group `&model`.
@@ -38,8 +40,8 @@ module thud_case
       character(len=name_length) :: level_method = 'exact'
       !> Bands of the levels: octave, third or both.
       character(len=name_length) :: bands = 'octave'
-      !> Force that the verdict is on: elastic or floor.
-      character(len=name_length) :: level_force = 'elastic'
+      !> Force whose levels, peak and verdict count: that on the floor, or the elastic one, the paper's ball force.
+      character(len=name_length) :: level_force = 'floor'
       !> Source whose limits apply.
       character(len=name_length) :: source = 'rubber_ball'
    end type case_type
@@ -84,8 +86,8 @@ contains
          in_group('levels', [ &
          choice_field('method', case%level_method, 'method of the levels', level_methods), &
          choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
-         choice_field('force', case%level_force, 'force that the verdict is on', &
-         [character(len=8) :: 'elastic', 'floor'])]), &
+         choice_field('force', case%level_force, 'force whose levels, peak and verdict count', &
+         [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)])]
    end function get_fields
 

@@ -7,6 +7,7 @@ module thud_compute
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
+   use thud_remarks, only: get_remarks
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    implicit none (type, external)
@@ -52,6 +53,7 @@ contains
       associate (model => case%models(get_model_number(case))%model)
          call model%solve(case%ball, case%drop, case%sampling, results%history, error)
       end associate
+      if (.not. allocated(error)) call get_remarks(case, results%history, results%history%remark)
    end subroutine compute_case
 
    !> Levels and criteria of the force history of a case.

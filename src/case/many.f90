@@ -17,6 +17,7 @@ module thud_many
    use thud_sampling, only: check_sampling, get_sample_count
    use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
+   use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, quoted, to_text
    implicit none (type, external)
    private
@@ -91,7 +92,7 @@ contains
       type(field_type), allocatable :: fields(:)
       type(list_type), pointer :: list
       logical, allocatable :: possible(:)
-      character(len=:), allocatable :: key
+      character(len=:), allocatable :: key, suggestion
       logical :: known
       integer :: i, j
 
@@ -114,7 +115,8 @@ contains
             end if
          end if
          if (.not. known) then
-            error = input_error(quoted(names(i))//' is not a key of drops; allowed: ' &
+            call get_suggestion(trim(names(i)), pack(fields%key, possible), suggestion)
+            error = input_error(quoted(names(i))//' is not a key of drops'//suggestion//'; allowed: ' &
                //join_quoted(pack(fields%key, possible)))
             if (columns(i)%place > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
                //' is not an entry of the list; allowed: '//trim(key)//'(1) to '//trim(key)//'('//to_text(list%count)//')')
@@ -276,7 +278,8 @@ contains
       if (allocated(error) .or. .not. forces) return
       if (any([(any(fields(columns(i)%place)%key == [character(len=11) :: 'duration', 'sample_rate']), &
          i=1, size(columns))])) then
-         error = input_error('forces are wanted of drops with their own sampling; allowed: one sampling for all, that of the case')
+         error = input_error('forces are wanted of drops with their own sampling; allowed: one sampling for all, ' &
+            //'that of the case')
       else
          call check_sampling(case%sampling, error)
       end if
@@ -414,7 +417,7 @@ contains
       do i = 1, size(sets)
          associate (found => outcomes(i))
             many%status(i) = merge(0, 1, found%computed)
-            many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_floor_force, found%max_deflection, &
+            many%outcome(:, i) = [found%contact_time, found%peak_force, found%peak_elastic_force, found%max_deflection, &
                found%restitution, found%impulse]
          end associate
          if (many%judged .and. many%status(i) == 0) call judge(case, i, many)

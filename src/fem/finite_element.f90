@@ -52,6 +52,7 @@ module thud_finite_element
    contains
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
+      procedure, pass(options) :: get_paper_modulus
       procedure, pass(options) :: get_loss_factors
    end type finite_element_type
 
@@ -66,6 +67,15 @@ contains
       ! The number of elements, and of steps, which grows as they shrink.
       cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
    end function get_cost
+
+   !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).
+   function get_paper_modulus(options) result(modulus)
+      class(finite_element_type), intent(in) :: options
+      !> The modulus, Pa.
+      real(wp) :: modulus
+
+      modulus = 2.08e6_wp
+   end function get_paper_modulus
 
    !> Loss factor of the material in shear against frequency.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)

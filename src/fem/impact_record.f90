@@ -112,12 +112,12 @@ contains
       ! Nodes that touch one by one make spikes, the higher the shorter the steps.
       call get_low_pass(history%floor_force, history%sample_rate, recorded_band, recorded)
       history%peak_force = maxval(recorded)
-      history%peak_floor_force = history%peak_force
+      history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
       history%max_deflection = maxval(history%deflection)
       associate (material => run%body%material)
-         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'computed_time', 'shortest_step', &
-            'deepest_sink']
+         history%fact_name = [character(len=24) :: 'shear_modulus', 'bulk_modulus', 'simulated_time', 'minimum_step', &
+            'maximum_penetration']
          history%fact_unit = [character(len=8) :: 'Pa', 'Pa', 's', 's', 'm']
          history%fact = [material%shear_modulus, material%bulk_modulus, run%time, run%shortest_interval, run%sink]
       end associate

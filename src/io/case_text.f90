@@ -4,15 +4,15 @@ module thud_case_text
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
+   use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, newline, quoted, to_text
    implicit none (type, external)
    private
 
    public :: describe_keys, get_case_text, read_case
 
-   !> Groups that a file must hold for an impact, and for free modes.
-   character(len=24), parameter :: impact_groups(3) = [character(len=24) :: 'ball', 'drop', 'model']
-   character(len=24), parameter :: modes_groups(2) = [character(len=24) :: 'ball', 'modes']
+   !> Groups whose defaults a run names where a file leaves them out, the first of them also of free modes.
+   character(len=*), parameter :: main_groups(*) = ['ball ', 'drop ', 'model']
 
 contains
 
@@ -28,7 +28,7 @@ contains
       logical, intent(in), optional :: unchecked
       type(group_type), allocatable :: groups(:)
       type(field_type), allocatable :: fields(:)
-      integer :: i
+      integer :: i, j
 
       call new_case(case)
       if (len(default_name) <= name_length) case%name = default_name
@@ -37,11 +37,11 @@ contains
       allocate (fields, source=get_fields(case))
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
-      if (case%has_impact) then
-         call check_groups(groups, fields, impact_groups, error)
-      else
-         call check_groups(groups, fields, modes_groups, error)
-      end if
+      call check_groups(groups, fields, error)
+      do i = 1, merge(size(main_groups), 1, case%has_impact)
+         if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
+         case%left_out = trim(case%left_out)//' &'//main_groups(i)
+      end do
       do i = 1, size(groups)
          if (allocated(error)) return
          call assign_group(groups(i), fields, error)
@@ -79,21 +79,23 @@ contains
       end do
    end subroutine check_use
 
-   !> Refuses groups that are missing, unknown or given twice.
-   subroutine check_groups(groups, fields, required_groups, error)
+   !> Refuses groups that are unknown or given twice, and files without any.
+   subroutine check_groups(groups, fields, error)
       !> Groups of the file: [n_group].
       type(group_type), intent(in) :: groups(:)
       !> Known keys: [n_field].
       type(field_type), intent(in) :: fields(:)
-      !> Groups that have to be there: [n].
-      character(len=*), intent(in) :: required_groups(:)
       type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: suggestion
       integer :: i, j
 
+      if (size(groups) == 0) error = input_error('there is no namelist group; allowed: files with groups such as ' &
+         //join_quoted(main_groups))
       do i = 1, size(groups)
          if (.not. any(fields%group == groups(i)%name)) then
+            call get_suggestion(groups(i)%name, fields%group, suggestion)
             error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
-               //' is not a known group; allowed: '//join_quoted(distinct(fields%group)))
+               //' is not a known group'//suggestion//'; allowed: '//join_quoted(distinct(fields%group)))
             return
          end if
          do j = 1, i - 1
@@ -102,12 +104,6 @@ contains
                //' and in line '//to_text(groups(i)%line)//'; allowed: once')
             return
          end do
-      end do
-      do i = 1, size(required_groups)
-         if (any([(groups(j)%name == required_groups(i), j=1, size(groups))])) cycle
-         error = input_error('&'//trim(required_groups(i))//' is missing; allowed: files with the groups ' &
-            //join_quoted(required_groups))
-         return
       end do
    end subroutine check_groups
 
@@ -118,7 +114,7 @@ contains
       type(field_type), intent(in) :: fields(:)
       !> A key is unknown or given twice, or its value has the wrong type.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: allowed
+      character(len=:), allocatable :: allowed, suggestion
       logical :: is_meant(size(fields))
       integer :: i, j
 
@@ -126,8 +122,10 @@ contains
          associate (given => group%assignments(i))
             is_meant = fields%group == group%name .and. fields%key == given%key
             if (.not. any(is_meant)) then
+               call get_suggestion(given%key, pack(fields%key, fields%group == group%name), suggestion)
                error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
-                  //' is not a known key; allowed: '//join_quoted(distinct(pack(fields%key, fields%group == group%name))))
+                  //' is not a known key'//suggestion//'; allowed: ' &
+                  //join_quoted(distinct(pack(fields%key, fields%group == group%name))))
             else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then
                error = input_error('&'//group%name//': '//given%key//' is given a second time in line ' &
                   //to_text(given%line)//'; allowed: once')

@@ -129,7 +129,7 @@ contains
       do i = 1, size(scalars)
          text = text//line(trim(scalar_fields(i)%name), to_text(scalars(i)), trim(scalar_fields(i)%unit))
       end do
-      text = text//'/'//newline//newline//fact_group(history)//'&verdict'//newline &
+      text = text//'/'//newline//newline//fact_group(history)//remark_group(history)//'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
@@ -159,6 +159,17 @@ contains
       end do
       text = text//'/'//newline//newline
    end function fact_group
+
+   !> Remarks as a namelist group.
+   function remark_group(history) result(text)
+      type(force_history_type), intent(in) :: history
+      !> The group; empty where there are none.
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (size(history%remark) > 0) text = '&remarks'//newline//line('remark', join_quoted(history%remark), '') &
+         //'/'//newline//newline
+   end function remark_group
 
    !> Where a value lies: `conforms`, `too low` or `too high`.
    function get_word(criterion) result(word)

@@ -17,7 +17,7 @@ module thud_run
    implicit none (type, external)
    private
 
-   public :: load_case, outcome_type, run_case
+   public :: load_case, outcome_type, replaces, run_case
 
    !> Files of an impact.
    character(len=13), parameter :: file_names(3) = [character(len=13) :: 'force.csv', 'levels.csv', 'summary.nml']
@@ -28,19 +28,48 @@ module thud_run
    !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
 
+   !> Remark on a directory, which follows.
+   character(len=*), parameter :: replaces = 'replaces the results of another input of the same name in '
+
+   !> A remark.
+   type :: remark_type
+      !> A sentence, with the file that it is about.
+      character(len=:), allocatable :: text
+   end type remark_type
+
    !> What a run leaves for its caller.
    type :: outcome_type
       !> Directory that holds the files.
       character(len=:), allocatable :: directory
       !> Table for the screen.
       character(len=:), allocatable :: table
-      !> A remark for the user, empty where there is none.
-      character(len=:), allocatable :: remark
+      integer :: n_remark = 0
+      !> Remarks for the user: [n_remark].
+      type(remark_type), allocatable :: remarks(:)
       !> The source conforms to the limits, or there is no impact to judge.
       logical :: conforms = .true.
+   contains
+      procedure :: add_remark
    end type outcome_type
 
 contains
+
+   !> Adds a remark.
+   subroutine add_remark(self, path, remark)
+      class(outcome_type), intent(inout) :: self
+      !> The file that it is about; a sentence.
+      character(len=*), intent(in) :: path, remark
+      type(remark_type), allocatable :: remarks(:)
+      integer :: i
+
+      allocate (remarks(self%n_remark + 1))
+      do i = 1, self%n_remark
+         call move_alloc(self%remarks(i)%text, remarks(i)%text)
+      end do
+      self%n_remark = self%n_remark + 1
+      remarks(self%n_remark)%text = path//': '//remark
+      call move_alloc(remarks, self%remarks)
+   end subroutine add_remark
 
    !> Runs a namelist file and writes its results.
    subroutine run_case(path, output, case, results, outcome, error)
@@ -56,16 +85,14 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call store_case(case, output, results, outcome, error)
-      if (allocated(error)) then
-         error%message = path//': '//error%message
-      else if (outcome%remark /= '') then
-         outcome%remark = path//': '//outcome%remark
-      end if
+      call store_case(path, case, output, results, outcome, error)
+      if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine store_case(case, output, results, outcome, error)
+   subroutine store_case(path, case, output, results, outcome, error)
+      !> The file of the case.
+      character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
@@ -77,12 +104,12 @@ contains
       type(text_file_type), allocatable :: files(:)
       type(text_file_type) :: input
       logical :: differs
+      integer :: i
 
       input%name = input_file
       call get_case_text(case, input%content)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      outcome%remark = ''
       call check_owner(outcome%directory, input, differs, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
@@ -91,7 +118,11 @@ contains
       call describe(case, results, files, outcome)
       call write_results(outcome%directory, input, files, differs, error)
       if (allocated(error)) return
-      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
+      if (differs) call outcome%add_remark(path, replaces//outcome%directory)
+      if (.not. case%has_impact) return
+      do i = 1, size(results%history%remark)
+         call outcome%add_remark(path, trim(results%history%remark(i)))
+      end do
    end subroutine store_case
 
    !> Refuses snapshots that would fill the disk.

@@ -1,6 +1,6 @@
 !> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
-!> commas or blanks separate the values, decimal commas are allowed with tabs and semicolons; empty lines and what
-!> follows a `#` are skipped.
+!> commas or blanks separate the values, which may stand in quotes; decimal commas are allowed but with commas
+!> between unquoted values; empty lines and what follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
@@ -8,6 +8,7 @@ module thud_set_table
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_many, only: column_type, find_columns
+   use thud_suggestion, only: get_suggestion
    use thud_system, only: directory_exists, path_length
    use thud_text, only: join_quoted, lower_case, quoted, replaced, to_text
    implicit none (type, external)
@@ -146,23 +147,24 @@ contains
       !> There are too many, or one is too long.
       type(error_type), allocatable, intent(out) :: error
       character(len=1), parameter :: tab = achar(9)
-      character(len=len(line)) :: rest
+      character(len=len(line)) :: rest, structure
       character(len=1) :: separator
       integer :: i, n, at, length, last
 
-      separator = ' '
-      if (index(line, ',') > 0) separator = ','
-      if (index(line, ';') > 0) separator = ';'
-      if (index(line, tab) > 0) separator = tab
       rest = adjustl(line)
+      structure = get_structure(rest)
+      separator = ' '
+      if (index(structure, ',') > 0) separator = ','
+      if (index(structure, ';') > 0) separator = ';'
+      if (index(structure, tab) > 0) separator = tab
       last = len_trim(rest)
       ! Spreadsheets may end lines with their separator.
-      if (separator == ';') last = verify(rest(:last), '; ', back=.true.)
+      if (separator == ';') last = verify(structure(:last), '; ', back=.true.)
       allocate (cells(max_columns))
       n = 0
       at = 1
       do while (at <= last + merge(1, 0, separator /= ' '))
-         length = index(rest(at:last)//separator, separator) - 1
+         length = index(structure(at:last)//separator, separator) - 1
          if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
             error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
                //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
@@ -171,7 +173,7 @@ contains
          n = n + 1
          cells(n) = adjustl(rest(at:at + length - 1))
          at = at + length + 1
-         if (separator == ' ') at = at + max(0, verify(rest(at:)//'x', ' ') - 1)
+         if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
       end do
       cells = cells(:n)
       do i = 1, n
@@ -180,6 +182,26 @@ contains
          cells(i) = replaced(cells(i), ',', '.')
       end do
    end subroutine split_line
+
+   !> A line with quoted text made of `x`, in which separators do not separate.
+   pure function get_structure(line) result(structure)
+      character(len=*), intent(in) :: line
+      character(len=len(line)) :: structure
+      character(len=1) :: quote
+      integer :: i
+
+      structure = line
+      quote = ' '
+      do i = 1, len_trim(line)
+         if (quote /= ' ') then
+            if (line(i:i) == quote) quote = ' '
+            structure(i:i) = 'x'
+         else if (scan(line(i:i), '''"') == 1) then
+            quote = line(i:i)
+            structure(i:i) = 'x'
+         end if
+      end do
+   end function get_structure
 
    !> One value of a drop.
    subroutine read_value(table, column, word, value, error)
@@ -191,7 +213,7 @@ contains
       real(wp), intent(out) :: value
       !> It is not what the key takes.
       type(error_type), allocatable, intent(out) :: error
-      character(len=:), allocatable :: wanted
+      character(len=:), allocatable :: suggestion, wanted
       character(len=128) :: message
       integer :: status
 
@@ -200,7 +222,8 @@ contains
       associate (field => table%fields(column))
          select case (field%get_kind())
          case ('choice')
-            wanted = 'allowed; allowed: '//join_quoted(field%choices(:field%n_choice))
+            call get_suggestion(word, field%choices(:field%n_choice), suggestion)
+            wanted = 'allowed'//suggestion//'; allowed: '//join_quoted(field%choices(:field%n_choice))
             value = real(findloc(field%choices(:field%n_choice) == lower_case(word), .true., dim=1), wp)
             status = merge(0, 1, value > 0.0_wp)
          case ('flag')

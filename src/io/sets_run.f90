@@ -12,10 +12,11 @@ module thud_sets_run
    use thud_many, only: many_type, new_many, solve_many
    use thud_progress, only: report_progress
    use thud_result_directory, only: add_text, begin_file, check_owner, close_results, open_results, result_directory_type
-   use thud_run, only: load_case, outcome_type
+   use thud_run, only: load_case, outcome_type, replaces
    use thud_set_report, only: get_set_header, get_set_rows
    use thud_set_table, only: open_set_table, read_sets, set_table_type
-   use thud_text, only: fixed, newline, to_text
+   use thud_table, only: get_force_title, get_span_row
+   use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
 
@@ -74,14 +75,9 @@ contains
       call write_sets(case, table, threads, results, tally, error)
       call close_results(results, differs, error)
       if (allocated(error)) return
-      outcome%remark = ''
-      if (differs) outcome%remark = 'replaces the results of another input of the same name in '//outcome%directory
-      if (tally%computed < tally%sets) then
-         if (outcome%remark /= '') outcome%remark = outcome%remark//'; '
-         outcome%remark = outcome%remark//to_text(tally%sets - tally%computed)//' of '//to_text(tally%sets) &
-            //' sets have no results, such as: '//trim(tally%failure)
-      end if
-      if (outcome%remark /= '') outcome%remark = path//': '//outcome%remark
+      if (differs) call outcome%add_remark(path, replaces//outcome%directory)
+      if (tally%computed < tally%sets) call outcome%add_remark(path, to_text(tally%sets - tally%computed)//' of ' &
+         //to_text(tally%sets)//' sets have no results, such as: '//trim(tally%failure))
       outcome%conforms = tally%conforming == tally%sets
       call describe(case, table, tally, outcome%table)
    end subroutine run_sets
@@ -173,21 +169,20 @@ contains
       integer :: i
 
       text = 'thud '//version//'   case '//trim(case%name)//'   model '//trim(case%model)//newline//newline &
-         //'  '//to_text(tally%sets)//' sets, '//to_text(tally%computed)//' computed, '//to_text(tally%conforming) &
-         //' conform to '
+         //'  '//to_text(tally%sets)//trim(merge(' set, ', ' sets,', tally%sets == 1))//' '//to_text(tally%computed) &
+         //' computed, '//to_text(tally%conforming)//' conform to '
       if (any(table%names == 'source') .or. any(table%names == 'force')) then
-         text = text//'their limits.'//newline
+         text = text//'all their limits.'//newline
       else
-         text = text//'the limits of the '//trim(case%source)//' by the '//trim(case%level_force)//' force.'//newline
+         text = text//'all limits of the '//replaced(trim(case%source), '_', ' ')//' by the ' &
+            //get_force_title(case%level_force)//'.'//newline
       end if
       if (tally%computed == 0) return
       octaves = get_octaves()
-      text = text//'  contact time  '//fixed(1.0e3_wp*tally%span(1, 1), 3)//' to '//fixed(1.0e3_wp*tally%span(1, 2), 3) &
-         //' ms'//newline
       do i = 1, octave_count
-         text = text//'  '//get_band_name(octaves(i))//' Hz  '//fixed(tally%span(i + 1, 1), 2)//' to ' &
-            //fixed(tally%span(i + 1, 2), 2)//' dB'//newline
+         text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
       end do
+      text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms')
    end subroutine describe
 
 end module thud_sets_run

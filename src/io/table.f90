@@ -3,7 +3,7 @@ module thud_table
    use thud_band, only: get_band_name, octave_count
    use thud_case, only: case_type
    use thud_compute, only: get_judged_force, verdict_type
-   use thud_force_history, only: force_history_type
+   use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: wp
    use thud_report, only: get_word
@@ -12,7 +12,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_modes_table, get_table
+   public :: get_force_title, get_modes_table, get_span_row, get_table
 
 contains
 
@@ -22,31 +22,66 @@ contains
       type(force_history_type), intent(in) :: history
       type(verdict_type), intent(in) :: verdict
       character(len=:), allocatable :: text
-      integer :: i
+      integer :: i, judged, other
 
-      text = '  octave   force exposure level, dB       limits, dB      verdict on the'//newline &
-         //'      Hz     elastic       floor      '//padded(case%source, 18)//trim(case%level_force)//' force'//newline
-      associate (criteria => verdict%criteria(:, get_judged_force(case)))
+      judged = get_judged_force(case)
+      other = force_count + 1 - judged
+      ! Most models have the same force twice.
+      if (.not. any(abs(verdict%level(:, other) - verdict%level(:, judged)) > 0.0_wp)) other = 0
+      text = '  '//padded(get_force_title(case%level_force), 27)//padded('value', 16)//padded('limits', 13)//'verdict'
+      if (other > 0) text = text//'    '//get_force_title(force_names(other))
+      text = text//newline
+      associate (criteria => verdict%criteria(:, judged))
          do i = 1, octave_count
-            text = text//'  '//right(get_band_name(verdict%bands(i)), 6)//right(fixed(verdict%level(i, 1), 2), 12) &
-               //right(fixed(verdict%level(i, 2), 2), 12)//right(fixed(criteria(i)%lower, 1), 10)//' to ' &
-               //padded(fixed(criteria(i)%upper, 1), 8)//get_word(criteria(i))//newline
+            text = text//level_row(i, criteria(i))
          end do
-         text = text//newline &
-            //scalar_row('contact time', history%contact_time*1000, 3, 'ms', criteria(octave_count + 1), 1000.0_wp) &
-            //scalar_row('restitution', history%restitution, 4, '', criteria(octave_count + 2), 1.0_wp) &
-            //scalar_row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
-            //scalar_row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
-            //scalar_row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp) &
-            //scalar_row('peak elastic force', history%peak_force, 1, 'N') &
-            //scalar_row('peak floor force', history%peak_floor_force, 1, 'N') &
-            //scalar_row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
-            //scalar_row('impulse', history%impulse, 3, 'N s') &
-            //facts(history)//newline &
-            //'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
-            //' to the limits of the '//trim(case%source)//' (levels: '//trim(case%level_method)//').'//newline
+         text = text//row('contact time', history%contact_time*1000, 3, 'ms', criteria(octave_count + 1), 1000.0_wp) &
+            //row('restitution', history%restitution, 4, '', criteria(octave_count + 2), 1.0_wp) &
+            //row('peaks of the force', criteria(octave_count + 3)%value, 0, '', criteria(octave_count + 3), 1.0_wp) &
+            //row('mass', case%ball%mass, 3, 'kg', criteria(octave_count + 4), 1.0_wp) &
+            //row('drop height', case%drop%height, 3, 'm', criteria(octave_count + 5), 1.0_wp)//newline
+         do i = octave_count + 1, size(verdict%bands)
+            text = text//level_row(i)
+         end do
+         if (size(verdict%bands) > octave_count) text = text//newline
+         text = text//row('peak force', merge(history%peak_force, history%peak_elastic_force, &
+            case%level_force == 'floor'), 1, 'N') &
+            //row('maximum deflection', history%max_deflection*1000, 3, 'mm') &
+            //row('impulse', history%impulse, 3, 'N s')//facts(history)//newline
+         text = text//'  The source '//trim(merge('conforms        ', 'does not conform', all(conforms(criteria)))) &
+            //' to the limits of the '//replaced(trim(case%source), '_', ' ')//': it meets ' &
+            //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
+            //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
       end associate
+      if (case%left_out /= '') text = text//'  Defaults hold for'//trim(case%left_out)//', which the file leaves out.' &
+         //newline
+
+   contains
+
+      !> Level of a band, by both forces where they differ.
+      function level_row(band, criterion) result(line)
+         !> Number of the band.
+         integer, intent(in) :: band
+         !> Its limits, where there are any.
+         type(criterion_type), intent(in), optional :: criterion
+         character(len=:), allocatable :: line
+
+         line = row('level, '//get_band_name(verdict%bands(band))//' Hz '//trim(verdict%bands(band)%set), &
+            verdict%level(band, judged), 2, 'dB', criterion, 1.0_wp)
+         if (other == 0) return
+         line = line(:len(line) - 1)//right(fixed(verdict%level(band, other), 2), 79 - len(line))//' dB'//newline
+      end function level_row
+
    end function get_table
+
+   !> Name of a force in words.
+   pure function get_force_title(force) result(title)
+      !> One of `force_names`.
+      character(len=*), intent(in) :: force
+      character(len=merge(18, 13, force == 'floor')) :: title
+
+      title = merge('force on the floor', 'elastic force     ', force == 'floor')
+   end function get_force_title
 
    !> The free modes on the screen.
    function get_modes_table(modes) result(text)
@@ -63,8 +98,8 @@ contains
       end do
    end function get_modes_table
 
-   !> One scalar of the table, with its limits where there are any.
-   function scalar_row(name, value, decimals, unit, criterion, scale) result(row)
+   !> One number of the table, with its limits where there are any.
+   function row(name, value, decimals, unit, criterion, scale) result(text)
       character(len=*), intent(in) :: name
       !> Its value in the shown unit.
       real(wp), intent(in) :: value
@@ -75,38 +110,46 @@ contains
       type(criterion_type), intent(in), optional :: criterion
       !> Shown unit over SI unit.
       real(wp), intent(in), optional :: scale
-      character(len=:), allocatable :: row
+      character(len=:), allocatable :: text
 
-      row = '  '//padded(name, 20)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
-      if (present(criterion) .and. present(scale)) then
-         row = row//right(short(criterion%lower*scale), 8)//' to '//padded(short(criterion%upper*scale), 8) &
-            //get_word(criterion)
-      end if
-      row = trim(row)//newline
-   end function scalar_row
+      text = '  '//padded(name, 22)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
+      if (present(criterion) .and. present(scale)) text = text//right(short(criterion%lower*scale), 7)//' to ' &
+         //padded(short(criterion%upper*scale), 7)//get_word(criterion)
+      text = trim(text)//newline
+   end function row
+
+   !> Minimum and maximum of a quantity, as a row.
+   function get_span_row(name, span, decimals, unit) result(text)
+      character(len=*), intent(in) :: name
+      !> Minimum and maximum in the shown unit: [2].
+      real(wp), intent(in) :: span(2)
+      integer, intent(in) :: decimals
+      !> The shown unit.
+      character(len=*), intent(in) :: unit
+      character(len=:), allocatable :: text
+
+      text = '  '//padded(name, 22)//right(fixed(span(1), decimals), 10)//' to '//right(fixed(span(2), decimals), 8)//' ' &
+         //unit//newline
+   end function get_span_row
 
    !> Numbers that the model chose or found, as rows.
    function facts(history) result(rows)
       type(force_history_type), intent(in) :: history
       character(len=:), allocatable :: rows
-      integer :: i
+      character(len=*), parameter :: prefixes(-3:3) = ['n', 'u', 'm', ' ', 'k', 'M', 'G']
+      real(wp) :: scale
+      integer :: i, power
 
       rows = ''
       do i = 1, size(history%fact_name)
-         rows = rows//'  '//padded(replaced(history%fact_name(i), '_', ' '), 20) &
-            //right(short_scientific(history%fact(i)), 10)//' '//trim(history%fact_unit(i))//newline
+         power = 0
+         if (history%fact_unit(i) /= '') power = floor(log10(max(abs(history%fact(i)), tiny(1.0_wp)))/3)
+         if (abs(power) > 3) power = 0
+         scale = 10.0_wp**(-3*power)
+         rows = rows//row(replaced(trim(history%fact_name(i)), '_', ' '), history%fact(i)*scale, 3, &
+            trim(adjustl(prefixes(power)//history%fact_unit(i))))
       end do
    end function facts
-
-   !> A number with four digits.
-   function short_scientific(value) result(text)
-      real(wp), intent(in) :: value
-      character(len=:), allocatable :: text
-      character(len=10) :: buffer
-
-      write (buffer, '(es10.3)') value
-      text = trim(adjustl(buffer))
-   end function short_scientific
 
    !> A limit with up to three decimals and no trailing zeros.
    pure function short(value) result(text)

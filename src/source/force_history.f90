@@ -7,7 +7,7 @@ module thud_force_history
    private
 
    public :: continue_to_zero, force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
-   public :: outcome_count, scalar_fields
+   public :: outcome_count, remark_length, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
@@ -21,6 +21,9 @@ module thud_force_history
 
    !> Length of the name of a part of the force.
    integer, parameter :: part_name_length = 24
+
+   !> Length of a remark.
+   integer, parameter :: remark_length = 240
 
    !> Force of one impact and the numbers that describe it.
    type :: force_history_type
@@ -48,6 +51,8 @@ module thud_force_history
       character(len=8), allocatable :: fact_unit(:)
       !> These numbers: [n_fact].
       real(wp), allocatable :: fact(:)
+      !> What is possible but not plausible: [n_remark].
+      character(len=remark_length), allocatable :: remark(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Snapshots of the deformed source, of models that take some.
@@ -58,10 +63,10 @@ module thud_force_history
       real(wp) :: contact_time = 0.0_wp
       !> The same between steps, of models that find it in whole steps, s; 0 where `contact_time` is exact.
       real(wp) :: exact_contact_time = 0.0_wp
-      !> Maximum elastic force, N; of models whose spikes no force plate records, of the part that it does.
+      !> Maximum force on the floor, N; of models whose spikes no force plate records, of the part that it does.
       real(wp) :: peak_force = 0.0_wp
-      !> Maximum force on the floor, N, likewise.
-      real(wp) :: peak_floor_force = 0.0_wp
+      !> Maximum elastic force, N, likewise.
+      real(wp) :: peak_elastic_force = 0.0_wp
       !> Maximum deflection, m.
       real(wp) :: max_deflection = 0.0_wp
       !> Velocity at release over velocity at first touch.
@@ -90,8 +95,8 @@ module thud_force_history
    !> The numbers that describe an impact, in the order of `get_scalars`.
    type(scalar_field_type), parameter :: scalar_fields(*) = [ &
       scalar_field_type('contact_time', 's', 'contact time'), &
-      scalar_field_type('peak_force', 'N', 'maximum elastic force'), &
-      scalar_field_type('peak_floor_force', 'N', 'maximum force on the floor'), &
+      scalar_field_type('peak_force', 'N', 'maximum force on the floor'), &
+      scalar_field_type('peak_elastic_force', 'N', 'maximum elastic force'), &
       scalar_field_type('max_deflection', 'm', 'maximum deflection'), &
       scalar_field_type('restitution', '', 'coefficient of restitution'), &
       scalar_field_type('impulse', 'N s', 'time integral of the force on the floor'), &
@@ -110,7 +115,7 @@ contains
       !> The numbers, SI units: [size(scalar_fields)].
       real(wp) :: values(size(scalar_fields))
 
-      values = [history%contact_time, history%peak_force, history%peak_floor_force, history%max_deflection, &
+      values = [history%contact_time, history%peak_force, history%peak_elastic_force, history%max_deflection, &
          history%restitution, history%impulse, history%impact_velocity, &
          merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
          history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]

@@ -158,7 +158,7 @@ contains
          if (released) return
          source%compressing = .false.
          history%max_deflection = state(at_deflection)
-         call source%get_parts(state, parts, history%peak_force)
+         call source%get_parts(state, parts, history%peak_elastic_force)
       end do
    end subroutine advance
 
@@ -175,7 +175,7 @@ contains
       history%deflection(i) = state(at_deflection)
       history%velocity(i) = state(at_velocity)
       call source%get_parts(state, history%part(i, :), history%elastic_force(i))
-      history%peak_floor_force = max(history%peak_floor_force, sum(history%part(i, :)))
+      history%peak_force = max(history%peak_force, sum(history%part(i, :)))
       ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       if (i == 1) history%part(i, :) = history%part(i, :)/2
       history%floor_force(i) = sum(history%part(i, :))
@@ -201,8 +201,8 @@ contains
          history%impulse_residual = abs(history%impulse - momentum)/momentum
          history%energy_residual = abs(mass/2*velocity**2 + state(at_loss) - energy)/energy
       end associate
-      history%peak_force = max(history%peak_force, maxval(history%elastic_force))
-      history%peak_floor_force = max(history%peak_force, history%peak_floor_force)
+      history%peak_elastic_force = max(history%peak_elastic_force, maxval(history%elastic_force))
+      history%peak_force = max(history%peak_elastic_force, history%peak_force)
       ! Written so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
          error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &

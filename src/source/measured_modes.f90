@@ -258,7 +258,7 @@ contains
       history%impulse_residual = abs(impulse - history%impulse)/history%impulse
       energy = sum(modes%mass)/2*history%impact_velocity**2
       history%energy_residual = abs(stored + loss - energy)/energy
-      history%peak_floor_force = history%peak_force
+      history%peak_elastic_force = history%peak_force
       call check_interrupt(error)
    end subroutine finish
 

@@ -23,6 +23,7 @@ module thud_source_model
       procedure, pass(options) :: check
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: get_cost
+      procedure, pass(options) :: get_paper_modulus
       procedure, pass(options) :: get_loss_factors
    end type source_model_type
 
@@ -84,6 +85,15 @@ contains
 
       cost = 1.0e-3_wp
    end function get_cost
+
+   !> Modulus of elasticity of the paper's ball in this model, Pa; by default 0, for models that do not use the wall.
+   function get_paper_modulus(options) result(modulus)
+      class(source_model_type), intent(in) :: options
+      !> The modulus, Pa.
+      real(wp) :: modulus
+
+      modulus = 0.0_wp
+   end function get_paper_modulus
 
    !> Loss factor of the material against frequency, of models that have a material; others refuse.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)

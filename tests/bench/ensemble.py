@@ -230,7 +230,7 @@ def stream(count: int, path: Path, chunk: int = 50_000) -> None:
             }, threads=1)  # fmt: skip
             rows = [
                 found.contact_time,
-                found.peak_force,
+                found.peak_elastic_force,
                 found.restitution,
                 *found.elastic_octaves.T,
             ]

@@ -42,7 +42,7 @@ def test_run_writes_results_and_figures(
         "summary.nml",
     ]
     output = capsys.readouterr().out
-    assert re.search(r"31\.5 +38\.53 +38\.70 +38\.0 to 40\.0 +conforms", output)
+    assert re.search(r"level, 31\.5 Hz octave +38\.70 dB +38 to 40 +conforms +38\.53 dB", output)
     assert "does not conform" in output
 
 

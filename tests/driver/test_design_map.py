@@ -64,13 +64,15 @@ def test_map_holds_the_verdicts_of_single_drops() -> None:
 def test_ball_of_the_paper_is_marked() -> None:
     result = thud.design_map(MODAL)
     assert (result.mark, result.mark_name) == ((0.032, 1.6e6), "paper's ball")
-    axes, _ = thud.plot.draw_design_map(result).axes
+    figure = thud.plot.draw_design_map(result)
+    axes, bar = figure.axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.6))
     assert axes.get_xlabel() == "Wall thickness, mm"
     assert axes.get_ylabel() == "Young's modulus, MPa"
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == ["octave limits", "all criteria met", "paper's ball"]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["Octave limits", "All criteria met", "Paper's ball"]
+    assert bar.get_ylabel() == "Margin (force on the floor), dB"
 
 
 def test_scale_of_the_study_is_that_of_the_axes() -> None:

@@ -76,11 +76,11 @@ def test_equals_the_single_solver() -> None:
             thirds = impact.levels("third", force=force)
             np.testing.assert_allclose(getattr(ensemble, f"{force}_octaves")[i], levels, atol=1e-6)
             np.testing.assert_allclose(ensemble.levels[force, "third"][i], thirds, atol=1e-6)
-        for name in ("contact_time", "peak_force", "peak_floor_force", "max_deflection",
+        for name in ("contact_time", "peak_force", "peak_elastic_force", "max_deflection",
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
         assert ensemble.conforms[i] == bool(impact.conformity())
-        assert ensemble.floor_conforms[i] == bool(impact.conformity(force="floor"))
+        assert ensemble.elastic_conforms[i] == bool(impact.conformity(force="elastic"))
 
 
 def test_fails_where_the_single_solver_fails() -> None:
@@ -110,8 +110,8 @@ def test_a_conforming_source_conforms() -> None:
     for i in range(count):
         ball = thud.Ball(**{key: float(values[i]) for key, values in parameters.items()})
         impact = thud.solve(ball)
-        assert ensemble.conforms[i] == bool(impact.conformity(force="elastic"))
-        assert ensemble.floor_conforms[i] == bool(impact.conformity(force="floor"))
+        assert ensemble.conforms[i] == bool(impact.conformity())
+        assert ensemble.elastic_conforms[i] == bool(impact.conformity(force="elastic"))
 
 
 def test_forces_beyond_the_memory_are_refused() -> None:

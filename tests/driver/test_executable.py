@@ -142,7 +142,7 @@ def test_bad_usage_is_told(run: Run, arguments: list[str], words: str) -> None:
 
 
 BAD_CASES = {
-    "missing group": ("&ball /\n&drop /", "&model is missing"),
+    "no group": ("! nothing\n", "there is no namelist group"),
     "unterminated group": ("&ball /\n&drop\n&model /", "&drop in line 2 is not terminated"),
     "unterminated last group": ("&ball /\n&drop /\n&model", "&model in line 3 is not terminated"),
     "unknown group": (f"{MINIMAL}&floor /", "&floor in line 4 is not a known group"),

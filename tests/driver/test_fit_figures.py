@@ -28,9 +28,7 @@ def fit_with_noise(noise: float, *parameters: str) -> thud.Fit:
 
 
 def labels(figure: Figure) -> list[str]:
-    above, below = figure.axes
-    assert below.get_legend() is None
-    return [text.get_text() for text in above.get_legend().get_texts()]
+    return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 @pytest.mark.parametrize(("noise", "shown"), [(1.0, False), (40.0, True)])
@@ -42,7 +40,7 @@ def test_record_is_drawn_where_it_can_be_seen(noise: float, shown: bool) -> None
 def test_noise_is_that_of_the_band() -> None:
     fit = fit_with_noise(5.0, "youngs_modulus")
     figure = target_and_fit(fit)
-    assert labels(figure) == ["Record below 1.25 kHz", "Fit", r"Noise below 1.25 kHz, $\pm2\sigma$"]
+    assert labels(figure) == ["Record below 1.25 kHz", "Fit", "Noise below 1.25 kHz, ±2σ"]
     below = figure.axes[1]
     # White noise of 22.05 kHz, of which 1.25 kHz are left.
     (band,) = below.patches
@@ -70,9 +68,8 @@ def test_level_target_has_no_ellipse_of_one_parameter() -> None:
     fit = thud.fit(thud.LevelTarget(levels, uncertainty=0.5), ["youngs_modulus"])
     figures = draw_fit(fit, fit.shown_units())
     assert list(figures) == ["fit"]
-    assert [text.get_text() for text in figures["fit"].axes[0].get_legend().get_texts()] == [
-        *("Its standard deviation", "Target", "Fit")
-    ]
+    assert labels(figures["fit"]) == ["Standard deviation of the target", "Target", "Fit"]
+    assert figures["fit"].axes[1].get_xlabel() == "Octave band, Hz"
 
 
 @pytest.mark.parametrize("known", [True, False])

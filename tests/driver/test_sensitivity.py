@@ -89,7 +89,7 @@ def test_figure_shows_every_index(lumped: Sensitivity) -> None:
     widths = [bar.get_width() for bars in axes.containers[::3] for bar in bars]
     expected = lumped.indices["total"].transpose("parameter", "output").values.ravel()
     np.testing.assert_array_equal(widths, expected)
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["mass", "height", "outer radius", "total index", "first order"]
     for place, name in ((1, "total"), (2, "first_order")):
         for container, parameter in zip(

@@ -50,7 +50,7 @@ def test_first_numeric_parameter_is_the_axis_and_texts_have_panels() -> None:
     for axes, flux in zip(figure.axes, fluxes, strict=True):
         assert axes.get_xlabel() == "Height, cm"
         drops = [thud.solve(drop=thud.Drop(height), momentum_flux=flux) for height in (0.5, 1.0)]
-        levels = [impact.levels(force="elastic") - NOMINAL for impact in drops]
+        levels = [impact.levels() - NOMINAL for impact in drops]
         np.testing.assert_allclose(curves(axes), levels, atol=1e-6)
     assert "Panels: momentum flux" in words(figure)
     assert "median" not in words(figure)

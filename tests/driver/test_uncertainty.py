@@ -96,7 +96,8 @@ def test_sets_without_results_are_counted_apart() -> None:
 
 def test_figure_shows_distribution_over_tolerance() -> None:
     result = thud.uncertainty({**SMALL, "design": {"size": 40}})
-    (axes,) = thud.plot.draw_uncertainty(result).axes
+    figure = thud.plot.draw_uncertainty(result)
+    (axes,) = figure.axes
     limits = thud.solve().conformity().criteria[:5]
     boxes = [body.get_datalim(axes.transData).intervaly for body in axes.collections[:5]]
     half = [(c.upper - c.lower) / 2 for c in limits]
@@ -105,8 +106,10 @@ def test_figure_shows_distribution_over_tolerance() -> None:
     nominal = [(c.upper + c.lower) / 2 for c in limits]
     np.testing.assert_allclose(medians, np.median(result.levels, axis=0) - nominal)
     low, high = result.interval
-    title = f"Conforms: {100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
-    assert axes.get_legend().get_title().get_text() == title
+    share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
+    assert figure.legends[0].get_title().get_text() == f"All criteria met: {share}"
+    words = {"floor": "force on the floor", "elastic": "elastic force"}
+    assert words[result.dataset.attrs["judged_force"]] in axes.get_ylabel()
 
 
 def test_command_writes_figure_and_table(

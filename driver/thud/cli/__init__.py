@@ -14,6 +14,8 @@ from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
 from thud.errors import InputError, ThudError
+from thud.impact import FORCES
+from thud.levels import SOURCES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,8 +52,16 @@ COMMANDS = {
                 help="namelist files, and recordings with columns of time, s, and force, N",
             ),
             output("the page (default: outputs/comparison)", default="outputs/comparison"),
-            argument("--force", choices=("elastic", "floor"), default="floor"),
-            argument("--source", choices=("rubber_ball", "tyre"), default="rubber_ball"),
+            argument(
+                "--force",
+                choices=FORCES,
+                help="force that is compared (default: that of each case, &levels force)",
+            ),
+            argument(
+                "--source",
+                choices=SOURCES,
+                help="source of the limits (default: that of the cases, &limits source)",
+            ),
             QUIET,
         ),
         compare_cases,

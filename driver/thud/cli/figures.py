@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from thud.errors import PlausibilityWarning
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
@@ -18,10 +21,19 @@ def compare_cases(options: argparse.Namespace) -> int:
     from thud import comparison  # noqa: PLC0415 - matplotlib takes its time
 
     found = comparison.read_all(options.cases)
-    page = comparison.compare(found, options.force, options.source, progress=not options.quiet)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)
+        page = comparison.compare(
+            found,
+            options.force,
+            options.source,
+            progress=not options.quiet and sys.stderr.isatty(),
+        )
+    for remark in page.remarks:
+        print(f"thud-driver: {remark}", file=sys.stderr)
     paths = page.save(options.output)
     if not options.quiet:
-        print(format_rows([comparison.HEADER, *page.table()]))
+        print(format_rows(page.table()))
         print(f"Page: {paths[-1]}")
     return 0
 
@@ -33,7 +45,9 @@ def draw_figures(options: argparse.Namespace) -> int:
     folder = Path(options.output)
     folder.mkdir(parents=True, exist_ok=True)
     figures = plot.documentation_figures()
-    for name, draw in tqdm(figures.items(), unit="figure", disable=options.quiet, leave=False):
+    for name, draw in tqdm(
+        figures.items(), unit="figure", disable=options.quiet or None, leave=False
+    ):
         plot.save_all({name: draw()}, folder)
     if not options.quiet:
         print(f"Figures: {folder}")

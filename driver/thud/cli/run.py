@@ -30,7 +30,9 @@ def run_cases(options: argparse.Namespace) -> int:
     """Run all cases, even where one fails; return the exit code."""
     worst = 0
     options.done = {}
-    for path in tqdm(options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet):
+    for path in tqdm(
+        options.cases, unit="case", disable=len(options.cases) == 1 or options.quiet or None
+    ):
         try:
             conforms = _run_case(path, options)
         except (ThudError, OSError) as error:
@@ -59,8 +61,8 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         raise InputError(message)
     options.done[case.name] = path
     found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
-    if found["remark"]:
-        tqdm.write(f"thud-driver: {text(found['remark'])}", file=sys.stderr)
+    for remark in found.get("run_remarks", {}).values():
+        tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
     pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
     if pictures:

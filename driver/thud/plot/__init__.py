@@ -21,7 +21,6 @@ from thud.plot.force_history import force_history as force_history
 from thud.plot.level_changes import level_changes as level_changes
 from thud.plot.levels import levels as levels
 from thud.plot.look import COLOURS as COLOURS
-from thud.plot.look import COMPACT as COMPACT
 from thud.plot.look import FORMATS as FORMATS
 from thud.plot.look import LINES as LINES
 from thud.plot.look import MARKERS as MARKERS

@@ -1,61 +1,62 @@
-"""Forces, octave and third levels of several impacts, and a table, on one page."""
+"""Forces, octave and third-octave levels of several impacts, and a table, on one page."""
 
 from collections.abc import Mapping, Sequence
+from textwrap import fill
 
-import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from thud.impact import Impact
 from thud.plot.force_history import draw_forces
-from thud.plot.levels import draw_tolerance
-from thud.plot.look import (
-    SIZE,
-    WIDTH,
-    dress,
-    iterate_curves,
-    line_style,
-    literal,
-    marker_style,
-    octave_axis,
-)
+from thud.plot.levels import draw_levels
+from thud.plot.look import SIZE, WIDTH, dress, legend_above, level_label, literal, new_figure
 from thud.recording import Recording
+
+# Size of a letter and of a line of the table, inch; letters of a name on one line.
+_LETTER, _LINE = 0.062, 0.17
+_LETTERS = 20
 
 
 def comparison_page(
     impacts: Mapping[str, Impact | Recording],
-    force: str,
+    force: str | None,
     source: str,
     table: Sequence[Sequence[str]],
 ) -> Figure:
-    """Draw forces, octave and third levels of several impacts, and a table, on one page.
+    """Draw forces, octave and third-octave levels of several impacts, and a table, on one page.
 
-    The table is a header and rows of text; the tolerance band is that of the source. Arguments are
-    those of `thud.compare`.
+    The table is rows of text, first the head; the tolerance band is that of the source. Other
+    arguments are those of `thud.compare`.
     """
-    figure = Figure(figsize=(2 * WIDTH, 7.5), dpi=200, layout="constrained")
-    rows = figure.add_gridspec(3, 2, height_ratios=[3, 3, 0.35 + 0.25 * len(table)])
-    history = dress(figure.add_subplot(rows[0, :]))
-    panels = {
-        "octave": dress(figure.add_subplot(rows[1, 0])),
-        "third": dress(figure.add_subplot(rows[1, 1])),
-    }
-    draw_tolerance(panels["octave"], source)
-    draw_forces(history, impacts, force)
-    for i, (_, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        for bands, axes in panels.items():
-            values = impact.levels(bands, "exact", kind)
-            axes.plot(np.arange(len(values)), values, **line_style(i), **marker_style(i, 3))
-    history.legend(fontsize=SIZE, frameon=False)
-    for bands, axes in panels.items():
-        octave_axis(axes, bands)
-        axes.set_ylabel("Force exposure level, dB re 1 N", fontsize=SIZE)
-    panels["octave"].legend(fontsize=SIZE, frameon=False)
-    below = figure.add_subplot(rows[2, :])
-    below.axis("off")
-    cells = below.table(
-        [[literal(cell) for cell in row] for row in table], loc="center", edges="horizontal"
+    head, *body = table
+    letters = [
+        2 + max([min(len(name), _LETTERS), *map(len, column)])
+        for name, *column in zip(*table, strict=True)
+    ]
+    names = [fill(name, length) for name, length in zip(head, letters, strict=True)]
+    lines = [1 + max(name.count("\n") for name in names), *(1 for _ in body)]
+    below = _LINE * (sum(lines) + 1)
+    width = max(2 * WIDTH, 0.8 + _LETTER * sum(letters))
+    figure = new_figure(5.8 + below, width)
+    rows = figure.add_gridspec(3, 2, height_ratios=[2.7, 2.7, below])
+    draw_forces(dress(figure.add_subplot(rows[0, :])), impacts, force)
+    octaves = figure.add_subplot(rows[1, 0])
+    thirds = figure.add_subplot(rows[1, 1], sharey=octaves)
+    draw_levels({"octave": octaves, "third": thirds}, impacts, force, source)
+    octaves.set_ylabel(level_label(impacts, force), fontsize=SIZE)
+    legend_above(octaves)
+    axes = figure.add_subplot(rows[2, :])
+    axes.set_axis_off()
+    cells = axes.table(
+        [[literal(cell) for cell in row] for row in (names, *body)],
+        colWidths=[length / sum(letters) for length in letters],
+        bbox=Bbox.unit(),
+        edges="horizontal",
     )
     cells.auto_set_font_size(value=False)
     cells.set_fontsize(SIZE - 1)
-    cells.auto_set_column_width(list(range(len(table[0]))))
+    for (row, column), cell in cells.get_celld().items():
+        cell.set(height=lines[row] / sum(lines), linewidth=0.5)
+        cell.PAD = 0.05
+        cell.set_text_props(ha="left" if column == 0 else "right")
     return figure

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from thud.keys import plain_words
-from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, new_figure
+from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -51,6 +51,7 @@ def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
         panels[row - 1, 0].set_ylabel(_label(fit.names[row], units, letters), fontsize=SIZE)
     for column in range(count - 1):
         panels[-1, column].set_xlabel(_label(fit.names[column], units, letters), fontsize=SIZE)
+    legend_above(panels[0, 0])
     figure.align_labels()
     return figure
 
@@ -63,14 +64,16 @@ def _draw_pair(
     centre = fit.estimate[list(pair)] / factor
     block = fit.covariance[np.ix_(pair, pair)] / np.outer(factor, factor)
     square = _squared_radius(fit)
-    _add_ellipse(axes, centre, square * block)
-    axes.plot(*centre, color=COLOURS[1], marker="+", markersize=6)
+    _add_ellipse(axes, centre, square * block, f"{100 * fit.confidence:g} % region of both")
+    axes.plot(
+        *centre, color=COLOURS[1], marker="+", markersize=6, linestyle="none", label="Estimate"
+    )
     intervals = fit.intervals()
     x, y = (
         np.array(intervals[fit.names[i]]) / scale for i, scale in zip(pair, factor, strict=True)
     )
     look: dict[str, Any] = {"color": GREY, "alpha": 0.5, "linewidth": 0, "zorder": 0}
-    axes.axvspan(*x, **look)
+    axes.axvspan(*x, label=f"{100 * fit.confidence:g} % interval of each", **look)
     axes.axhspan(*y, **look)
     half = 1.25 * np.sqrt(square * np.diag(block))
     axes.set_xlim(centre[0] - half[0], centre[0] + half[0])
@@ -81,7 +84,7 @@ def _draw_pair(
     axes.ticklabel_format(useOffset=False)
     share = fit.correlation[pair]
     digits = 2 if abs(share) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
-    axes.set_title(f"correlation {share:.{digits}f}", fontsize=SIZE - 1)
+    axes.set_title(f"Correlation {share:z.{digits}f}".replace("-", "−"), fontsize=SIZE - 1)
 
 
 def _squared_radius(fit: Fit) -> float:
@@ -93,7 +96,9 @@ def _squared_radius(fit: Fit) -> float:
     return float(freedom * np.expm1(-2 * logarithm / freedom))
 
 
-def _add_ellipse(axes: Axes, centre: NDArray[np.float64], block: NDArray[np.float64]) -> None:
+def _add_ellipse(
+    axes: Axes, centre: NDArray[np.float64], block: NDArray[np.float64], label: str
+) -> None:
     """Draw the ellipse (x - centre) block^-1 (x - centre) = 1."""
     # In units of its deviations an ellipse has its axes on the diagonals: no loss of digits.
     x, y = np.sqrt(np.diag(block))
@@ -105,6 +110,7 @@ def _add_ellipse(axes: Axes, centre: NDArray[np.float64], block: NDArray[np.floa
         facecolor="none",
         edgecolor=COLOURS[0],
         linewidth=1.2,
+        label=label,
     )
 
 
@@ -119,7 +125,7 @@ def _draw_correlation(fit: Fit) -> Figure:
     axes.set_xticks(range(len(names)), names, fontsize=SIZE - 1, rotation=90)
     axes.set_yticks(range(len(names)), names, fontsize=SIZE - 1)
     for (row, column), value in np.ndenumerate(fit.correlation):
-        text = f"{value:.2f}" if np.isfinite(value) else "not\nknown"
+        text = f"{value:z.2f}".replace("-", "−") if np.isfinite(value) else "not\nknown"
         dark = np.isfinite(value) and abs(value) > 0.6  # noqa: PLR2004 - colours
         axes.text(
             column, row, text, ha="center", va="center", fontsize=SIZE - 1,

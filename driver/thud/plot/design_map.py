@@ -6,13 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import TwoSlopeNorm
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
-from thud.plot.look import SIZE, empty_axes, legend_above
+from thud.plot.look import FORCE_WORDS, SIZE, empty_axes, legend_above
 from thud.plot.parameter_axis import show_parameter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.colorbar import Colorbar
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -39,26 +40,27 @@ def draw_design_map(result: DesignMap) -> Figure:
     margin = np.ma.masked_invalid(dataset["margin"].transpose(*result.axes).values.T)
     conforms = dataset["conforms"].transpose(*result.axes).values.T
     if margin.count():
-        _draw_margin(figure, axes, (x, y), margin)
+        bar = _draw_margin(figure, axes, (x, y), margin)
+        bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['judged_force']]}), dB", fontsize=SIZE)
     row, column = np.nonzero(conforms)
     if row.size:
-        axes.plot(x[column], y[row], ".", markersize=2, color="black", label="all criteria met")
+        axes.plot(x[column], y[row], ".", markersize=2, color="black", label="All criteria met")
     if result.mark:
         place = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
         axes.plot(
             *place, "*", markersize=9, markerfacecolor="white", markeredgecolor="black",
-            linestyle="none", label=result.mark_name, clip_on=False, zorder=3,
+            linestyle="none", label=result.mark_name.capitalize(), clip_on=False, zorder=3,
         )  # fmt: skip
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.grid(visible=False)
     if axes.get_legend_handles_labels()[0]:
-        legend_above(axes, 2)
+        legend_above(axes)
     return figure
 
 
 def _draw_margin(
     figure: Figure, axes: Axes, place: tuple[Values, Values], margin: np.ma.MaskedArray[Any, Any]
-) -> None:
+) -> Colorbar:
     """Draw the margin as colours, white at 0, with lines at 0 and at round values."""
     lower, upper = min(float(margin.min()), 0.0), max(float(margin.max()), 0.0)
     # The colours of the smaller side, usually of what conforms, change up to four times faster.
@@ -70,10 +72,10 @@ def _draw_margin(
     inside = steps[(steps > margin.min()) & (steps < margin.max()) & (steps != 0)]
     if inside.size:
         lines = axes.contour(*place, margin, inside, colors="0.25", linewidths=0.4, linestyles="-")
-        axes.clabel(lines, fontsize=SIZE - 2, fmt="%g")
+        axes.clabel(lines, fontsize=SIZE - 2, fmt=StrMethodFormatter("{x:g}"))
     if margin.min() < 0 < margin.max():
         axes.contour(*place, margin, levels=[0.0], colors="black", linewidths=1.2)
-        axes.plot([], [], color="black", linewidth=1.2, label="octave limits")
+        axes.plot([], [], color="black", linewidth=1.2, label="Octave limits")
     bar = figure.colorbar(filled, ax=axes, ticks=steps)
-    bar.set_label("Margin, dB", fontsize=SIZE)
     bar.ax.tick_params(labelsize=SIZE)
+    return bar

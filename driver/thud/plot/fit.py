@@ -8,7 +8,17 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from thud.plot.confidence import confidence
-from thud.plot.look import COLOURS, GREY, SIZE, dress, legend_above, new_figure
+from thud.plot.look import (
+    BAND_WORDS,
+    COLOURS,
+    FORCE_WORDS,
+    GREY,
+    LEVEL,
+    SIZE,
+    dress,
+    legend_above,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.studies.fitting.force_target import ForceMisfit
+    from thud.studies.fitting.level_target import LevelMisfit
     from thud.studies.fitting.result import Fit
 
 # More names of bands are rotated.
@@ -50,7 +61,7 @@ def target_and_fit(fit: Fit) -> Figure:
     if fit.misfit.deviation_unit == "N":
         _draw_force(fit, cast("ForceMisfit", fit.misfit), above, below)
     else:
-        _draw_levels(fit, above, below)
+        _draw_levels(fit, cast("LevelMisfit", fit.misfit), above, below)
     above.tick_params(axis="x", labelbottom=False)
     figure.align_ylabels()
     return figure
@@ -65,7 +76,7 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     if np.median(np.abs(record - target)) > VISIBLE * target.max():
         above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
     above.plot(
-        time, target / 1e3, color=COLOURS[0], linewidth=2.2, alpha=0.6, label=f"Record {band}"
+        time, target / 1e3, color=COLOURS[5], linewidth=2.8, alpha=0.6, label=f"Record {band}"
     )
     above.plot(
         time, column["model_N"] / 1e3, color=COLOURS[1], linestyle="--", linewidth=1.1, label="Fit"
@@ -78,18 +89,18 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     begin, end = fit.time_shift - BEFORE * contact, fit.time_shift + (1 + AFTER) * contact
     below.set_xlim(1e3 * max(begin, misfit.time[0]), 1e3 * min(end, misfit.time[-1]))
     below.set_xlabel("Time, ms", fontsize=SIZE)
-    above.set_ylabel(f"{misfit.kind.capitalize()} force, kN", fontsize=SIZE)
-    below.set_ylabel("Fit - target, N", fontsize=SIZE)
+    above.set_ylabel(f"{FORCE_WORDS[misfit.kind].capitalize()}, kN", fontsize=SIZE)
+    below.set_ylabel("Fit − target, N", fontsize=SIZE)
     limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
     below.set_ylim(-limit, limit)
     # Below, it would cover the curve.
-    above.fill_between([], [], color=GREY, linewidth=0, label=rf"Noise {band}, $\pm2\sigma$")
-    legend_above(above, 2, "lower right")
+    above.fill_between([], [], color=GREY, linewidth=0, label=f"Noise {band}, ±2σ")
+    legend_above(above)
 
 
-def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
+def _draw_levels(fit: Fit, misfit: LevelMisfit, above: Axes, below: Axes) -> None:
     """Draw levels with their uncertainty, and the residuals of all quantities."""
-    column = fit.misfit.columns(fit.impact, 0.0)
+    column = misfit.columns(fit.impact, 0.0)
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
     values = {
         name: np.array(column[name], dtype=np.float64)
@@ -101,7 +112,7 @@ def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     for i in range(count):
         edge = values["target"][i] + scale * np.array([-1, 1]) * values["uncertainty"][i]
         name = "Target" if i == 0 else None
-        band = "Its standard deviation" if i == 0 else None
+        band = "Standard deviation of the target" if i == 0 else None
         above.fill_between([i - 0.35, i + 0.35], *edge, color="0.75", linewidth=0, label=band)
         above.plot(
             [i - 0.35, i + 0.35], 2 * [values["target"][i]], color=COLOURS[0], linewidth=1.2,
@@ -115,12 +126,12 @@ def _draw_levels(fit: Fit, above: Axes, below: Axes) -> None:
     below.plot(place, fit.residuals, color=COLOURS[1], marker="o", markersize=4, linestyle="none")
     limit = 1.2 * max(1.2, np.abs(fit.residuals).max())
     below.set_ylim(-limit, limit)
-    below.set_xticks(place, [BROKEN.get(name, name) for name in names])
+    below.set_xticks(place, [BROKEN.get(name, name) for name in names], fontsize=SIZE - 1)
     below.xaxis.set_minor_locator(NullLocator())
     below.set_xlim(-0.6, len(names) - 0.4)
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
-    below.set_xlabel("Band, Hz", fontsize=SIZE)
-    above.set_ylabel("Force exposure level, dB", fontsize=SIZE)
-    below.set_ylabel("(Fit - target)\n/ uncertainty", fontsize=SIZE)
-    above.legend(fontsize=SIZE - 1, frameon=False)
+    below.set_xlabel(f"{BAND_WORDS[misfit.bands]}, Hz", fontsize=SIZE)
+    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[misfit.kind]})", fontsize=SIZE)
+    below.set_ylabel("(Fit − target)\n/ uncertainty", fontsize=SIZE)
+    legend_above(above)

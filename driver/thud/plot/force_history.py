@@ -5,75 +5,89 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from thud._schema import Drop
 from thud.impact import Impact, solve
 from thud.levels import record_force
 from thud.plot.examples import solve_published
-from thud.plot.look import SIZE, Curve, add_legend, empty_axes, iterate_curves, line_style, named
+from thud.plot.look import (
+    SIZE,
+    Curve,
+    empty_axes,
+    force_words,
+    iterate_curves,
+    legend_above,
+    line_style,
+    literal,
+    named,
+)
+from thud.recording import NOISE
 
-# Unrecorded part, relative to the maximum force, above which the unfiltered force is drawn too.
-UNSEEN = 0.02
+# Time that is drawn before and after the contact, as fraction of it.
+MARGIN = 0.04
+TIME_LABEL = "Time since first touch, ms"
 
 
-def force_history(impacts: Mapping[str, Impact], force: str | None = "elastic") -> Figure:
-    """Draw forces against time (paper, figure 2).
+def force_history(impacts: Mapping[str, Impact], force: str | None = None) -> Figure:
+    """Draw forces against time, below 1.25 kHz as force plates record them (paper, figure 2).
 
     Parameters
     ----------
     impacts
         Impacts by their names in the legend.
     force
-        ``"elastic"`` (the paper's ball force), ``"floor"``, or None for both.
+        ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
 
     Returns
     -------
     Figure
-        Time in ms, force in kN.
+        Time from first touch to last release in ms, force in kN.
     """
-    figure, axes = empty_axes(2.5)
+    figure, axes = empty_axes(2.6)
     draw_forces(axes, impacts, force)
-    add_legend(axes, impacts)
+    legend_above(axes)
     return figure
 
 
 def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
-    """Draw forces against time as force plates record them, and unfiltered ones in grey."""
-    peak = end = 0.0
-    band = ""
+    """Draw forces against time."""
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        whole = impact.force(kind)
-        time = 1e3 * (impact.time - impact.touch_time)
-        recorded = record_force(whole, impact.sample_rate)
-        if np.abs(whole - recorded).max() > UNSEEN * whole.max():
-            # One entry of the legend for all of them.
-            unfiltered = None if band else "unfiltered"
-            axes.plot(time, 1e-3 * whole, color="0.75", linewidth=0.4, zorder=1, label=unfiltered)
-            shown, band = recorded, " below 1.25 kHz"
-        else:
-            shown = whole
-        axes.plot(time, 1e-3 * shown, label=name, **line_style(i))
-        end = max(end, time[np.flatnonzero(whole > 0)[-1]])
-        peak = max(peak, whole.max())
-    axes.set_xlim(0, 1.15 * end)
-    axes.set_ylim(0, 1.05e-3 * peak)
-    axes.set_xlabel("Time since first touch, ms", fontsize=SIZE)
-    name = force.capitalize() if force else "Blocked"
-    axes.set_ylabel(f"{name} force{band}, kN", fontsize=SIZE)
+        axes.plot(*contact_force(impact, kind), label=literal(name), **line_style(i))
+    axes.margins(x=0)
+    axes.set_xlabel(TIME_LABEL, fontsize=SIZE)
+    axes.set_ylabel(force_label(impacts, force), fontsize=SIZE)
+
+
+def contact_force(impact: Curve, kind: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return time since first touch, ms, and force below 1.25 kHz, kN, while there is contact.
+
+    Force plates record no more (paper, section 3); above it, meshes and modes ring.
+    """
+    time = impact.time - impact.touch_time
+    recorded = record_force(impact.force(kind), impact.sample_rate)
+    end = time[recorded > NOISE * recorded.max()][-1]
+    shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
+    return 1e3 * time[shown], 1e-3 * recorded[shown]
+
+
+def force_label(impacts: Mapping[str, Curve], force: str | None) -> str:
+    """Return the label of an axis of forces."""
+    return f"{force_words(impacts, force).capitalize()}\nbelow 1.25 kHz, kN"
 
 
 def _draw_heights() -> Figure:
     """Draw the three heights of the paper."""
-    return force_history({f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)})
+    impacts = {f"{height:.2f} m": solve(drop=Drop(height)) for height in (0.1, 1, 1.6)}
+    return force_history(impacts, "elastic")
 
 
 def _draw_viscosity() -> Figure:
     """Draw the effect of the viscosity of the rubber on the force."""
-    impacts = {"viscous": solve_published(), "elastic": solve_published("none")}
-    return force_history(impacts, "floor")
+    return force_history({"viscous": solve_published(), "elastic": solve_published("none")})
 
 
-IMPACT_FIGURES = {"force": lambda impact: force_history(named(impact), None)}
+IMPACT_FIGURES = {"force": lambda impact: force_history(named(impact))}
 DOCUMENTATION_FIGURES = {
     "figure2_force_history": _draw_heights,
     "finite_element_force": _draw_viscosity,

@@ -12,13 +12,17 @@ from thud.plot.look import (
     empty_axes,
     iterate_curves,
     legend_above,
+    level_label,
     line_style,
+    literal,
     marker_style,
     octave_axis,
 )
 
 
-def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str = "floor") -> Figure:
+def level_changes(
+    reference: Impact, impacts: Mapping[str, Impact], force: str | None = None
+) -> Figure:
     """Draw how octave levels change against a reference.
 
     Parameters
@@ -28,7 +32,7 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
     impacts
         Impacts by their names in the legend.
     force
-        ``"elastic"`` or ``"floor"``.
+        ``"floor"`` or ``"elastic"``; by default that of each case.
 
     Returns
     -------
@@ -40,10 +44,12 @@ def level_changes(reference: Impact, impacts: Mapping[str, Impact], force: str =
     base = reference.levels(force=force)
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
         change = impact.levels(force=kind) - base
-        axes.plot(np.arange(len(base)), change, label=name, **line_style(i), **marker_style(i))
+        axes.plot(
+            np.arange(len(base)), change, label=literal(name), **line_style(i), **marker_style(i)
+        )
     octave_axis(axes)
-    axes.set_ylabel("Change of the level, dB", fontsize=SIZE)
-    legend_above(axes, 3)
+    axes.set_ylabel(level_label(impacts, force, "Change of the level, dB"), fontsize=SIZE)
+    legend_above(axes)
     return figure
 
 

@@ -2,9 +2,10 @@
 
 import io
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from textwrap import fill
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.files import replace_file
-from thud.impact import FORCES, Impact
+from thud.impact import Impact
 from thud.levels import get_bands
 from thud.recording import Recording
 
@@ -27,14 +28,19 @@ Curve = TypeVar("Curve", bound=Impact | Recording)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+# Of bars; in print they tell colours apart.
+HATCHES = (None, "//////", "......", "\\\\\\\\\\\\", "xxxxxx", "------", "||||||", "++++++")
 # Areas behind curves.
 GREY = "0.85"
 # Width of a column, inch, and size of text, pt.
 WIDTH = 3.5
 SIZE = 8
-# Legends of many entries.
-COMPACT: dict[str, Any] = {"handlelength": 1.8, "handletextpad": 0.4, "columnspacing": 0.8}
 FORMATS = ("pdf", "png", "svg")
+FORCE_WORDS = {"elastic": "elastic force", "floor": "force on the floor"}
+BAND_WORDS = {"octave": "Octave band", "third": "One-third-octave band"}
+LEVEL = "Force exposure level, dB re 1 N"
+# Maximum number of letters of a line of a legend.
+_LINE = 44
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
@@ -58,14 +64,31 @@ def dress(axes: Axes) -> Axes:
     return axes
 
 
-def legend_above(
-    axes: Axes, columns: int, place: Literal["lower left", "lower right"] = "lower left"
-) -> Legend:
-    """Put the legend above the axes; `place` is its corner that is fixed to them."""
-    return axes.legend(
-        fontsize=SIZE - 1, frameon=False, ncols=columns, loc=place,
-        bbox_to_anchor=(float(place == "lower right"), 1), **COMPACT,
-    )  # fmt: skip
+def legend_above(axes: Axes, title: str = "") -> Legend:
+    """Put the legend of axes above all axes of their figure, in as few rows as its width allows.
+
+    The figure becomes higher by the legend.
+    """
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        message = "the axes are removed from their figure; allowed: axes of a figure"
+        raise InputError(message)
+    handles, names = axes.get_legend_handles_labels()
+    rows = 0
+    while True:
+        rows += 1
+        legend = figure.legend(
+            handles, [fill(name, _LINE) for name in names], loc="outside upper left",
+            ncols=-(-len(names) // rows), title=title, title_fontsize=SIZE - 1, alignment="left",
+            fontsize=SIZE - 1, frameon=False, borderpad=0, handlelength=2.4, handletextpad=0.4,
+            columnspacing=0.8,
+        )  # fmt: skip
+        size = legend.get_window_extent()
+        if rows >= len(names) or size.width < 0.97 * figure.bbox.width:
+            width, height = figure.get_size_inches()
+            figure.set_size_inches(width, height + size.height / figure.dpi)
+            return legend
+        legend.remove()
 
 
 def literal(label: str) -> str:
@@ -73,18 +96,23 @@ def literal(label: str) -> str:
     return label.lstrip("_").replace("$", r"\$")
 
 
+def styled(i: int, styles: Sequence[Any]) -> Any:  # noqa: ANN401 - of matplotlib
+    """Return the style of a curve by its number; each round of colours has it shifted by one."""
+    return styles[(i + i // len(COLOURS)) % len(styles)]
+
+
 def line_style(i: int) -> dict[str, Any]:
     """Return colour and line style of a curve by its number."""
     return {
         "color": COLOURS[i % len(COLOURS)],
-        "linestyle": LINES[i % len(LINES)],
+        "linestyle": styled(i, LINES),
         "linewidth": 1.2,
     }
 
 
 def marker_style(i: int, size: float = 4) -> dict[str, Any]:
     """Return the marker of a curve by its number."""
-    return {"marker": MARKERS[i % len(MARKERS)], "markersize": size}
+    return {"marker": styled(i, MARKERS), "markersize": size}
 
 
 def add_curves(
@@ -105,6 +133,8 @@ def iterate_curves(
 ) -> Iterator[tuple[str, Curve, str]]:
     """Yield label, impact and kind of force of each curve.
 
+    Without `force` each case has the one that it judges. Labels say which where they differ.
+
     Raises
     ------
     InputError
@@ -115,19 +145,27 @@ def iterate_curves(
         raise InputError(message)
     for name, impact in impacts.items():
         require_kind(name, impact, Impact | Recording)
-        if force:
-            yield literal(name), impact, force
-        else:
-            prefix = f"{name}, " if len(impacts) > 1 else ""
-            same = np.array_equal(impact.force("elastic"), impact.force("floor"))
-            for kind in FORCES[1:] if same else FORCES:
-                yield literal(f"{prefix}{kind} force"), impact, kind
+    kinds = [_kind(impact, force) for impact in impacts.values()]
+    for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
+        which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
+        yield f"{name}{which}", impact, kind
 
 
-def add_legend(axes: Axes, impacts: Mapping[str, Impact]) -> None:
-    """Add the legend, titled by the name of a single impact."""
-    title = literal(next(iter(impacts))) if len(impacts) == 1 else None
-    axes.legend(fontsize=SIZE, frameon=False, title=title, title_fontsize=SIZE)
+def force_words(impacts: Mapping[str, Curve], force: str | None) -> str:
+    """Return the words for the force of all curves, those for any where labels say which."""
+    kinds = {kind for _, _, kind in iterate_curves(impacts, force)}
+    return FORCE_WORDS[kinds.pop()] if len(kinds) == 1 else "force"
+
+
+def level_label(impacts: Mapping[str, Curve], force: str | None, what: str = LEVEL) -> str:
+    """Return the label of an axis of levels, with their force where labels do not say which."""
+    words = force_words(impacts, force)
+    return what if words == "force" else f"{what}\n({words})"
+
+
+def _kind(impact: Curve, force: str | None) -> str:
+    """Return the kind of force that is shown; a recording is of the floor."""
+    return force or impact.judged_force if isinstance(impact, Impact) else "floor"
 
 
 def octave_axis(axes: Axes, bands: str = "octave") -> None:
@@ -136,7 +174,7 @@ def octave_axis(axes: Axes, bands: str = "octave") -> None:
     axes.set_xticks(np.arange(len(names)), names)
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xlim(-0.6, len(names) - 0.4)
-    axes.set_xlabel(f"{bands.capitalize()} band, Hz", fontsize=SIZE)
+    axes.set_xlabel(f"{BAND_WORDS[bands]}, Hz", fontsize=SIZE)
     if bands == "third":
         axes.tick_params(axis="x", labelrotation=90)
 
@@ -174,9 +212,11 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
         raise InputError(message)
     content = io.BytesIO()
     # Without a date and with constant names, the same figure gives the same bytes.
-    metadata = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    with mpl.rc_context({"svg.hashsalt": "thud"}):
-        figure.savefig(content, format=kind, metadata=metadata)
+    date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
+    title = Path(path).stem.replace("_", " ").capitalize()
+    # Text in vector graphics stays text.
+    with mpl.rc_context({"svg.hashsalt": "thud", "svg.fonttype": "none"}):
+        figure.savefig(content, format=kind, metadata={"Title": title, **date})
     replace_file(path, content.getvalue())
 
 

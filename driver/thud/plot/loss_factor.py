@@ -10,7 +10,7 @@ from thud._schema import FiniteElement
 from thud.errors import InputError
 from thud.free_modes import loss_factors
 from thud.impact import Impact
-from thud.plot.look import SIZE, add_curves, empty_axes
+from thud.plot.look import SIZE, add_curves, empty_axes, legend_above
 
 
 def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
@@ -43,7 +43,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
         axis.set_major_formatter("{x:g}")
     axes.set_xlabel("Frequency, Hz", fontsize=SIZE)
     axes.set_ylabel("Loss factor", fontsize=SIZE)
-    axes.legend(fontsize=SIZE, frameon=False)
+    legend_above(axes)
     return figure
 
 
@@ -59,7 +59,7 @@ def _draw_viscosity(impact: Impact) -> Figure | None:
 def _draw_laws() -> Figure:
     """Draw the laws of viscosity."""
     laws = {
-        "Kelvin-Voigt": FiniteElement(),
+        "Kelvin–Voigt": FiniteElement(),
         "Prony series, constant": FiniteElement(viscosity="constant_loss"),
         "Prony series, one term": FiniteElement(
             viscosity="prony", prony_share=(0.5,), prony_time=(1.5e-3,)

@@ -51,7 +51,7 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
     for axes in panels:
         axes.set_axis_off()
         axes.set_aspect("equal")
-    add_colour_bar(figure, panels, scale, "Displacement over its largest")
+    add_colour_bar(figure, panels, scale, "Displacement relative to its maximum")
     return figure
 
 

@@ -10,6 +10,8 @@ from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from matplotlib.quiver import Quiver, QuiverKey
 from numpy.typing import NDArray
 
 from thud.checks import require_kind
@@ -23,8 +25,9 @@ from thud.plot.look import SIZE, WIDTH, new_figure
 # Instants of the paper's figure 5.
 INSTANTS = 9
 # Nodes between two arrows, from pole to pole and through the wall.
-ARROWS = (4, 4)
+ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
+LABEL = "Displacement, mm"
 
 
 def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
@@ -57,10 +60,11 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     panels = figure.subplots(rows, 3, squeeze=False).ravel()
     scale = _scale(shown, chosen)
     for axes, i in zip(panels, chosen, strict=False):
-        _draw_instant(axes, impact, shown, i, scale)
+        arrows = _draw_instant(axes, impact, shown, i, scale)
     for axes in panels:
         axes.set_axis_off()
-    add_colour_bar(figure, panels, scale, _label(impact))
+    add_colour_bar(figure, panels, scale, LABEL)
+    _add_key(panels[0], arrows, impact)
     return figure
 
 
@@ -89,11 +93,11 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     axes = figure.subplots()
     count = len(shown.time)
     scale = _scale(shown, range(count))
-    add_colour_bar(figure, [axes], scale, _label(impact))
+    add_colour_bar(figure, [axes], scale, LABEL)
 
     def draw(i: int) -> list[Any]:
         axes.clear()
-        _draw_instant(axes, impact, shown, i, scale)
+        _add_key(axes, _draw_instant(axes, impact, shown, i, scale), impact)
         axes.set_axis_off()
         return []
 
@@ -120,11 +124,6 @@ def _scale(shown: Motion, chosen: list[int] | range) -> Normalize:
     return Normalize(0, 1e3 * max(_displacement(shown, i).max() for i in chosen))
 
 
-def _label(impact: Impact) -> str:
-    """Return the meaning of colours and arrows."""
-    return f"Displacement, mm (arrows: a third of the radius is {impact.impact_velocity:.1f} m/s)"
-
-
 def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
     """Return the displacements since first touch, m, shape (n_line, n_ring)."""
     touching = shown.start - [0, shown.start[..., 1].min()]
@@ -132,28 +131,44 @@ def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
     return length
 
 
-def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Normalize) -> None:
-    """Draw the ball at one instant, its velocities and the floor."""
+def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Normalize) -> Quiver:
+    """Draw the ball at one instant, its velocities and the floor; return the arrows."""
     radius = impact.case.ball.outer_radius
     place = shown.position[i]
     draw_section(axes, place, 1e3 * _displacement(shown, i), scale)
     some = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
-    axes.quiver(
-        *place[some].reshape(-1, 2).T,
-        *shown.velocity[i][some].reshape(-1, 2).T,
+    start, velocity = (field[some].reshape(-1, 2) for field in (place, shown.velocity[i]))
+    # At first touch an arrow is as long as a third of the radius.
+    unit = 3 * impact.impact_velocity / radius
+    above = start[:, 1] + velocity[:, 1] / unit >= 0
+    arrows = axes.quiver(
+        *start[above].T,
+        *velocity[above].T,
         angles="xy",
         scale_units="xy",
-        # At first touch an arrow is as long as a third of the radius.
-        scale=3 * impact.impact_velocity / radius,
-        width=0.008,
+        scale=unit,
+        width=0.014,
         color="0.1",
+        # A light edge shows arrows on dark colours.
+        path_effects=[withStroke(linewidth=1, foreground="white")],
     )
     axes.fill_between([-0.05 * radius, 1.4 * radius], -0.12 * radius, 0, color="0.6", linewidth=0)
     since = 1e3 * (shown.time[i] - impact.touch_time)
     axes.set_title(f"{since:.1f} ms", fontsize=SIZE, pad=2)
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
-    axes.set_ylim(-0.4 * radius, 2.6 * radius)
+    axes.set_ylim(-0.15 * radius, 2.4 * radius)
     axes.set_aspect("equal")
+    return arrows
+
+
+def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
+    """Show the size of a round velocity beside the label of the colours."""
+    velocity = float(f"{impact.impact_velocity:.1g}")
+    key = QuiverKey(
+        arrows, WIDTH - 0.5, 0.11, velocity, f"{velocity:g} m/s", labelpos="E",
+        coordinates="inches", fontproperties={"size": SIZE},
+    )  # fmt: skip
+    axes.add_artist(key)
 
 
 IMPACT_FIGURES = {"motion": lambda impact: motion(impact) if impact.motion else None}

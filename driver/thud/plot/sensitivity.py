@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.keys import plain_words
-from thud.plot.look import COLOURS, SIZE, empty_axes, legend_above
+from thud.plot.look import COLOURS, FORCE_WORDS, HATCHES, SIZE, empty_axes, legend_above
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,14 +24,15 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     parameters = [str(name) for name in indices["parameter"].values]
     outputs = [str(name) for name in indices["output"].values]
     thickness = 0.84 / len(parameters)
-    figure, axes = empty_axes(0.9 + 0.075 * len(outputs) * (len(parameters) + 1))
+    figure, axes = empty_axes(0.8 + 0.075 * len(outputs) * (len(parameters) + 1))
     place = np.arange(len(outputs), dtype=float)
     for i, name in enumerate(parameters):
         row = indices.sel(parameter=name)
         at = place + (i - (len(parameters) - 1) / 2) * thickness
         axes.barh(
             at, row["total"], 0.9 * thickness, color=COLOURS[i % len(COLOURS)],
-            hatch="////" if i >= len(COLOURS) else None, label=plain_words(name),
+            hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
+            label=plain_words(name),
         )  # fmt: skip
         look: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
         axes.errorbar(
@@ -46,6 +47,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     axes.set_yticks(place, outputs)
     axes.set_ylim(len(outputs) - 0.5, -0.5)
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-    axes.set_xlabel("Sobol index, with its interval of 95 %", fontsize=SIZE)
-    legend_above(axes, 3, "lower right")
+    words = FORCE_WORDS[result.dataset.attrs["judged_force"]]
+    axes.set_xlabel(f"Sobol index, with its interval of 95 %\n({words})", fontsize=SIZE)
+    legend_above(axes)
     return figure

@@ -9,7 +9,16 @@ import numpy as np
 from thud.impact import FORCES
 from thud.keys import plain_words
 from thud.levels import BANDWIDTHS, get_bands, octave_limits
-from thud.plot.look import COLOURS, COMPACT, SIZE, dress, line_style, marker_style, new_figure
+from thud.plot.look import (
+    COLOURS,
+    FORCE_WORDS,
+    SIZE,
+    dress,
+    legend_above,
+    line_style,
+    marker_style,
+    new_figure,
+)
 from thud.plot.parameter_axis import show_parameter, words
 
 if TYPE_CHECKING:
@@ -68,9 +77,10 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
         axes.xaxis.label.set_visible(lowest)
     for axes in panels[len(parts) :]:
         axes.remove()
-    figure.supylabel("Level - nominal, dB", fontsize=SIZE)
+    words = "judged force" if "force" in columns else FORCE_WORDS[dataset.attrs["judged_force"]]
+    figure.supylabel(f"Level − nominal, dB\n({words})", fontsize=SIZE)
     others = [n for n in varied if n not in {name, split}]
-    _add_legend(figure, judged, split, others)
+    legend_above(panels[0], _meaning(judged, split, others))
     return figure
 
 
@@ -154,8 +164,8 @@ def _of(part: NDArray[np.float64], function: Any) -> float:  # noqa: ANN401 - of
     return float(function(known)) if known.size else np.nan
 
 
-def _add_legend(figure: Figure, judged: _Judged, split: str | None, others: list[str]) -> None:
-    """Add the legend above the panels, with the meaning of panels, lines, shades and grey."""
+def _meaning(judged: _Judged, split: str | None, others: list[str]) -> str:
+    """Return what panels, lines, shades and grey mean."""
     minimum, maximum = judged.tolerance
     lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
@@ -163,8 +173,4 @@ def _add_legend(figure: Figure, judged: _Judged, split: str | None, others: list
         lines.insert(0, f"Lines: median over {over}; shades: range")
     if split:
         lines.insert(0, f"Panels: {plain_words(split)}")
-    figure.legend(
-        *figure.axes[0].get_legend_handles_labels(), loc="outside upper left", ncols=5,
-        title="\n".join(lines), title_fontsize=SIZE - 1, alignment="left", fontsize=SIZE - 1,
-        frameon=False, borderpad=0, **COMPACT,
-    )  # fmt: skip
+    return "\n".join(lines)

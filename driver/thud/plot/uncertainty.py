@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from thud.levels import octave_limits
-from thud.plot.look import COLOURS, SIZE, empty_axes, legend_above, octave_axis, octave_boxes
+from thud.plot.look import (
+    COLOURS,
+    FORCE_WORDS,
+    SIZE,
+    empty_axes,
+    legend_above,
+    octave_axis,
+    octave_boxes,
+)
 
 if TYPE_CHECKING:
+    from matplotlib.collections import PolyCollection
     from matplotlib.figure import Figure
 
     from thud.studies.uncertainty import Uncertainty
@@ -23,23 +32,24 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     lower, upper = octave_limits(result.source)
     nominal = (lower + upper) / 2
     figure, axes = empty_axes(2.8)
-    label = f"tolerance, {result.source.replace('_', ' ')}"
+    label = f"Tolerance, {result.source.replace('_', ' ')}"
     octave_boxes(axes, lower - nominal, upper - nominal, label)
     levels = result.levels - nominal
     place = np.arange(len(nominal))
     shapes = axes.violinplot(levels, place, widths=0.6, showextrema=False)
-    for shape in shapes["bodies"]:  # type: ignore[attr-defined]
-        shape.set(facecolor=COLOURS[0], alpha=0.8, edgecolor="none")
+    for i, shape in enumerate(cast("list[PolyCollection]", shapes["bodies"])):
+        shape.set(
+            facecolor=COLOURS[5], alpha=1, edgecolor="none", label=None if i else "Distribution"
+        )
     low, middle, high = np.quantile(levels, [0.025, 0.5, 0.975], axis=0)
     axes.errorbar(
         place, middle, (middle - low, high - middle), fmt="o", color="black", markersize=2.5,
-        elinewidth=0.8, capsize=2, label="median, 95 % of sets",
+        elinewidth=0.8, capsize=2, label="Median, 95 % of sets",
     )  # fmt: skip
     octave_axis(axes)
-    axes.set_ylabel("Level - nominal, dB", fontsize=SIZE)
+    words = FORCE_WORDS[result.dataset.attrs["judged_force"]]
+    axes.set_ylabel(f"Level − nominal, dB\n({words})", fontsize=SIZE)
     low, high = result.interval
-    legend = legend_above(axes, 2)
     share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
-    legend.set_title(f"Conforms: {share}")
-    legend.get_title().set_fontsize(SIZE)
+    legend_above(axes, f"All criteria met: {share}")
     return figure

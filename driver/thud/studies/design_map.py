@@ -59,7 +59,7 @@ class DesignMap:
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
         if margin.notnull().any():
             best = margin.isel(margin.argmax(...))
-            rows.append(("largest margin, dB", f"{float(best):.2f}"))
+            rows.append(("largest margin, dB", f"{float(best):z.2f}"))
             for name in self.axes:
                 power = self.dataset[name].attrs["shown_power"]
                 unit = self.dataset[name].attrs["shown_unit"]

@@ -127,7 +127,7 @@ def sensitivity(
 def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
     force = study.case.levels.force
     levels = dataset[f"{force}_level"].values
-    peak = "peak_force" if force == "elastic" else "peak_floor_force"
+    peak = "peak_elastic_force" if force == "elastic" else "peak_force"
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)}
     dimension = len(study.parameters)

@@ -27,6 +27,7 @@ module thud_hollow_sphere
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: solve => solve_hollow_sphere
+      procedure, pass(options) :: get_paper_modulus
    end type hollow_sphere_type
 
    !> The choices of `momentum_flux`.
@@ -71,6 +72,15 @@ contains
       fields = [choice_field('momentum_flux', options%momentum_flux, &
          'momentum of wall that enters or leaves the flat cap', flux_choices)]
    end function get_fields
+
+   !> Modulus of elasticity of the paper's ball, Pa (section 2.3).
+   function get_paper_modulus(options) result(modulus)
+      class(hollow_sphere_type), intent(in) :: options
+      !> The modulus, Pa.
+      real(wp) :: modulus
+
+      modulus = 1.6e6_wp
+   end function get_paper_modulus
 
    !> The equation of motion of a ball.
    pure function new_shell(ball, compression_weight, restitution_weight) result(shell)

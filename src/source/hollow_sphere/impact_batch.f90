@@ -26,9 +26,9 @@ module thud_impact_batch
       !> Maximum deflection: [batch_size].
       real(wp) :: max_deflection(batch_size)
       !> Maximum elastic force, at samples and turning point, N: [batch_size].
-      real(wp) :: peak_force(batch_size)
+      real(wp) :: peak_elastic_force(batch_size)
       !> Maximum force on the floor, likewise, N: [batch_size].
-      real(wp) :: peak_floor_force(batch_size)
+      real(wp) :: peak_force(batch_size)
       !> Steps from first touch to release: [batch_size].
       real(wp) :: contact(batch_size)
       type(shell_batch_type) :: shell

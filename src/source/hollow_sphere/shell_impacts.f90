@@ -54,7 +54,7 @@ contains
       call finish_step(impacts, impacts%released, length, elastic_force, floor_force)
       impacts%contact = last + length
       last_sample = last_step/substeps + 1
-      call get_peaks(force(:, :last_sample), impacts%peak_force, impacts%peak_floor_force)
+      call get_peaks(force(:, :last_sample), impacts%peak_elastic_force, impacts%peak_force)
       ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       force(:, 1) = force(:, 1)/2
    end subroutine solve_impacts
@@ -224,25 +224,25 @@ contains
       impacts%max_deflection = impacts%states(impacts%now)%deflection
       call finish_step(impacts, turns, 1 - length, elastic_force, floor_force)
       ! Those at the turning point.
-      impacts%peak_force = elastic_force
-      impacts%peak_floor_force = floor_force
+      impacts%peak_elastic_force = elastic_force
+      impacts%peak_force = floor_force
    end subroutine turn
 
    !> Raises the forces at the turning point to the maximum of all samples.
-   pure subroutine get_peaks(force, peak_force, peak_floor_force)
+   pure subroutine get_peaks(force, peak_elastic_force, peak_force)
       !> Elastic forces, then floor forces, N: [2 batch_size, n_sample].
       real(wp), intent(in) :: force(:, :)
       !> Maximum elastic force, N: [batch_size].
-      real(wp), intent(inout) :: peak_force(batch_size)
+      real(wp), intent(inout) :: peak_elastic_force(batch_size)
       !> Maximum force on the floor, N: [batch_size].
-      real(wp), intent(inout) :: peak_floor_force(batch_size)
+      real(wp), intent(inout) :: peak_force(batch_size)
       integer :: i, n
 
       do n = 1, size(force, 2)
          !$omp simd
          do i = 1, batch_size
-            peak_force(i) = max(peak_force(i), force(i, n))
-            peak_floor_force(i) = max(peak_floor_force(i), force(batch_size + i, n))
+            peak_elastic_force(i) = max(peak_elastic_force(i), force(i, n))
+            peak_force(i) = max(peak_force(i), force(batch_size + i, n))
          end do
       end do
    end subroutine get_peaks

@@ -44,9 +44,9 @@ module thud_shell_sets
       !> Time from first touch to release, s.
       real(wp) :: contact_time = not_a_number
       !> Maximum elastic force, N.
-      real(wp) :: peak_force = not_a_number
+      real(wp) :: peak_elastic_force = not_a_number
       !> Maximum force on the floor, N.
-      real(wp) :: peak_floor_force = not_a_number
+      real(wp) :: peak_force = not_a_number
       !> Maximum deflection, m.
       real(wp) :: max_deflection = not_a_number
       !> Velocity at release over velocity at first touch.
@@ -192,8 +192,8 @@ contains
          if (.not. outcomes(i)%computed) cycle
          associate (diameter => 2*sets(i)%ball%outer_radius)
             outcomes(i)%contact_time = impacts%contact(i)*step
+            outcomes(i)%peak_elastic_force = impacts%peak_elastic_force(i)
             outcomes(i)%peak_force = impacts%peak_force(i)
-            outcomes(i)%peak_floor_force = impacts%peak_floor_force(i)
             outcomes(i)%max_deflection = impacts%max_deflection(i)*diameter
             outcomes(i)%restitution = -impacts%states(impacts%now)%velocity(i)/impacts%impact_velocity(i)
             outcomes(i)%impulse = sets(i)%ball%mass*(1 + outcomes(i)%restitution)*get_impact_velocity(sets(i)%drop)

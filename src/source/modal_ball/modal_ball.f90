@@ -42,6 +42,7 @@ module thud_modal_ball
    contains
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
+      procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
 
    !> Motion of the ball.
@@ -72,6 +73,15 @@ contains
 
       cost = 6.0e-3_wp*(options%rings/44.0_wp)
    end function get_cost
+
+   !> Modulus of elasticity of the paper's ball, Pa (section 2.3; of linear modes an effective modulus).
+   function get_paper_modulus(options) result(modulus)
+      class(modal_ball_type), intent(in) :: options
+      !> The modulus, Pa.
+      real(wp) :: modulus
+
+      modulus = 1.6e6_wp
+   end function get_paper_modulus
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
@@ -319,7 +329,7 @@ contains
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
       history%peak_force = maxval(history%floor_force)
-      history%peak_floor_force = history%peak_force
+      history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
       history%restitution = state%speed/history%impact_velocity
       associate (momentum => mass*(history%impact_velocity + state%speed), initial => mass/2*history%impact_velocity**2)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.errors import NumericalError, ThudError
-from thud.impact import Impact, solve_case
+from thud.impact import Impact, compute
 from thud.studies.fitting.ranges import with_values
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ class Objective:
         self.evaluations += 1
         self.bar.update()
         try:
-            impact = solve_case(self.case_at(place))
+            impact = compute(self.case_at(place))
         except ThudError as error:
             self.failures += 1
             self.error = error

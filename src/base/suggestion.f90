@@ -1,0 +1,55 @@
+!> Suggestions for misspelt words.
+module thud_suggestion
+   use thud_text, only: lower_case, quoted
+   implicit none (type, external)
+   private
+
+   public :: get_suggestion
+
+   !> Longer words are no misspelt ones.
+   integer, parameter :: max_length = 64
+
+contains
+
+   !> The known word that a misspelt one probably means.
+   pure subroutine get_suggestion(word, known, suggestion)
+      !> The misspelt word.
+      character(len=*), intent(in) :: word
+      !> The known words: [n_known].
+      character(len=*), intent(in) :: known(:)
+      !> ` (did you mean 'height'?)`; empty where no word comes close.
+      character(len=:), allocatable, intent(out) :: suggestion
+      integer :: distance(size(known))
+      integer :: i
+
+      suggestion = ''
+      if (size(known) == 0 .or. len(word) > max_length) return
+      distance = [(get_distance(lower_case(word), lower_case(trim(known(i)))), i=1, size(known))]
+      i = minloc(distance, dim=1)
+      ! A third of the letters may be wrong.
+      if (3*distance(i) <= max(len(word), len_trim(known(i)))) suggestion = ' (did you mean '//quoted(known(i))//'?)'
+   end subroutine get_suggestion
+
+   !> Number of letters to insert, delete, replace or swap with their neighbours, to make one word of the other
+   !> (Damerau and Levenshtein, adjacent swaps only).
+   pure function get_distance(one, other) result(distance)
+      character(len=*), intent(in) :: one, other
+      integer :: distance
+      ! Distances of the beginnings: row i belongs to the first i letters of `one`.
+      integer :: row(0:len(other), 0:len(one))
+      integer :: i, j
+
+      row(:, 0) = [(j, j=0, len(other))]
+      do i = 1, len(one)
+         row(0, i) = i
+         do j = 1, len(other)
+            row(j, i) = min(row(j, i - 1) + 1, row(j - 1, i) + 1, row(j - 1, i - 1) + merge(0, 1, one(i:i) == other(j:j)))
+            if (i == 1 .or. j == 1) cycle
+            if (one(i:i) == other(j - 1:j - 1) .and. one(i - 1:i - 1) == other(j:j)) row(j, i) = min(row(j, i), &
+               row(j - 2, i - 2) + 1)
+         end do
+      end do
+      distance = row(len(other), len(one))
+   end function get_distance
+
+end module thud_suggestion

@@ -1,0 +1,115 @@
+"""The page of a comparison: the same curves in picture and HTML, a table of any rows."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from test_figure_look import assert_clean
+
+import thud
+from thud.comparison import _cell
+from thud.plot.comparison import comparison_page
+from thud.plot.comparison_html import comparison_html
+
+SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
+IMPACTS: dict[str, thud.Impact | thud.Recording] = {"shell <1>": SHELL, "soft $x^{$": SOFT}
+TABLE = [
+    ("", *IMPACTS, "limits, rubber ball"),
+    ("31.5 Hz, dB", "38.53", "36.10 low", "38 to 40"),
+    ("verdict", "does not conform", "does not conform", ""),
+]
+
+
+def plots(page: str) -> list[dict[str, Any]]:
+    (found,) = re.findall(r"^(\[\{.*\}\])\.forEach", page, re.MULTILINE)
+    read: list[dict[str, Any]] = json.loads(found)
+    return read
+
+
+def test_page_has_the_curves_of_the_picture() -> None:
+    figure = comparison_page(IMPACTS, "floor", "rubber_ball", TABLE)
+    page = plots(comparison_html(IMPACTS, "floor", "rubber_ball", TABLE))
+    assert len(page) == 3
+    for axes, drawn in zip(figure.axes, page, strict=False):
+        layout = drawn["layout"]
+        assert layout["xaxis"]["title"]["text"] == axes.get_xlabel()
+        label = layout["yaxis"]["title"]["text"].replace("<br>", "\n")
+        # Panels of levels share their axis.
+        assert label == (axes.get_ylabel() or figure.axes[1].get_ylabel())
+        lines = [line for line in axes.lines if line.get_label() in {*IMPACTS, r"soft \$x^{\$"}]
+        curves = [curve for curve in drawn["data"] if "type" not in curve]
+        assert len(lines) == len(curves) == len(IMPACTS)
+        for line, curve in zip(lines, curves, strict=True):
+            np.testing.assert_allclose(curve["y"], line.get_ydata(), atol=1e-5)
+    assert page[0]["layout"]["yaxis"]["title"]["text"] == (
+        "Force on the floor<br>below 1.25 kHz, kN"
+    )
+    low, high = figure.axes[0].get_xlim()
+    assert low == 0
+    assert high < 1.1e3 * SOFT.contact_time
+
+
+def test_tolerance_is_that_of_the_octaves() -> None:
+    _, octaves, thirds = plots(comparison_html(IMPACTS, None, "tyre", TABLE))
+    (box,) = [curve for curve in octaves["data"] if curve.get("type") == "bar"]
+    criteria = SHELL.conformity("tyre").criteria[:5]
+    assert box["base"] == [c.lower for c in criteria]
+    assert np.add(box["base"], box["y"]) == pytest.approx([c.upper for c in criteria])
+    assert "Tolerance, tyre" in box["name"]
+    assert all("type" not in curve for curve in thirds["data"])
+
+
+def test_curves_are_told_apart_without_colour() -> None:
+    names = {f"{i}": SHELL for i in range(8)}
+    for plot in plots(comparison_html(names, None, "rubber_ball", TABLE)):
+        curves = [curve for curve in plot["data"] if "type" not in curve]
+        looks = {(c["line"]["dash"], c["line"]["color"], c["marker"]["symbol"]) for c in curves}
+        assert len(looks) == 8
+        assert len({curve["line"]["dash"] for curve in curves}) == 7
+
+
+def test_names_and_cells_are_no_code() -> None:
+    page = comparison_html({"</script><b>": SHELL}, None, "rubber_ball", [("<i>",), ("a & b",)])
+    assert "<i>" not in page
+    assert "a &amp; b" in page
+    assert "</script><b>" not in page
+    assert plots(page)[0]["data"][0]["name"] == "&lt;/script&gt;&lt;b&gt;"
+
+
+def test_page_suits_narrow_screens_and_dark_ones() -> None:
+    page = comparison_html(IMPACTS, None, "rubber_ball", TABLE)
+    assert '<meta name="viewport" content="width=device-width' in page
+    assert "prefers-color-scheme: dark" in page
+    assert "minmax(min(100%," in page
+    assert "responsive: true" in page
+    for plot in plots(page):
+        assert "width" not in plot["layout"]
+        assert plot["layout"]["paper_bgcolor"] == "rgba(0,0,0,0)"
+
+
+@pytest.mark.parametrize("count", [1, 3, 9])
+def test_table_of_any_rows_fits_on_the_picture(count: int) -> None:
+    names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(count)]
+    rows = [
+        ("", *names, "limits"),
+        *(("peak force, N", *["1574.3"] * count, "") for _ in range(12)),
+    ]
+    figure = comparison_page(dict.fromkeys(names, SHELL), None, "rubber_ball", rows)
+    assert_clean(figure)
+    cells = figure.axes[3].tables[0].get_celld()
+    assert len(cells) == 13 * (count + 2)
+    for cell in cells.values():
+        box, text = cell.get_window_extent(), cell.get_text().get_window_extent()
+        if cell.get_text().get_text():
+            assert box.x0 <= text.x0
+            assert text.x1 <= box.x1
+            assert box.height >= text.height
+
+
+def test_no_cell_is_minus_zero() -> None:
+    criterion = thud.Criterion("level", "dB", -0.001, -1.0, 1.0, conforms=True)
+    assert _cell(criterion, 1.0, 2) == "0.00"

@@ -1,0 +1,199 @@
+"""Look of all figures: nothing crosses a legend, forces and bands are named, text stays text."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from matplotlib.quiver import Quiver, QuiverKey
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+from PIL import Image
+
+import thud
+from thud import plot
+from thud.plot.look import COLOURS, line_style, marker_style
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+LONG = "rubber_ball_with_a_name_that_is_much_longer_than_the_column_of_a_page_is_wide"
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@pytest.fixture(scope="module")
+def shell() -> thud.Impact:
+    return thud.solve()
+
+
+def judging(impact: thud.Impact, force: str) -> thud.Impact:
+    return replace(impact, case=replace(impact.case, levels=thud.Levels(force=force)))
+
+
+def texts(figure: Figure) -> list[str]:
+    return [t.get_text() for t in figure.findobj(Text) if isinstance(t, Text)]
+
+
+def assert_clean(figure: Figure) -> None:
+    """Assert that the parts of a figure neither overlap nor leave it."""
+    figure.draw_without_rendering()
+    parts = [axes.get_tightbbox() for axes in figure.axes]
+    parts += [legend.get_window_extent() for legend in figure.legends]
+    parts = [part for part in parts if part is not None]
+    assert all(axes.get_legend() is None for axes in figure.axes)
+    for i, part in enumerate(parts):
+        # Rounding of the layout, in pixels of 1/300 inch.
+        assert not [p for p in parts[:i] if (b := Bbox.intersection(p, part)) and min(b.size) > 2]
+        assert min(part.min) > -2
+        assert (part.max < figure.bbox.max + 2).all()
+    for before, after in pairwise(figure.axes[0].get_xticklabels()):
+        assert before.get_window_extent().x1 < after.get_window_extent().x0
+    assert not re.search(r"[-−]0\.?0*(?![.\d])", " ".join(texts(figure)))
+
+
+@pytest.mark.parametrize("name", sorted(plot.documentation_figures()))
+def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
+    figure = plot.documentation_figures()[name]()
+    assert figure.get_figwidth() == pytest.approx(3.5)
+    assert_clean(figure)
+    words = " ".join(texts(figure))
+    for label in (axes.get_ylabel() for axes in figure.axes):
+        if "orce" in label or "evel" in label:
+            assert "force on the floor" in words.lower() or "elastic force" in words.lower()
+
+
+@pytest.mark.parametrize("count", [1, 2, 8])
+def test_long_names_of_many_cases_stay_outside_of_the_axes(shell: thud.Impact, count: int) -> None:
+    impacts = {f"{LONG}_{i}": shell for i in range(count)}
+    heights = []
+    for draw in (plot.force_history, plot.levels):
+        figure = draw(impacts)
+        assert_clean(figure)
+        axes = figure.axes[0].get_window_extent()
+        heights.append(axes.height / figure.dpi)
+    # The legend does not squeeze the axes.
+    assert min(heights) > 1.8
+
+
+def test_no_two_of_many_curves_look_the_same() -> None:
+    looks = {
+        (line_style(i)["color"], str(line_style(i)["linestyle"]), marker_style(i)["marker"])
+        for i in range(4 * len(COLOURS))
+    }
+    assert len(looks) == 4 * len(COLOURS)
+
+
+def test_force_is_that_of_the_case_and_is_named(shell: thud.Impact) -> None:
+    for force, words in (("floor", "force on the floor"), ("elastic", "elastic force")):
+        one = {"ball": judging(shell, force)}
+        assert plot.force_history(one).axes[0].get_ylabel().startswith(words.capitalize())
+        (axes,) = plot.levels(one).axes
+        assert axes.get_ylabel().endswith(f"({words})")
+        curves = {str(line.get_label()): line.get_ydata() for line in axes.lines}
+        np.testing.assert_array_equal(curves["ball"], shell.levels(force=force))
+
+
+def test_legend_names_forces_that_differ(shell: thud.Impact) -> None:
+    both = {"a": judging(shell, "elastic"), "b": judging(shell, "floor")}
+    for draw in (plot.force_history, plot.levels):
+        figure = draw(both)
+        assert {"a, elastic force", "b, force on the floor"} <= set(texts(figure))
+        assert "(" not in figure.axes[0].get_ylabel()
+
+
+@pytest.mark.parametrize(("bands", "panels"), [("octave", 1), ("third", 2), ("both", 2)])
+def test_third_octaves_are_drawn_where_a_case_asks_for_them(
+    shell: thud.Impact, bands: str, panels: int
+) -> None:
+    case = replace(shell.case, levels=thud.Levels(bands=bands))
+    figure = plot.levels({"ball": replace(shell, case=case)})
+    assert_clean(figure)
+    labels = [axes.get_xlabel() for axes in figure.axes]
+    assert labels == ["Octave band, Hz", "One-third-octave band, Hz"][:panels]
+    # Tolerances are those of the octaves.
+    assert [len(axes.collections) for axes in figure.axes] == [5, 0][:panels]
+    if panels > 1:
+        (line,) = figure.axes[1].lines
+        np.testing.assert_array_equal(line.get_ydata(), shell.levels("third"))
+
+
+def limits(impact: thud.Impact | thud.Recording) -> tuple[float, float]:
+    low, high = plot.force_history({"ball": impact}).axes[0].get_xlim()  # type: ignore[dict-item]
+    return low, high
+
+
+def test_time_axis_is_that_of_the_contact_whatever_the_length_of_the_record() -> None:
+    short, long = (thud.solve(duration=duration) for duration in (0.025, 1.0))
+    contact = 1e3 * long.contact_time
+    assert limits(long) == limits(short)
+    assert limits(long)[0] == 0
+    assert contact < limits(long)[1] < 1.05 * contact
+    flying = thud.solve(
+        model="finite_element", radial_elements=2, polar_elements=16, flight_before=5e-3
+    )
+    low, high = limits(flying)
+    contact = 1e3 * flying.contact_time
+    assert -0.05 * contact < low < 0
+    assert 0.98 * contact < high < 1.05 * contact
+
+
+def test_recording_is_drawn_from_first_touch_to_last_release(shell: thud.Impact) -> None:
+    force = np.random.default_rng(1).normal(scale=0.5, size=44100)
+    contact = shell.floor_force[shell.floor_force > 0]
+    for start, part in ((11025, 1.0), (22050, 0.7)):
+        force[start : start + len(contact)] += part * contact
+    once = force.copy()
+    once[20000:] = 0
+    time = np.arange(44100) / 44100
+    low, high = limits(thud.Recording.from_arrays(np.column_stack([time, once])))
+    assert -1.5 < low < 0
+    assert 20 < high < 22
+    low, high = limits(thud.Recording.from_arrays(np.column_stack([time, force])))
+    assert -15 < low < 0
+    assert 250 + 20 < high < 290
+
+
+def test_arrows_have_a_key_and_end_above_the_floor() -> None:
+    impact = thud.solve(model="finite_element", flight_before=2e-3)
+    figure = plot.motion(impact)
+    arrows = [a for axes in figure.axes for a in axes.collections if isinstance(a, Quiver)]
+    assert len(arrows) == 9
+    for quiver in arrows:
+        start = np.asarray(quiver.get_offsets())
+        end = start[:, 1] + quiver.V / quiver.scale  # type: ignore[attr-defined]
+        assert (end >= 0).all()
+    assert len(arrows[0].get_offsets()) > 0
+    (key,) = (artist for artist in figure.findobj(QuiverKey) if isinstance(artist, QuiverKey))
+    assert key.text.get_text() == "4 m/s"
+
+
+@pytest.mark.parametrize("ending", ["svg", "png", "pdf"])
+def test_files_have_a_title(shell: thud.Impact, tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"rubber_ball.{ending}"
+    plot.save(plot.levels({"shell & <ball>": shell}), path)
+    if ending == "svg":
+        root = ET.fromstring(path.read_text())  # noqa: S314 - our own
+        title = root.find(f"{SVG}title")
+        assert title is not None
+        assert title.text == "Rubber ball"
+    elif ending == "png":
+        with Image.open(path) as picture:
+            assert picture.info["Title"] == "Rubber ball"
+    else:
+        assert b"/Title (Rubber ball)" in path.read_bytes()
+
+
+def test_text_of_vector_graphics_is_text(shell: thud.Impact, tmp_path: Path) -> None:
+    plot.save(plot.levels({"shell & <ball>": shell}), tmp_path / "levels.svg")
+    root = ET.fromstring((tmp_path / "levels.svg").read_text())  # noqa: S314 - our own
+    found = list(root.iter(f"{SVG}text"))
+    shown = {"".join(text.itertext()).strip() for text in found}
+    assert {"shell & <ball>", "Octave band, Hz", "31.5", "Tolerance, rubber ball"} <= shown
+    assert all("sans-serif" in text.attrib["style"] for text in found)

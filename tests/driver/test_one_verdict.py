@@ -1,0 +1,69 @@
+"""One file has one peak, one set of levels and one verdict, whatever command is asked."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import f90nml
+import numpy as np
+import pytest
+from conftest import INPUTS
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+WITH_IMPACT = [path for path in INPUTS if thud.read_case(path).model]
+# The batches of the shell model repeat the single solver to this part of the peak, and dB.
+BATCH = 1e-9
+
+
+@pytest.mark.parametrize("path", WITH_IMPACT, ids=lambda path: path.stem)
+def test_every_command_has_the_same_peak_levels_and_verdict(
+    path: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    case = thud.read_case(path)
+    impact = thud.solve_case(case)
+    levels, conformity = impact.levels(), impact.conformity()
+
+    assert cli.main(["run", "-q", "--no-figures", str(path)]) == 0
+    summary = f90nml.read(f"outputs/{case.name}/summary.nml")
+    peak = {"floor": "peak_force", "elastic": "peak_elastic_force"}[case.levels.force]
+    assert summary["summary"][peak] == impact.peak()
+    assert summary["verdict"]["value"][:5] == levels.tolist()
+    assert summary["verdict"]["conforms"] == conformity.conforms
+
+    capsys.readouterr()
+    assert cli.main(["compare", str(path)]) == 0
+    shown = {line[:20].strip(): line[20:].strip() for line in capsys.readouterr().out.splitlines()}
+    assert shown["peak force, N"] == f"{impact.peak():.1f}"
+    assert [shown[f"{f:g} Hz, dB"].split()[0] for f in thud.get_bands().nominal] == [
+        f"{level:.2f}" for level in levels
+    ]
+    assert shown["verdict"] == conformity.verdict
+
+    swept = thud.sweep(
+        {"case": str(path), "parameters": {"height": {"values": [case.drop.height]}}}
+    )
+    near = BATCH if isinstance(case.model, thud.HollowSphere) else 0.0
+    assert swept[peak].item() == pytest.approx(impact.peak(), rel=near, abs=0)
+    np.testing.assert_allclose(
+        swept[f"{case.levels.force}_level"].values.ravel(), levels, rtol=0, atol=1e3 * near
+    )
+    assert swept["conforms"].item() == conformity.conforms
+
+
+def test_fit_ends_with_the_impact_of_its_case() -> None:
+    case = thud.Case(ball=thud.Ball(youngs_modulus=1.5e6))
+    target = thud.LevelTarget(thud.solve().levels())
+    found = thud.fit(target, {"youngs_modulus": {"start": 1.5e6}}, case)
+    impact = thud.solve_case(found.case)
+    assert found.impact.peak() == impact.peak()
+    assert found.impact.levels().tolist() == impact.levels().tolist()
+    assert found.impact.conformity() == impact.conformity()

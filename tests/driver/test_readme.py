@@ -1,0 +1,46 @@
+"""The README shows what the program prints."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+
+README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```(\w*)\n(.*?)```", README, re.DOTALL)
+
+
+def shown_after(marker: str) -> str:
+    """Return the block of output that follows a block with some words, or the first with them."""
+    places = [i for i, (_, text) in enumerate(BLOCKS) if marker in text]
+    return BLOCKS[places[0]][1]
+
+
+def test_first_result_is_that_of_the_commands() -> None:
+    cases = re.search(r"^first=\((.*)\)$", (REPOSITORY / "bootstrap").read_text(), re.MULTILINE)
+    assert cases is not None
+    paths = [str(REPOSITORY / path) for path in cases[1].split()]
+    page = thud.compare(thud.read_all(paths))
+    shown = [line.split() for line in shown_after("rubber_ball_100cm").splitlines()]
+    expected = [[word for cell in row for word in cell.split()] for row in page.table()]
+    timed = [line for line in shown if line[:2] != ["computed", "in,"]][: len(expected) - 1]
+    assert timed == [line for line in expected if line[:2] != ["computed", "in,"]]
+
+
+def test_python_example_prints_what_is_shown() -> None:
+    (code,) = (text for kind, text in BLOCKS if kind == "python")
+    place = [text for _, text in BLOCKS].index(code)
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own
+    assert printed.getvalue() == BLOCKS[place + 1][1]
+
+
+def test_commands_exist() -> None:
+    for command in re.findall(r"thud-driver (\w+)", README):
+        assert command in cli.COMMANDS
