@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from tqdm import tqdm
 
-from thud._api import call, collect, ensemble_api, text
+from thud._api import call, call_through, collect, ensemble_api, text
 from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import (
@@ -270,7 +270,8 @@ def _compute(  # noqa: PLR0913 - those of the library
     count = len(numbers)
     # f2py knows no empty arrays: one set stands in for none.
     given = numbers if count else np.zeros((1, numbers.shape[1]))
-    status, outcome, level, conforms, margin, verdict, force, *left = ensemble_api.drop_many(
+    status, outcome, level, conforms, margin, verdict, force, *left = call_through(
+        ensemble_api.drop_many,
         content,
         _joined(columns),
         given.T,

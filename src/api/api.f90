@@ -16,11 +16,12 @@ module thud_api
    use thud_kinds, only: int64, int8, wp
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: load_case, outcome_type, run_case
+   use thud_system, only: begin_call, end_call, end_all_calls => end_calls
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_text, collect, describe_library, effective_case, free_modes, loss_factors, run, solve
+   public :: check_text, collect, describe_library, effective_case, end_calls, free_modes, loss_factors, run, solve
 
 contains
 
@@ -42,6 +43,12 @@ contains
       call bundle%copy_values(values)
       deallocate (bundle)
    end subroutine collect
+
+   !> Ends the calls that are running in other threads, as an interrupt does.
+   subroutine end_calls()
+
+      call end_all_calls()
+   end subroutine end_calls
 
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
@@ -109,9 +116,11 @@ contains
       type(error_type), allocatable :: error
 
       allocate (bundle)
+      call begin_call()
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (.not. allocated(error)) call add_history(bundle, results%history)
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine solve
 
@@ -171,10 +180,12 @@ contains
       type(error_type), allocatable :: error
 
       allocate (bundle)
+      call begin_call()
       call read_case(text, 'python', case, error)
       case%has_impact = .false.
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (.not. allocated(error)) call add_modes(bundle, results%modes)
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine free_modes
 
@@ -240,6 +251,7 @@ contains
       integer :: i
 
       allocate (bundle)
+      call begin_call()
       if (progress == 1) call begin_progress()
       call run_case(path, output, case, results, outcome, error)
       call end_progress()
@@ -255,6 +267,7 @@ contains
          if (case%has_impact) call add_history(bundle, results%history)
          if (case%has_modes) call add_modes(bundle, results%modes)
       end if
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine run
 

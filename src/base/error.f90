@@ -12,12 +12,12 @@ module thud_error
    !> The computation broke down; also the exit code of the executable.
    integer, parameter :: numerical_failure = 2
 
-   !> The user has interrupted the work; also the exit code of the executable.
-   integer, parameter :: interrupted = 130
+   !> A signal has interrupted the work: with its number, the code and the exit code of the executable.
+   integer, parameter :: interrupted = 128
 
    !> An error, in one sentence for the user.
    type :: error_type
-      !> `bad_input`, `numerical_failure` or `interrupted`.
+      !> `bad_input`, `numerical_failure`, or `interrupted` plus the number of the signal.
       integer :: code = numerical_failure
       !> One sentence that names the place, the value and what is allowed.
       character(len=:), allocatable :: message

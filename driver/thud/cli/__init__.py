@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from typing import TYPE_CHECKING
 
@@ -19,7 +20,10 @@ from thud.levels import SOURCES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-INTERRUPTED = 130
+    from _typeshed import SupportsWrite
+
+# Exit code after an interrupt: this, plus the number of the signal.
+INTERRUPTED = 128
 
 COMMANDS = {
     "run": Command(
@@ -74,21 +78,22 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with arguments, by default those of this process; return the exit code."""
+    kept = Command._field_defaults["kept"]
     try:
-        options = _parser().parse_args(arguments)
-    except SystemExit as stop:
-        # argparse exits with 2 for bad usage, which is a numerical failure here.
-        return InputError.exit_code if stop.code else 0
-    command = COMMANDS[options.name]
-    try:
-        if options.output is not None and not options.output.strip():
-            message = "--output has no value; allowed: a directory"
-            raise InputError(message)
-        code = command.function(options)
+        options = _parse(arguments)
+        if isinstance(options, int):
+            code = options
+        else:
+            command = COMMANDS[options.name]
+            kept = command.kept
+            if options.output is not None and not options.output.strip():
+                message = "--output has no value; allowed: a directory"
+                raise InputError(message)
+            code = command.function(options)
         sys.stdout.flush()
-    except KeyboardInterrupt:
-        print(f"thud-driver: interrupted; {command.kept}", file=sys.stderr)
-        return INTERRUPTED
+    except KeyboardInterrupt as interrupt:
+        print(f"thud-driver: interrupted; {kept}", file=sys.stderr)
+        return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
             # Standard output is full or closed: discard what is still buffered.
@@ -98,13 +103,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
+    """Return the options, or an exit code where argparse has shown its text."""
+    try:
+        return _parser().parse_args(arguments)
+    except SystemExit as stop:
+        # argparse exits with 2 for bad usage, which is a numerical failure here.
+        return InputError.exit_code if stop.code else 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser that does not swallow the error of a full or closed output."""
+
+    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
+        print(message, end="", file=file or sys.stderr)
+
+
 def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="thud-driver",
         description="Cases with figures, studies, and the figures of the paper.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
-        "3 not conforming (run --check), 130 interrupted.",
+        "3 not conforming (run --check), 130 interrupted, 143 terminated.",
     )
     parser.add_argument("--version", action="version", version=f"thud {version()}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="name")

@@ -2,6 +2,6 @@
 
 import sys
 
-from thud.cli import main
+from thud_driver import main
 
 sys.exit(main())
