@@ -147,8 +147,23 @@ def test_figure_that_cannot_be_replaced_is_named(
     assert "outputs/case/force.png: Is a directory; allowed: " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["swep", "study.toml"], "sweep"),
+        (["run", "case.nml", "--chekc"], "--check"),
+        (["sweep", "study.toml", "--backend", "thread"], "threads"),
+    ],
+)
+def test_misspelt_commands_and_options_are_told(
+    arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(arguments) == 1
+    assert f"(did you mean '{meant}'?)" in capsys.readouterr().err
+
+
 def test_full_screen_is_an_error_without_a_traceback(case_file: CaseFile, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "thud.cli", "run", "--no-figures", str(case_file(MINIMAL))]
+    command = [sys.executable, "-m", "thud", "run", "--no-figures", str(case_file(MINIMAL))]
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
             command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False

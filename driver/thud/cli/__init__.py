@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from thud._api import version
+from thud.checks import suggestion
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.run import run_cases
@@ -98,9 +100,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        """Report bad usage; name the word that was probably meant."""
+        found = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
+        super().error(message + (suggestion(found[1], _words()) if found else ""))
+
+
+def _words() -> list[str]:
+    """Return commands, their options, and the choices of these."""
+    given = [one for command in COMMANDS.values() for one in command.arguments]
+    options = [name for names, _ in given for name in names if name.startswith("--")]
+    return [*COMMANDS, *options, *(word for _, more in given for word in more.get("choices", ()))]
+
+
 def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="thud-driver",
         description="Cases with figures, studies, and the figures of the paper.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
