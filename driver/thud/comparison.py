@@ -8,13 +8,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from tqdm import tqdm
 
 from thud.case import Case, read_case
 from thud.checks import refuse, refuse_value, require_kind
+from thud.display import Displayed
 from thud.errors import InputError, PlausibilityWarning, ThudError
 from thud.files import replace_file
 from thud.impact import Impact, compute
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud.levels import Criterion
+    from thud._schema import LevelsForce, LimitsSource
+    from thud.criteria import Criterion
 
 # Criteria after the octaves: name and unit, size of the unit, decimals.
 _ROWS = (
@@ -41,8 +43,8 @@ _ROWS = (
 )
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Displayed):
     """Impacts of the same drop, side by side.
 
     Attributes
@@ -59,14 +61,22 @@ class Comparison:
 
     impacts: dict[str, Impact | Recording]
     run_times: dict[str, float]
-    force: str | None = None
-    source: str = "rubber_ball"
+    force: LevelsForce | None = None
+    source: LimitsSource = "rubber_ball"
 
     @property
     def remarks(self) -> list[str]:
         """What is possible but not plausible, with the names of the impacts."""
         solved = {n: i for n, i in self.impacts.items() if isinstance(i, Impact)}
         return [f"{name}: {remark}" for name, i in solved.items() for remark in i.remarks]
+
+    def __repr__(self) -> str:
+        """Return the names of what is compared."""
+        return f"<Comparison: {', '.join(self.impacts)}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return self.table()
 
     def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, peaks, times, verdicts.
@@ -134,10 +144,27 @@ def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
     return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
 
 
+# mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
+@overload
+def compare(
+    impacts: Mapping[str, Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
+@overload
+def compare(
+    impacts: Iterable[Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
 def compare(
     impacts: Mapping[str, Case | Impact | Recording] | Iterable[Case | Impact | Recording],
-    force: str | None = None,
-    source: str | None = None,
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
     *,
     progress: bool = False,
 ) -> Comparison:
@@ -199,7 +226,8 @@ def compare(
             f"&limits: source differs ({', '.join(sorted(sources))})",
             "cases with one source, or the choice of one",
         )
-    found = Comparison(solved, run_times, force, source or next(iter(sources), SOURCES[0]))
+    limits = next(iter(sources), SOURCES[0]) if source is None else source
+    found = Comparison(solved, run_times, force, limits)
     for remark in found.remarks:
         warnings.warn(remark, PlausibilityWarning, stacklevel=2)
     return found

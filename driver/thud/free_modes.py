@@ -11,7 +11,9 @@ from thud._api import api, call
 from thud._schema import Ball, FiniteElement, Modes
 from thud.case import Case, case_text
 from thud.checks import require_kind
+from thud.display import Displayed
 from thud.errors import InputError
+from thud.key import check_keywords
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class FreeModes:
+class FreeModes(Displayed):
     """Axisymmetric elastic modes without twist, in ascending order, without the rigid motion.
 
     Nodes run from the lowest point to the highest and from the inner surface to the outer one;
@@ -53,7 +55,18 @@ class FreeModes:
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
 
+    def __repr__(self) -> str:
+        """Return the frequencies, without the shapes."""
+        return f"<FreeModes: {', '.join(f'{f:.2f}' for f in self.frequency)} Hz>"
 
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        columns = zip(self.frequency, self.harmonic, self.participation, strict=True)
+        rows = [(f"{f:.2f}", f"{harmonic}", f"{part:.3f}") for f, harmonic, part in columns]
+        return [("frequency, Hz", "harmonic", "participation"), *rows]
+
+
+@check_keywords
 def free_modes(
     ball: Ball | None = None,
     count: int = Modes.count,

@@ -13,7 +13,8 @@ import numpy as np
 from thud._schema import SCALARS
 from thud.case import Case
 from thud.errors import InputError
-from thud.impact import Impact, Motion
+from thud.impact import Impact
+from thud.motion import Motion
 
 if TYPE_CHECKING:
     import os

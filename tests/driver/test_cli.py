@@ -148,6 +148,21 @@ def test_figure_that_cannot_be_replaced_is_named(
     assert "outputs/case/force.png: Is a directory; allowed: " in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["swep", "study.toml"], "sweep"),
+        (["run", "case.nml", "--chekc"], "--check"),
+        (["sweep", "study.toml", "--backend", "thread"], "threads"),
+    ],
+)
+def test_misspelt_commands_and_options_are_told(
+    arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(arguments) == 1
+    assert f"(did you mean '{meant}'?)" in capsys.readouterr().err
+
+
 # All of them write to standard output; runs of two cases are told once.
 SPEAKING = (
     "--help",
@@ -167,7 +182,7 @@ def test_screen_that_takes_nothing_is_told_in_one_sentence(
 ) -> None:
     case_file(MINIMAL)
     case_file(MINIMAL, "other.nml")
-    command = f"{{ {sys.executable} -m thud.cli {arguments} 2> errors; echo $? > code; }} {screen}"
+    command = f"{{ {sys.executable} -m thud {arguments} 2> errors; echo $? > code; }} {screen}"
     subprocess.run(
         ["/bin/sh", "-c", command],
         cwd=tmp_path,
@@ -188,7 +203,7 @@ def test_errors_that_nobody_can_read_change_no_exit_code(
     case_file(MINIMAL)
     case_file("&ball", "bad.nml")
     for name, code in (("case", 0), ("bad", 1)):
-        command = f"{sys.executable} -m thud.cli run --no-figures {name}.nml 2{screen}"
+        command = f"{sys.executable} -m thud run --no-figures {name}.nml 2{screen}"
         done = subprocess.run(
             ["/bin/sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=False
         )

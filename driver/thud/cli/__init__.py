@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import signal
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from thud._api import version
+from thud.checks import suggestion
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.run import run_cases
@@ -113,10 +115,21 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that does not swallow the error of a full or closed output."""
+    """Parser that names the word that was probably meant, and tells of a full or closed output."""
+
+    def error(self, message: str) -> NoReturn:
+        found = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
+        super().error(message + (suggestion(found[1], _words()) if found else ""))
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         print(message, end="", file=file or sys.stderr)
+
+
+def _words() -> list[str]:
+    """Return commands, their options, and the choices of these."""
+    given = [one for command in COMMANDS.values() for one in command.arguments]
+    options = [name for names, _ in given for name in names if name.startswith("--")]
+    return [*COMMANDS, *options, *(word for _, more in given for word in more.get("choices", ()))]
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from thud._schema import ModalBall
+from thud._schema import LevelsForce, ModalBall
 from thud.impact import Impact, solve
 from thud.plot.look import (
     SIZE,
@@ -21,7 +21,7 @@ from thud.plot.look import (
 
 
 def level_changes(
-    reference: Impact, impacts: Mapping[str, Impact], force: str | None = None
+    reference: Impact, impacts: Mapping[str, Impact], force: LevelsForce | None = None
 ) -> Figure:
     """Draw how octave levels change against a reference.
 

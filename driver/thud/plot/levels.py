@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thud._schema import Levels
+from thud._schema import BandSet, Levels, LevelsForce, LevelsMethod, LimitsSource
 from thud.impact import Impact, solve
 from thud.levels import octave_limits
 from thud.plot.examples import solve_published
@@ -30,9 +30,9 @@ from thud.plot.look import (
 
 def levels(
     impacts: Mapping[str, Impact],
-    force: str | None = None,
-    source: str = "rubber_ball",
-    method: str | None = None,
+    force: LevelsForce | None = None,
+    source: LimitsSource = "rubber_ball",
+    method: LevelsMethod | None = None,
 ) -> Figure:
     """Draw octave levels over the tolerance band of the standards (paper, figure 3).
 
@@ -56,7 +56,7 @@ def levels(
     """
     curves = list(iterate_curves(impacts, force))
     asked = {impact.case.levels.bands for _, impact, _ in curves}
-    bands = ["octave"] if asked == {"octave"} else ["octave", "third"]
+    bands: list[BandSet] = ["octave"] if asked == {"octave"} else ["octave", "third"]
     figure = new_figure(0.4 + 2.5 * len(bands))
     panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
     draw_levels(panels, impacts, force, source, method)
@@ -67,11 +67,11 @@ def levels(
 
 
 def draw_levels(
-    panels: Mapping[str, Axes],
+    panels: Mapping[BandSet, Axes],
     impacts: Mapping[str, Curve],
-    force: str | None,
-    source: str,
-    method: str | None = None,
+    force: LevelsForce | None,
+    source: LimitsSource,
+    method: LevelsMethod | None = None,
 ) -> None:
     """Draw levels in the axes of their bands; those of the octaves have the tolerance band."""
     draw_tolerance(panels["octave"], source)
@@ -86,7 +86,7 @@ def draw_levels(
         octave_axis(axes, bands)
 
 
-def draw_tolerance(axes: Axes, source: str) -> None:
+def draw_tolerance(axes: Axes, source: LimitsSource) -> None:
     """Draw the range of each octave as a grey box with its nominal value."""
     lower, upper = octave_limits(source)
     octave_boxes(axes, lower, upper, f"Tolerance, {source.replace('_', ' ')}")

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.files import replace_file
-from thud.impact import Impact, Motion
+from thud.impact import Impact
+from thud.motion import Motion
 from thud.plot.examples import solve_published
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure

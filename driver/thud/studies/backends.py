@@ -24,6 +24,7 @@ from thud._api import api
 from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
 from thud.ensemble import MAX_THREADS
 from thud.errors import NumericalError, ThudError
+from thud.extras import require_extra
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:
@@ -171,12 +172,10 @@ def _no_interrupt_in_processes() -> Iterator[None]:
 
 @contextmanager
 def _dask(address: str) -> Iterator[tuple[Executor, int]]:
-    try:
+    with require_extra("dask"):
         from distributed import Client  # noqa: PLC0415 - an optional package
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
         from distributed.comm.registry import get_backend  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        refuse(f"{error.name} is not installed", "pip install '.[studies,dask]'", error)
     try:
         # A client of an unknown kind of address would fail again when deleted.
         get_backend(parse_address(address)[0])

@@ -17,6 +17,8 @@ from thud.studies.fitting.misfit import Misfit, require_positive
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from thud._schema import LevelsForce
+
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 BELOW = 1250.0
 # Part of that frequency that rounded times leave open.
@@ -59,7 +61,7 @@ class ForceTarget:
 
     record: Recording | Impact | tuple[ArrayLike, ArrayLike]
     noise: float | None = None
-    force: str = "floor"
+    force: LevelsForce = "floor"
     time_shift: bool | None = None
     below: float = BELOW
     window: tuple[float, float] | None = None
@@ -134,7 +136,7 @@ class ForceMisfit(Misfit):
         force: NDArray[np.float64],
         sample_rate: float,
         noise: float | None,
-        kind: str,
+        kind: LevelsForce,
         below: float,
         *,
         free_shift: bool,

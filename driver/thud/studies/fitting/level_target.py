@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet, LevelsForce
     from thud.impact import Impact
 
 
@@ -43,11 +44,11 @@ class LevelTarget:
 
     levels: Sequence[float]
     uncertainty: float | Sequence[float] | None = None
-    bands: str = "octave"
+    bands: BandSet = "octave"
     frequencies: Sequence[float] | None = None
     contact_time: tuple[float, float] | None = None
     restitution: tuple[float, float] | None = None
-    force: str = "floor"
+    force: LevelsForce = "floor"
 
     def misfit(self) -> LevelMisfit:
         """Return what the fit needs of the target."""

@@ -1,4 +1,4 @@
-"""``python -m thud.cli``."""
+"""``python -m thud``."""
 
 import sys
 
