@@ -33,7 +33,13 @@ def main() -> int:
     interrupt = _Interrupt()
     sys.unraisablehook = interrupt.retry
     _handle(interrupt)
-    code = run()
+    try:
+        code = run()
+    except Exception:
+        # Compiled modules, such as those that draw, turn an interrupt into an error of their own.
+        if not interrupt.number:
+            raise
+        code = _say(interrupt.number)
     _handle(signal.SIG_IGN)
     return code
 
@@ -46,9 +52,14 @@ def _handle(handler: Any) -> None:  # noqa: ANN401 - as `signal.signal` takes it
 
 
 def _end(number: int, _: FrameType | None) -> None:
+    os._exit(_say(number))
+
+
+def _say(number: int) -> int:
+    """Say that the process was interrupted; return the exit code."""
     with suppress(OSError):
         os.write(2, b"thud-driver: interrupted; finished results are kept\n")
-    os._exit(128 + number)
+    return 128 + number
 
 
 class _Interrupt:
@@ -56,15 +67,15 @@ class _Interrupt:
 
     def __init__(self) -> None:
         self.first = 0.0
+        self.number = 0
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         if not self.first:
             self.first = time.monotonic()
+            self.number = number
+            self.attempt(number, frame)
         elif time.monotonic() > self.first + _COPIES:
-            os._exit(128 + number)
-        else:
-            return
-        self.attempt(number, frame)
+            _end(number, frame)
 
     def attempt(self, number: int, frame: FrameType | None) -> None:
         """Raise it, but not during an import: modules lose or print what they do not expect."""

@@ -181,6 +181,25 @@ sys.exit(thud_driver.main())
         assert ended(process, signal.SIGINT) == KEPT
 
 
+def test_interrupt_that_a_compiled_module_makes_an_error_of_is_one_sentence() -> None:
+    code = """
+import signal, sys, thud_driver
+from thud import cli
+
+def draw(*_):
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise TypeError("incompatible function arguments")
+
+cli.main = lambda: draw()
+sys.exit(thud_driver.main())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == KEPT
+    assert done.returncode == 130
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_cases_keep_those_that_are_done(number: int, tmp_path: Path) -> None:
     (tmp_path / "short.nml").write_text(MINIMAL)
