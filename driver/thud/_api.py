@@ -26,6 +26,8 @@ ensemble_api = _core.thud_ensemble_api
 
 # The status of an interrupt is this plus the number of the signal.
 _INTERRUPTED = 128
+# Place of the status among the results of procedures that leave a bundle.
+_OF_BUNDLE = -4
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
@@ -39,7 +41,7 @@ def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
 
 
 def call_through(
-    routine: Callable[..., tuple[Any, ...]], *arguments: object, status: int = -4
+    routine: Callable[..., tuple[Any, ...]], *arguments: object, status: int = _OF_BUNDLE
 ) -> tuple[Any, ...]:
     """Call a procedure whose status is the result of that number; return all results.
 
@@ -48,6 +50,8 @@ def call_through(
     KeyboardInterrupt.
     """
     while (results := routine(*arguments))[status] > _INTERRUPTED:
+        if status == _OF_BUNDLE:
+            api.collect(*results[-3:])
         if threading.current_thread() is not threading.main_thread():
             raise KeyboardInterrupt
     return results

@@ -111,8 +111,13 @@ def shown(value: object) -> str:
     return text if fits else f"an object of {type(value).__name__}"
 
 
-def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise InputError where a word is not known; of a former word, name the new one."""
+def require_words(
+    place: str, given: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
+) -> None:
+    """Raise InputError where a word is not known; of a former word, name the new one.
+
+    What was meant may be one of other words, too.
+    """
     allowed = list(known)
     for word in given:
         if word not in allowed:
@@ -120,4 +125,4 @@ def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> Non
             listed = ", ".join(allowed)
             if new in allowed:
                 refuse(f"{place}: {word!r} is now {new!r}", listed)
-            refuse(f"{place}: {word!r} is not known{suggestion(word, allowed)}", listed)
+            refuse(f"{place}: {word!r} is not known{suggestion(word, [*allowed, *also])}", listed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
@@ -19,15 +20,14 @@ from thud.display import Displayed
 from thud.errors import InputError, PlausibilityWarning, ThudError
 from thud.files import replace_file
 from thud.impact import Impact, compute
-from thud.levels import SOURCES, get_bands
+from thud.levels import get_bands
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
+from thud.plot.levels import common_source
 from thud.plot.look import save_all
 from thud.recording import Recording
 
 if TYPE_CHECKING:
-    import os
-
     from matplotlib.figure import Figure
 
     from thud._schema import LevelsForce, LimitsSource
@@ -88,7 +88,7 @@ class Comparison(Displayed):
         octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *map(self._force_of, impacts), ""),
+            ("force", *(impact.judged(self.force) for impact in impacts), ""),
             ("levels", *(impact.level_method for impact in impacts), ""),
         ]
         together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
@@ -106,11 +106,6 @@ class Comparison(Displayed):
             times = (self.run_times.get(name) for name in self.impacts)
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
         return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
-
-    def _force_of(self, impact: Impact | Recording) -> str:
-        """Return the force of an impact that is compared; a recording has only one."""
-        chosen = self.force if isinstance(impact, Impact) else None
-        return chosen or impact.judged_force
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -220,14 +215,7 @@ def compare(
         listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
         message = f"&drop: height or gravity differs ({listed}); allowed: cases of the same drop"
         raise InputError(message)
-    sources = {i.case.limits.source for i in solved.values() if isinstance(i, Impact)}
-    if source is None and len(sources) > 1:
-        refuse(
-            f"&limits: source differs ({', '.join(sorted(sources))})",
-            "cases with one source, or the choice of one",
-        )
-    limits = next(iter(sources), SOURCES[0]) if source is None else source
-    found = Comparison(solved, run_times, force, limits)
+    found = Comparison(solved, run_times, force, common_source(solved, source))
     for remark in found.remarks:
         warnings.warn(remark, PlausibilityWarning, stacklevel=2)
     return found
@@ -235,18 +223,19 @@ def compare(
 
 def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
     """Return what is compared by name, checked."""
-    allowed = "one or more cases, impacts or recordings, by name or in a list"
+    allowed = "one or more cases, impacts or recordings, by name or in a list (files: read_all)"
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:
         row = [impacts] if isinstance(impacts, Case | Impact | Recording) else impacts
-        if not isinstance(row, Iterable):
+        if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
             refuse_value("impacts", row, allowed)
         pairs = [(_name(given), given) for given in row]
     if not pairs:
         refuse("impacts is empty", allowed)
     named: dict[str, Case | Impact | Recording] = {}
     for name, given in pairs:
+        require_kind("name", name, str)
         require_kind(name, given, Case | Impact | Recording)
         # Cases from Python often share their name.
         names = chain([name], (f"{name} ({n})" for n in count(2)))

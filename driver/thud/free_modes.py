@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import api, call, text
 from thud._schema import Ball, FiniteElement, Modes
 from thud.case import Case, case_text
 from thud.checks import require_kind
 from thud.display import Displayed
-from thud.errors import InputError
+from thud.errors import InputError, PlausibilityWarning
 from thud.key import check_keywords
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ class FreeModes(Displayed):
         Nodes relative to the centre of the ball, m; nine per element.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of maximum length 1, the lowest point moving upwards.
+    remarks : tuple of str
+        As `Impact.remarks`.
     """
 
     ball: Ball
@@ -54,6 +57,7 @@ class FreeModes(Displayed):
     rigid_frequency: float
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         """Return the frequencies, without the shapes."""
@@ -96,13 +100,21 @@ def free_modes(
         Names group, key, value and allowed range.
     NumericalError
         Where the modes cannot be computed.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `FreeModes.remarks`.
     """
     case = Case(
         ball=Ball() if ball is None else ball,
         model=None,
         modes=Modes(count, radial_elements, polar_elements),
     )
-    return new_modes(case.ball, call(api.free_modes, case_text(case)))
+    modes = new_modes(case.ball, call(api.free_modes, case_text(case)))
+    for remark in modes.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    return modes
 
 
 def new_modes(ball: Ball, found: Bundle) -> FreeModes:
@@ -116,6 +128,7 @@ def new_modes(ball: Ball, found: Bundle) -> FreeModes:
         modes["rigid_frequency"],
         np.stack((modes["r"], modes["z"]), axis=-1),
         np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
+        tuple(map(text, found.get("remarks", {}).values())),
     )
 
 

@@ -151,26 +151,22 @@ class Impact(Displayed):
 
         By default that which the case judges.
         """
-        return self.elastic_force if self._is_elastic(kind) else self.floor_force
+        return self.elastic_force if self.judged(kind) == "elastic" else self.floor_force
 
     def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, N; see `force` and `peak_force`."""
-        return self.peak_elastic_force if self._is_elastic(force) else self.peak_force
+        return self.peak_elastic_force if self.judged(force) == "elastic" else self.peak_force
 
-    @property
-    def judged_force(self) -> LevelsForce:
-        """Force that the case judges, ``"floor"`` or ``"elastic"``."""
-        return self.case.levels.force
+    def judged(self, force: LevelsForce | None = None) -> LevelsForce:
+        """Return a force, checked, or without it that which the case judges."""
+        chosen = force or self.case.levels.force
+        require_choice("force", chosen, FORCES)
+        return chosen
 
     @property
     def level_method(self) -> LevelsMethod:
         """Method of the levels, ``"exact"`` or ``"fft"``."""
         return self.case.levels.method
-
-    def _is_elastic(self, kind: LevelsForce | None) -> bool:
-        chosen = kind or self.judged_force
-        require_choice("force", chosen, FORCES)
-        return chosen == "elastic"
 
     def levels(
         self,

@@ -74,8 +74,13 @@ def require_keywords(place: str, given: Collection[str], known: Collection[str])
     for word in given:
         owners = [one.__name__ for one in Group.__subclasses__() if word in _names(one)]
         if word not in known and owners:
-            refuse(f"{place}: {word!r} is a key of {' and '.join(owners)}", ", ".join(known))
-    require_words(place, given, known)
+            refuse(
+                f"{place}: {word!r} is a key of {' and '.join(owners)}",
+                " or ".join(f"{one}({word}=...)" for one in owners),
+            )
+    groups = Group.__subclasses__()
+    also = [word for one in groups for word in (one.__name__.lower(), *_names(one))]
+    require_words(place, given, known, also)
 
 
 def check_keywords(function: Callable[P, R]) -> Callable[P, R]:

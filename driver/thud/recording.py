@@ -128,9 +128,8 @@ class Recording(Displayed):
         """Not known from one impact: NaN."""
         return float("nan")
 
-    @property
-    def judged_force(self) -> LevelsForce:
-        """Force that a force plate measures: ``"floor"``."""
+    def judged(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+        """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
     @property

@@ -82,6 +82,7 @@ class _Interrupt:
         while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
             frame = frame.f_back
         if not frame:
+            signal.signal(number, self)
             raise KeyboardInterrupt(number)
         if time.monotonic() > self.first + _PATIENCE:
             _end(number, frame)

@@ -119,10 +119,24 @@ contains
       call begin_call()
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
-      if (.not. allocated(error)) call add_history(bundle, results%history)
+      if (.not. allocated(error)) call add_results(bundle, case, results)
       call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine solve
+
+   !> Adds what a case has computed to a bundle.
+   subroutine add_results(bundle, case, results)
+      type(bundle_type), intent(inout) :: bundle
+      type(case_type), intent(in) :: case
+      type(results_type), intent(in) :: results
+      integer :: i
+
+      if (case%has_impact) call add_history(bundle, results%history)
+      if (case%has_modes) call add_modes(bundle, results%modes)
+      do i = 1, size(results%remark)
+         call bundle%add_text('remarks.'//to_text(i), trim(results%remark(i)))
+      end do
+   end subroutine add_results
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, history)
@@ -146,9 +160,6 @@ contains
       call bundle%add_array('samples.floor_force', n, history%floor_force)
       do i = 1, size(history%part_name)
          call bundle%add_array('parts.'//history%part_name(i), n, history%part(:, i))
-      end do
-      do i = 1, size(history%remark)
-         call bundle%add_text('remarks.'//to_text(i), trim(history%remark(i)))
       end do
       if (allocated(history%channel)) then
          do i = 1, size(history%channel_name)
@@ -184,7 +195,7 @@ contains
       call read_case(text, 'python', case, error)
       case%has_impact = .false.
       if (.not. allocated(error)) call compute_case(case, results, error)
-      if (.not. allocated(error)) call add_modes(bundle, results%modes)
+      if (.not. allocated(error)) call add_results(bundle, case, results)
       call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine free_modes
@@ -264,8 +275,7 @@ contains
             call bundle%add_text('run_remarks.'//to_text(i), outcome%remarks(i)%text)
          end do
          call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
-         if (case%has_impact) call add_history(bundle, results%history)
-         if (case%has_modes) call add_modes(bundle, results%modes)
+         call add_results(bundle, case, results)
       end if
       call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)

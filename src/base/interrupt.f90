@@ -1,7 +1,7 @@
 !> Interrupts of long work: whoever handles signals notes them here, long loops ask.
 module thud_interrupt
    use, intrinsic :: iso_c_binding, only: c_int
-   use thud_error, only: error_type, interrupted
+   use thud_error, only: error_type, signal_base
    implicit none (type, external)
    private
 
@@ -25,7 +25,7 @@ contains
       !> What went wrong before, or the interrupt.
       type(error_type), allocatable, intent(inout) :: error
 
-      if (is_interrupted() .and. .not. allocated(error)) error = error_type(interrupted + latest_signal, &
+      if (is_interrupted() .and. .not. allocated(error)) error = error_type(signal_base + latest_signal, &
          'interrupted; nothing was written')
    end subroutine check_interrupt
 

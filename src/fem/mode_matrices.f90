@@ -162,14 +162,14 @@ contains
       end do
    end subroutine assemble
 
-   !> Cholesky factor of a banded matrix. Wide bands take LAPACK minutes without a pause: they are factored by its
-   !> algorithm, block after block.
+   !> Cholesky factor of a banded matrix. Wide bands take LAPACK minutes without a pause: they are factored by the
+   !> algorithm of its dpbtrf, block after block.
    subroutine factorise(n, n_band, a, info)
       !> Numbers of unknowns and of diagonals below the main one.
       integer, intent(in) :: n, n_band
       !> The matrix, then the factor, lower band: [n_band + 1, n].
       real(wp), intent(inout) :: a(n_band + 1, n)
-      !> 0, or the number of the leading minor that is not positive; not meant after an interrupt.
+      !> 0, or not where the matrix is not positive definite; not meant after an interrupt.
       integer, intent(out) :: info
       integer, parameter :: block = 32
       ! The part of a block that is cut off by the band, a triangle.
@@ -177,6 +177,7 @@ contains
       integer :: i, j, width, inside, cut
 
       info = 0
+      if (is_interrupted()) return
       if (n_band <= 2*block) call dpbtrf('L', n, n_band, a, n_band + 1, info)
       if (n_band <= 2*block) return
       corner = 0.0_wp

@@ -1,6 +1,6 @@
 !> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
-!> commas or blanks separate the values, which may stand in quotes; decimal commas are allowed but with commas
-!> between unquoted values; empty lines and what follows a `#` are skipped.
+!> commas or blanks separate the values, which may stand in quotes; decimal commas are allowed where commas do not
+!> separate; empty lines and what follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error

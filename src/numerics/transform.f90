@@ -3,7 +3,6 @@
 !> To make a plan takes longer than to transform a record of a contact, so plans are kept by length.
 module thud_transform
    use, intrinsic :: iso_c_binding
-   use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    implicit none (type)
    private
@@ -126,7 +125,7 @@ contains
       !> Plans from `transform_padded`, given back.
       type(plans_type), intent(inout) :: plans
 
-      if (.not. is_interrupted()) call fftw_execute_dft_c2r(plans%back, spectrum, signal)
+      call fftw_execute_dft_c2r(plans%back, spectrum, signal)
       call give_back(plans)
    end subroutine transform_back
 

@@ -7,7 +7,6 @@
 #include <limits.h>
 #include <pthread.h>
 #include <signal.h>
-#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -62,20 +61,27 @@ void thud_prepare_process(void)
 
 // Handlers of the process that `note` calls first, and the library's calls that are running.
 static struct sigaction handlers[2];
-static atomic_int running = 0;
+static volatile sig_atomic_t running = 0;
+static pthread_mutex_t calls = PTHREAD_MUTEX_INITIALIZER;
 
 static void note(int number, siginfo_t *information, void *context)
 {
+   static volatile sig_atomic_t nested = 0;
    const struct sigaction *handler = &handlers[number == SIGTERM];
 
+   if (running) thud_latest_signal = number;
+   // Another library may have saved this handler and call it from its own.
+   if (nested) return;
+   nested = 1;
    if (handler->sa_flags & SA_SIGINFO) handler->sa_sigaction(number, information, context);
    else handler->sa_handler(number);
-   thud_latest_signal = number;
+   nested = 0;
 }
 
 // A forked process has none of the threads that were at work.
 static void forget(void)
 {
+   pthread_mutex_init(&calls, NULL);
    running = 0;
    thud_latest_signal = 0;
 }
@@ -92,7 +98,8 @@ void thud_begin_call(void)
    struct sigaction action;
 
    pthread_once(&once, forget_in_children);
-   if (atomic_fetch_add(&running, 1) == 0) thud_latest_signal = 0;
+   pthread_mutex_lock(&calls);
+   running++;
    for (int i = 0; i < 2; i++) {
       if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == note
           || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
@@ -101,6 +108,7 @@ void thud_begin_call(void)
       action.sa_flags |= SA_SIGINFO;
       sigaction(ending_signals[i], &action, NULL);
    }
+   pthread_mutex_unlock(&calls);
 }
 
 // Ends the running calls.
@@ -112,7 +120,9 @@ void thud_end_calls(void)
 // A call has ended.
 void thud_end_call(void)
 {
-   atomic_fetch_sub(&running, 1);
+   pthread_mutex_lock(&calls);
+   if (--running == 0) thud_latest_signal = 0;
+   pthread_mutex_unlock(&calls);
 }
 
 // From now on an interrupt is kept for `thud_write`.
@@ -139,13 +149,13 @@ int thud_open(const char *path)
    return open(path, O_RDONLY | O_CLOEXEC);
 }
 
-// Bytes that were read; 0 at the end, negative after an error.
+// Bytes that were read; 0 at the end, negative after an error or a signal that ends the work.
 ssize_t thud_read(int descriptor, char *bytes, size_t length)
 {
    ssize_t count;
 
    do count = read(descriptor, bytes, length);
-   while (count < 0 && errno == EINTR);
+   while (count < 0 && errno == EINTR && !thud_latest_signal);
    return count;
 }
 
@@ -194,7 +204,8 @@ int thud_flush(const char *path)
 }
 
 // Waits for the lock on a directory and takes it, by a descriptor; makes the directory where that is asked for.
-// Minus the number of the error where this user cannot write there. File systems without locks go without.
+// Minus the number of the error where this user cannot write there, or of EINTR after a signal that ends the work.
+// File systems without locks go without.
 int thud_lock_directory(const char *path, int make)
 {
    for (;;) {
@@ -211,7 +222,11 @@ int thud_lock_directory(const char *path, int make)
          close(descriptor);
          return -error;
       }
-      while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) continue;
+      while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) {
+         if (!thud_latest_signal) continue;
+         close(descriptor);
+         return -EINTR;
+      }
       // The previous owner of the lock may have renamed or removed the directory.
       if (fstat(descriptor, &locked) == 0 && lstat(path, &named) == 0 && locked.st_dev == named.st_dev
           && locked.st_ino == named.st_ino)

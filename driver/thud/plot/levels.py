@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from thud._schema import BandSet, Levels, LevelsForce, LevelsMethod, LimitsSource
+from thud.checks import refuse
 from thud.impact import Impact, solve
 from thud.levels import octave_limits
 from thud.plot.examples import solve_published
@@ -31,7 +32,7 @@ from thud.plot.look import (
 def levels(
     impacts: Mapping[str, Impact],
     force: LevelsForce | None = None,
-    source: LimitsSource = "rubber_ball",
+    source: LimitsSource | None = None,
     method: LevelsMethod | None = None,
 ) -> Figure:
     """Draw octave levels over the tolerance band of the standards (paper, figure 3).
@@ -45,7 +46,7 @@ def levels(
     force
         ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: whose tolerance band is drawn.
+        ``"rubber_ball"`` or ``"tyre"``: of the tolerance band; by default that of the cases.
     method
         ``"exact"`` or ``"fft"``; by default that of each case.
 
@@ -59,7 +60,7 @@ def levels(
     bands: list[BandSet] = ["octave"] if asked == {"octave"} else ["octave", "third"]
     figure = new_figure(0.4 + 2.5 * len(bands))
     panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
-    draw_levels(panels, impacts, force, source, method)
+    draw_levels(panels, impacts, force, common_source(impacts, source), method)
     for axes in panels.values():
         axes.set_ylabel(level_label(impacts, force), fontsize=SIZE)
     legend_above(panels["octave"])
@@ -84,6 +85,22 @@ def draw_levels(
             place = np.arange(len(values)) + step * (i - (len(impacts) - 1) / 2)
             axes.plot(place, values, label=literal(name), **line_style(i), **marker_style(i))
         octave_axis(axes, bands)
+
+
+def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
+    """Return a source of limits, or without it that of the cases.
+
+    Raises
+    ------
+    InputError
+        Where the cases differ in it.
+    """
+    found = {i.case.limits.source for i in impacts.values() if isinstance(i, Impact)}
+    if source is None and len(found) > 1:
+        what = f"&limits: source differs ({', '.join(sorted(found))})"
+        refuse(what, "cases with one source, or the choice of one")
+    standard: LimitsSource = "rubber_ball"
+    return source or next(iter(found), standard)
 
 
 def draw_tolerance(axes: Axes, source: LimitsSource) -> None:
@@ -120,7 +137,7 @@ def _draw_fluxes() -> Figure:
     return levels(impacts, "elastic")
 
 
-IMPACT_FIGURES = {"levels": lambda impact: levels(named(impact), source=impact.case.limits.source)}
+IMPACT_FIGURES = {"levels": lambda impact: levels(named(impact))}
 DOCUMENTATION_FIGURES = {
     "figure3_levels": _draw_shell,
     "finite_element_levels": _draw_models,

@@ -146,7 +146,7 @@ def iterate_curves(
         raise InputError(message)
     for name, impact in impacts.items():
         require_kind(name, impact, Impact | Recording)
-    kinds = [_kind(impact, force) for impact in impacts.values()]
+    kinds = [impact.judged(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind
@@ -162,11 +162,6 @@ def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, what: s
     """Return the label of an axis of levels, with their force where labels do not say which."""
     words = force_words(impacts, force)
     return what if words == "force" else f"{what}\n({words})"
-
-
-def _kind(impact: Curve, force: LevelsForce | None) -> LevelsForce:
-    """Return the kind of force that is shown; a recording is of the floor."""
-    return force or impact.judged_force if isinstance(impact, Impact) else "floor"
 
 
 def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:

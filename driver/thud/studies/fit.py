@@ -224,8 +224,8 @@ class FitKind(Kind[FitStudy, Fit]):
         return f"{study.name}\n\n{result.table(study.units)}"
 
     def remarks(self, result: Fit) -> list[str]:
-        """Return the warnings."""
-        return list(result.warnings)
+        """Return the warnings, and what is not plausible in the impact that was found."""
+        return [*result.warnings, *result.impact.remarks]
 
     def succeeded(self, result: Fit) -> bool:
         """Return whether the search has converged."""
