@@ -61,7 +61,9 @@ def suggestion(word: object, known: Collection[str]) -> str:
     import difflib  # noqa: PLC0415 - for errors only
 
     by_small = {name.lower(): name for name in known}
-    close = difflib.get_close_matches(str(word).lower(), by_small, 1, cutoff=0.7)
+    if not isinstance(word, str) or len(word) > LONGEST_SHOWN:
+        return ""
+    close = difflib.get_close_matches(word.lower(), by_small, 1, cutoff=0.7)
     return f" (did you mean {by_small[close[0]]!r}?)" if close else ""
 
 

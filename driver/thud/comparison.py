@@ -15,12 +15,12 @@ import numpy as np
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import refuse, refuse_value, require_kind
+from thud.checks import refuse, refuse_value, require_choice, require_kind
 from thud.display import Displayed
 from thud.errors import InputError, PlausibilityWarning, ThudError
 from thud.files import replace_file
-from thud.impact import Impact, compute
-from thud.levels import get_bands
+from thud.impact import FORCES, Impact, compute
+from thud.levels import SOURCES, get_bands
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 from thud.plot.levels import common_source
@@ -101,7 +101,7 @@ class Comparison(Displayed):
                     " to ".join(dict.fromkeys(ends)),
                 )
             )
-        rows.append(("peak force, N", *(f"{i.peak(self.force):.1f}" for i in impacts), ""))
+        rows.append(("peak force, N", *(_digits(i.peak(self.force)) for i in impacts), ""))
         if self.run_times:
             times = (self.run_times.get(name) for name in self.impacts)
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
@@ -129,6 +129,11 @@ class Comparison(Displayed):
         page = folder / "comparison.html"
         replace_file(page, self.html().encode())
         return [*pictures, page]
+
+
+def _digits(force: float) -> str:
+    """Return a force with a decimal, small ones with three digits."""
+    return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
 
 
 def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
@@ -192,6 +197,10 @@ def compare(
     PlausibilityWarning
         As `Comparison.remarks`.
     """
+    if force is not None:
+        require_choice("force", force, FORCES)
+    if source is not None:
+        require_choice("source", source, SOURCES)
     named = _named(impacts)
     solved: dict[str, Impact | Recording] = {}
     run_times = {}
@@ -245,7 +254,7 @@ def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
 
 def _name(given: object) -> str:
     case = given.case if isinstance(given, Impact) else given
-    return case.name if isinstance(case, Case) else "recording"
+    return case.name if isinstance(case, Case) else type(given).__name__.lower()
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:

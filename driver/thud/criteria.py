@@ -40,7 +40,7 @@ class Criterion(Displayed):
     def __repr__(self) -> str:
         """Return value, limits and verdict."""
         name, value, limits, found = self._row()
-        return f"<Criterion, {name}: {value} {found}, allowed {limits}>"
+        return f"<Criterion, {name}: {f'{value} {found}'.strip()}, allowed {limits}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -52,7 +52,8 @@ class Criterion(Displayed):
         missed = "is not known" if math.isnan(self.value) else missed
         found = "conforms" if self.conforms else missed
         limits = f"{self.lower:g} to {self.upper:g}"
-        return name, f"{self.value:.4g} {self.unit}".strip(), limits, found
+        value = "" if math.isnan(self.value) else f"{self.value:.4g} {self.unit}".strip()
+        return name, value, limits, found
 
 
 @dataclass(frozen=True, repr=False)
@@ -89,9 +90,11 @@ class Conformity(Displayed):
 
     def __repr__(self) -> str:
         """Return the verdict, and which criteria are not met."""
-        missed = [one.name for one in self.criteria if not one.conforms]
-        where = f" in {', '.join(missed)}" if missed else ""
-        return f"<Conformity, {self.source}: {self.verdict}{where}>"
+        missed = [one for one in self.criteria if not one.conforms]
+        failed = ", ".join(one.name for one in missed if not math.isnan(one.value))
+        unknown = ", ".join(one.name for one in missed if math.isnan(one.value))
+        words = [self.verdict, failed and f"in {failed};", unknown and f"not known: {unknown}"]
+        return f"<Conformity, {self.source}: {' '.join(filter(None, words)).removesuffix(';')}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""

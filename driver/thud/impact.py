@@ -159,7 +159,7 @@ class Impact(Displayed):
 
     def judged(self, force: LevelsForce | None = None) -> LevelsForce:
         """Return a force, checked, or without it that which the case judges."""
-        chosen = force or self.case.levels.force
+        chosen = self.case.levels.force if force is None else force
         require_choice("force", chosen, FORCES)
         return chosen
 

@@ -85,7 +85,10 @@ class Ensemble(Displayed):
         """Return what differs, and how many drops conform."""
         names = ", ".join(self.parameters)
         failed = f", {np.sum(self.status != 0)} failed" if self.status.any() else ""
-        return f"<Ensemble: {len(self)} drops by {names}; {self.conforms.sum()} conform{failed}>"
+        # Without levels the margins of drops that were computed are not known.
+        judged = np.isfinite(self.margin).any() or (self.status != 0).all()
+        verdict = f"{self.conforms.sum()} conform" if judged else "not judged"
+        return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -93,7 +96,10 @@ class Ensemble(Displayed):
         units = {name: SCALARS[name][0] for name in OUTCOMES} | {"margin": "dB"}
         for name, unit in units.items():
             known = getattr(self, name)[self.status == 0]
-            shares = np.quantile(known, [0, 0.5, 1]) if known.size else np.full(3, np.nan)
+            known = known[np.isfinite(known)]
+            if not known.size:
+                continue
+            shares = np.quantile(known, [0, 0.5, 1])
             label = f"{name.replace('_', ' ')}, {unit}".removesuffix(", ")
             rows.append((label, *(f"{value:.4g}" for value in shares)))
         return rows

@@ -69,7 +69,10 @@ def quantity(text: str) -> float:
     if unit not in units:
         what = f"unit {unit!r} is not known{suggestion(unit, units)}" if unit else "unit is missing"
         refuse(f"quantity = {shown(text)}: {what}", ", ".join(units))
-    return scaled(float(match[1]), units[unit])
+    value = scaled(float(match[1]), units[unit])
+    if not math.isfinite(value):
+        refuse(f"quantity = {shown(text)} is too large", "finite numbers")
+    return value + 0.0
 
 
 def scaled(value: float, power: int) -> float:

@@ -7,7 +7,6 @@ from string import Template
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
 from plotly.offline import get_plotlyjs
 
 from thud._schema import BandSet, LevelsForce, LimitsSource
@@ -66,7 +65,7 @@ def comparison_html(
 
 def _points(x: Any, y: Any) -> dict[str, list[Any]]:  # noqa: ANN401 - numbers or texts
     """Return a curve, its values with as many digits as can be seen."""
-    return {"x": list(x), "y": np.round(y, 5).tolist()}
+    return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
 
 
 def _names(bands: BandSet) -> list[str]:

@@ -28,7 +28,7 @@ INSTANTS = 9
 # Nodes between two arrows, from pole to pole and through the wall.
 ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
-LABEL = "Displacement, mm"
+LABEL = "Displacement of the material, mm"
 
 
 def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
