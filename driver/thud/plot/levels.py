@@ -99,8 +99,9 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     if source is None and len(found) > 1:
         what = f"&limits: source differs ({', '.join(sorted(found))})"
         refuse(what, "cases with one source, or the choice of one")
-    standard: LimitsSource = "rubber_ball"
-    return source or next(iter(found), standard)
+    if source is not None:
+        return source
+    return found.pop() if found else "rubber_ball"
 
 
 def draw_tolerance(axes: Axes, source: LimitsSource) -> None:
