@@ -1,4 +1,4 @@
-"""Make driver/thud/_schema.py and docs/keys.md from the library's schema.
+"""Make _schema.py and _solve.pyi in driver/thud, and docs/keys.md, from the library's schema.
 
 Run by ``./bootstrap schema``: thud --schema | python driver/generate_schema.py [DIRECTORY]
 """
@@ -11,7 +11,7 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-TYPES = {"real": "float", "whole": "int", "flag": "bool", "choice": "str", "text": "str"}
+TYPES = {"real": "float", "whole": "int", "flag": "bool", "text": "str"}
 HEAD = '''"""Groups of the input, keys and results as the library declares them.
 
 Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
@@ -21,14 +21,52 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import ClassVar, Literal, Self
 
-from thud.key import Key
+from thud.key import Group, Key
 
 __all__ = [
 {names}]
+
+# Choices of keys.
+{choices}'''
+SOLVE = '''"""The calls of `thud.solve` by model, for type checkers.
+
+Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
+"""
+
+from collections.abc import Sequence
+from typing import Literal, TypedDict, Unpack, overload
+
+from thud._schema import (
+{names})
+from thud.impact import Impact
 '''
+# A model is given by name, in its place or as a keyword; the first is the default.
+CALL = '''
+@overload
+def solve(
+    ball: Ball | None{default}, drop: Drop | None{default}, {star}model: {model},
+    **options: Unpack[{options}],
+) -> Impact:
+    """Drop a ball on a rigid floor{by}."""
+'''
+# What a class has beside its keys.
+STANDARD_BALL = '''
+    @classmethod
+    def standard(cls) -> Self:
+        """Return the ball that conforms to the standards by finite elements.
+
+        With its modulus, 2.08 MPa, the first free modes are those that the paper computed by finite
+        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. The call that conforms
+        is ``thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt",
+        loss_factor=0.2, loss_frequency=74.0)``; the shell model has another modulus, the default.
+        """
+        return cls(youngs_modulus=2.08e6)
+'''
+EXTRAS = {"ball": STANDARD_BALL}
 INDENT = " " * 8
+LONGEST = 100
 PAGE = """# Keys of an input file
 
 Made by `./bootstrap schema` from the library's own declarations. SI units. `thud --keys` prints the
@@ -54,8 +92,24 @@ def allowed(key: Entry) -> str:
     return f"{ends[0]} {signs[0]} {key['name']} {signs[1]} {ends[1]}"
 
 
+def choice_name(key: Entry) -> str:
+    """Return the name of the type of a choice."""
+    return class_name(key["owner"] or key["group"]) + class_name(key["name"])
+
+
+def literal(name: str, words: list[str]) -> str:
+    """Return the type of one of some words as Python writes it."""
+    line = f"{name} = Literal[{', '.join(map(quoted, words))}]\n"
+    if len(line) <= LONGEST:
+        return line
+    entries = "".join(f"    {quoted(word)},\n" for word in words)
+    return f"{name} = Literal[\n{entries}]\n"
+
+
 def python_type(key: Entry) -> str:
     """Return the type of a key's value."""
+    if key["kind"] == "choice":
+        return choice_name(key)
     if key["kind"] == "list":
         return f"Sequence[{'int' if key['whole'] else 'float'}]"
     return TYPES[key["kind"]]
@@ -70,7 +124,7 @@ def python_default(key: Entry) -> str:
 def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> str:
     """Return the dataclass of some keys."""
     attributes: list[str] = []
-    members = [f'    name: ClassVar[str] = "{model}"'] if model else []
+    members = [f'    name: ClassVar[ModelName] = "{model}"'] if model else []
     for key in keys:
         unit = f", {key['unit']}" if key["unit"] else ""
         words = [key["meaning"][0].upper() + key["meaning"][1:] + unit, allowed(key)]
@@ -81,12 +135,14 @@ def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> 
         type_name = python_type(key)
         text = INDENT + "; ".join(filter(None, words)) + "."
         plain_type = type_name.replace("Sequence[", "sequence of ").rstrip("]")
+        if key["kind"] == "choice":
+            plain_type = "str"
         attributes.append(f"    {key['name']} : {plain_type}")
         attributes += textwrap.wrap(text, 99, subsequent_indent=INDENT)
         members.append(f"    {key['name']}: {type_name} = {default}")
-    head = f'\n\n@dataclass(frozen=True)\nclass {class_name(group)}:\n    """{title}\n'
+    head = f'\n\n@dataclass(frozen=True)\nclass {class_name(group)}(Group):\n    """{title}\n'
     attributes = ["    Attributes", "    ----------", *attributes, '    """\n']
-    return "\n".join([head, *attributes, *members, ""])
+    return "\n".join([head, *attributes, *members, EXTRAS.get(group, "")])
 
 
 def python_module(schema: Entry) -> str:
@@ -94,8 +150,12 @@ def python_module(schema: Entry) -> str:
     keys, models = schema["keys"], schema["models"]
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
-    classes = sorted(map(class_name, [*groups, "modes", *models]))
-    parts = [HEAD.format(names="".join(f'    "{name}",\n' for name in classes))]
+    names = list(map(class_name, models))
+    public = sorted([*map(class_name, [*groups, "modes"]), *names, "ModelName", "ModelOptions"])
+    choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
+    choices.append(literal("BandSet", schema["band_sets"]))
+    quoted_names = "".join(f"    {quoted(name)},\n" for name in public)
+    parts = [HEAD.format(names=quoted_names, choices="".join(choices))]
     for group in groups:
         members = [key for key in shared if key["group"] == group]
         parts.append(python_class(f"Group ``&{group}``.", members, group))
@@ -105,7 +165,6 @@ def python_module(schema: Entry) -> str:
         members = [key for key in keys if key["owner"] == model]
         title = f"Options of the source model ``{model}``."
         parts.append(python_class(title, members, model, model))
-    names = list(map(class_name, models))
     scalars = [f"{quoted(s['name'])}: ({quoted(s['unit'])}, {quoted(s['meaning'])})"
                for s in schema["scalars"]]  # fmt: skip
     parts += [
@@ -121,6 +180,33 @@ def python_module(schema: Entry) -> str:
         *(f"    {python_key(key)},\n" for key in keys),
         ")\n",
     ]  # fmt: skip
+    return "".join(parts)
+
+
+def python_calls(schema: Entry) -> str:
+    """Return the text of ``_solve.pyi``."""
+    keys, models = schema["keys"], schema["models"]
+    owned = {model: [key for key in keys if key["owner"] == model] for model in models}
+    choices = {choice_name(key) for key in keys if key["owner"] and key["choices"]}
+    names = sorted({"Ball", "Drop", "ModelName", "ModelOptions", *choices})
+    parts = [SOLVE.format(names="".join(f"    {name},\n" for name in names))]
+    shared = [key for key in keys if key["group"] == "sampling"]
+    for name, base, members in [
+        ("Sampling", "TypedDict", shared),
+        *((class_name(model), "SamplingOptions", owned[model]) for model in models),
+    ]:
+        parts.append(f"\nclass {name}Options({base}, total=False):\n")
+        parts += [f"    {key['name']}: {python_type(key)}\n" for key in members]
+    for model in models:
+        words = {"options": f"{class_name(model)}Options", "by": f" by the model ``{model}``"}
+        name = f"Literal[{quoted(model)}]"
+        if model == models[0]:
+            parts.append(CALL.format(default=" = ...", star="", model=f"{name} = ...", **words))
+        else:
+            parts.append(CALL.format(default="", star="", model=name, **words))
+            parts.append(CALL.format(default=" = ...", star="*, ", model=name, **words))
+    parts.append(CALL.format(default=" = ...", star="", model="ModelName | ModelOptions = ...",
+                             options="SamplingOptions", by=""))  # fmt: skip
     return "".join(parts)
 
 
@@ -166,10 +252,11 @@ def page(schema: Entry) -> str:
 
 
 def main() -> None:
-    """Write both files below a directory, by default that of the project."""
+    """Write the files below a directory, by default that of the project."""
     schema = json.load(sys.stdin)
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
     (root / "driver/thud/_schema.py").write_text(python_module(schema), encoding="utf-8")
+    (root / "driver/thud/_solve.pyi").write_text(python_calls(schema), encoding="utf-8")
     (root / "docs/keys.md").write_text(page(schema), encoding="utf-8")
 
 

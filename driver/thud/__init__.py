@@ -9,25 +9,71 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING
 
 from thud._api import version
 from thud._schema import *  # noqa: F403 - the groups and models that the library declares
 from thud._schema import __all__ as _groups
 from thud.case import Case, read_case, write_case
-from thud.ensemble import Ensemble, solve_many
+from thud.checks import suggestion
+from thud.criteria import Conformity, Criterion
+from thud.display import MAKERS
+from thud.ensemble import solve_many
 from thud.errors import FitWarning, InputError, NumericalError, PlausibilityWarning, ThudError
+from thud.extras import require_extra
 from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import Impact, Motion, solve, solve_case
-from thud.levels import Bands, Conformity, Criterion, force_exposure_levels, get_bands, judge
+from thud.impact import Impact, solve_case
+from thud.levels import Bands, force_exposure_levels, get_bands, judge
+from thud.motion import Motion
+from thud.outcomes import Ensemble
 from thud.recording import Recording
 from thud.results import read_results
 from thud.studies import kinds
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    # For type checkers, the calls of `solve` by model and what is imported at first use.
+    from thud import comparison as comparison
+    from thud import plot as plot
+    from thud._solve import solve as solve
+    from thud.comparison import Comparison as Comparison
+    from thud.comparison import compare as compare
+    from thud.comparison import read_all as read_all
+    from thud.studies.blocks import read_sweep as read_sweep
+    from thud.studies.design_map import DesignMap as DesignMap
+    from thud.studies.design_map import design_map as design_map
+    from thud.studies.fit import fit as fit
+    from thud.studies.fitting.force_target import ForceTarget as ForceTarget
+    from thud.studies.fitting.level_target import LevelTarget as LevelTarget
+    from thud.studies.fitting.result import Fit as Fit
+    from thud.studies.kinds import read_study as read_study
+    from thud.studies.parameter import Parameter as Parameter
+    from thud.studies.sensitivity import Sensitivity as Sensitivity
+    from thud.studies.sensitivity import sensitivity as sensitivity
+    from thud.studies.study import Study as Study
+    from thud.studies.sweep import sweep as sweep
+    from thud.studies.uncertainty import Uncertainty as Uncertainty
+    from thud.studies.uncertainty import uncertainty as uncertainty
+    from thud.units import quantity as quantity
+else:
+    from thud.impact import solve
+
 __version__ = version()
 
-__all__ = [  # noqa: PLE0604 - the first are strings too
+# What is imported at first use, by its module; modules themselves have none.
+_LATE = {
+    "plot": "",
+    "comparison": "",
+    "Comparison": "comparison",
+    "compare": "comparison",
+    "read_all": "comparison",
+    "quantity": "units",
+}
+__all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
+    *_LATE,
+    *kinds.PUBLIC,
     "Bands",
     "Case",
     "Conformity",
@@ -55,22 +101,37 @@ __all__ = [  # noqa: PLE0604 - the first are strings too
     "write_case",
 ]
 
+# Type checkers would take the name of anything for that of an object.
+if not TYPE_CHECKING:
 
-# What needs matplotlib, plotly, SciPy or xarray is imported at first use: these are slow to import.
-_LATE = {
-    "plot": None,
-    "comparison": None,
-    "compare": "comparison",
-    "read_all": "comparison",
-}
-
-
-def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module or an object of it
-    """Import slow modules at first use."""
-    if name in kinds.PUBLIC:
-        return getattr(kinds.load(kinds.PUBLIC[name]), name)
-    if name in _LATE:
+    def __getattr__(name: str) -> object:
+        """Import slow modules at first use."""
+        if name in kinds.PUBLIC:
+            return kinds.public(name)
+        if name not in _LATE:
+            message = f"module 'thud' has no attribute {name!r}{suggestion(name, __all__)}"
+            raise AttributeError(message)
         module = importlib.import_module(f"thud.{_LATE[name] or name}")
         return getattr(module, name) if _LATE[name] else module
-    message = f"module 'thud' has no attribute {name!r}"
-    raise AttributeError(message)
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return [*__all__, "__version__"]
+
+
+def _maker(module: str, function: str) -> Callable[..., object]:
+    """Return a function of a module that is imported at first use."""
+
+    def make(*arguments: object) -> object:
+        with require_extra("studies"):
+            return getattr(importlib.import_module(f"thud.{module}"), function)(*arguments)
+
+    return make
+
+
+MAKERS.update(
+    figure=_maker("plot.overview", "overview"),
+    dataset=_maker("export", "dataset"),
+    table=_maker("export", "table"),
+)

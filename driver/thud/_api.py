@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import re
+import threading
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,10 @@ api = _core.thud_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
 
+# The status of an interrupt is this plus the number of the signal.
+_INTERRUPTED = 128
+# Place of the status among the results of procedures that leave a bundle.
+_OF_BUNDLE = -4
 _ERRORS = {error.exit_code: error for error in (InputError, NumericalError)}
 
 
@@ -32,7 +37,24 @@ def call(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> Bundle:
     It holds texts, numbers and arrays by name; those named ``group.name`` are in a dictionary for
     each group. Raise InputError or NumericalError with the message of the library.
     """
-    return collect(*routine(*arguments))
+    return collect(*call_through(routine, *arguments))
+
+
+def call_through(
+    routine: Callable[..., tuple[Any, ...]], *arguments: object, status: int = _OF_BUNDLE
+) -> tuple[Any, ...]:
+    """Call a procedure whose status is the result of that number; return all results.
+
+    An interrupt ends it early. Handlers of signals have run by then, in the main thread: where they
+    have raised nothing, the work is to go on and is done again. Other threads raise
+    KeyboardInterrupt.
+    """
+    while (results := routine(*arguments))[status] > _INTERRUPTED:
+        if status == _OF_BUNDLE:
+            api.collect(*results[-3:])
+        if threading.current_thread() is not threading.main_thread():
+            raise KeyboardInterrupt
+    return results
 
 
 def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> tuple[Any, ...]:
@@ -40,7 +62,7 @@ def call_direct(routine: Callable[..., tuple[Any, ...]], *arguments: object) -> 
 
     Raise InputError or NumericalError with the message.
     """
-    *results, status, message = routine(*arguments)
+    *results, status, message = call_through(routine, *arguments, status=-2)
     if status:
         raise _ERRORS.get(status, NumericalError)(trimmed(message))
     return tuple(results)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import f90nml
 import numpy as np
@@ -23,14 +23,19 @@ from thud._schema import (
     Modes,
     Sampling,
 )
-from thud.checks import LARGEST, require_choice, require_kind, require_words, shown
+from thud.checks import LARGEST, refuse, require_choice, require_kind, shown
+from thud.display import Displayed
 from thud.errors import InputError
 from thud.files import replace_file
+from thud.key import Group, require_keywords
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from dataclasses import Field
     from typing import Any, Self
 
+# Values by group and key, as f90nml has them.
+Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
 # Keys of the mesh, which free modes and finite elements share.
@@ -43,15 +48,20 @@ def group_of(model: str, option: Field[Any]) -> str:
     return group
 
 
-def new_model(name: str, options: dict[str, object]) -> ModelOptions:
+def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> ModelOptions:
     """Return the options of a model by its name; raise InputError where one is not known."""
-    require_choice("&model: name", name, MODELS)
-    require_words(f"&{name}", options, [option.name for option in fields(MODELS[name])])
-    return MODELS[name](**options)  # type: ignore[arg-type]
+    if isinstance(model, ModelOptions):
+        if options:
+            what = f"model is an object of {type(model).__name__} beside {', '.join(options)}"
+            refuse(what, "options in the object, or beside the name of a model")
+        return model
+    require_choice("&model: name", model, MODELS)
+    require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
+    return MODELS[model](**options)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
-class Case:
+@dataclass(frozen=True, repr=False)
+class Case(Group, Displayed):
     """Everything that one run needs.
 
     Attributes
@@ -75,8 +85,25 @@ class Case:
     limits: Limits = field(default_factory=Limits)
     modes: Modes | None = None
 
-    def to_namelist(self) -> f90nml.Namelist:
-        """Return the case as a namelist with every key.
+    def __repr__(self) -> str:
+        """Return what is computed."""
+        model = self.model.name if isinstance(self.model, ModelOptions) else ""
+        modes = "free modes" if self.modes else ""
+        return f"<Case {self.name}: {', '.join(filter(None, (model, modes)))}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        units = {(key.owner or key.group, key.name): key.unit for key in KEYS}
+        rows: list[tuple[str, ...]] = [("group", "key", "value", "unit")]
+        for group, entries in vars(self).items():
+            if isinstance(entries, Group):
+                owner = str(getattr(entries, "name", group))
+                for key, value in vars(entries).items():
+                    rows.append((owner, key, str(value), units[owner, key]))
+        return rows
+
+    def to_namelist(self) -> Namelist:
+        """Return the case as a namelist with every key; its text is that of a file.
 
         Raises
         ------
@@ -111,7 +138,8 @@ class Case:
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
             namelist[group] = {key: value for key, value in plain.items() if value != []}
-        return namelist
+        result: Namelist = namelist
+        return result
 
     @classmethod
     def from_text(cls, content: str) -> Self:
@@ -119,26 +147,27 @@ class Case:
         return cls.from_namelist(f90nml.reads(content))
 
     @classmethod
-    def from_namelist(cls, namelist: f90nml.Namelist) -> Self:
+    def from_namelist(cls, namelist: Namelist) -> Self:
         """Return the case of a namelist; missing keys have their default."""
+        content: dict[str, Any] = dict(namelist)
         groups = {
-            group: kind(**namelist[group]) for group, kind in GROUPS.items() if group in namelist
+            group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
         }
         model = modes = None
-        if "modes" in namelist:
-            modes = Modes(**namelist["modes"], **namelist.get("mesh", {}))
-        if "model" in namelist or not modes:
-            name = namelist.get("model", {}).get("name", next(iter(MODELS)))
+        if "modes" in content:
+            modes = Modes(**content["modes"], **content.get("mesh", {}))
+        if "model" in content or not modes:
+            name = content.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
             for option in fields(MODELS[name]):
-                given = namelist.get(group_of(name, option), {})
+                given = content.get(group_of(name, option), {})
                 if option.name in given:
                     entries = given[option.name]
                     if option.name in LISTS:
                         entries = tuple(entries) if isinstance(entries, list) else (entries,)
                     options[option.name] = entries
             model = MODELS[name](**options)
-        title = namelist.get("case", {}).get("name", cls.name)
+        title = content.get("case", {}).get("name", cls.name)
         return cls(name=title, model=model, modes=modes, **groups)
 
 

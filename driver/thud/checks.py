@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import inspect
-from functools import wraps
-from typing import TYPE_CHECKING, Any, NoReturn, ParamSpec, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, NoReturn, get_args
 
 import numpy as np
 
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Container, Iterable
+    from collections.abc import Collection, Container, Iterable
     from types import UnionType
 
     from numpy.typing import ArrayLike, NDArray
-
-P = ParamSpec("P")
-R = TypeVar("R")
 
 # Former words of studies, and those that replace them.
 OLD_WORDS = {"base": "case", "lower": "low", "upper": "high", "level": "confidence"}
@@ -53,7 +48,23 @@ def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
     """Raise InputError where a word is not one of those that are allowed."""
     choices = list(allowed)
     if not isinstance(value, str) or value not in choices:
-        refuse(f"{name} = {shown(value)} is not known", ", ".join(map(repr, choices)))
+        what = f"{name} = {shown(value)} is not known{suggestion(value, choices)}"
+        refuse(what, ", ".join(map(repr, choices)))
+
+
+def suggestion(word: object, known: Collection[str]) -> str:
+    """Return the known word that a misspelt one probably means, as part of a sentence.
+
+    >>> suggestion("heigth", ["gravity", "height"])
+    " (did you mean 'height'?)"
+    """
+    import difflib  # noqa: PLC0415 - for errors only
+
+    by_small = {name.lower(): name for name in known}
+    if not isinstance(word, str) or len(word) > LONGEST_SHOWN:
+        return ""
+    close = difflib.get_close_matches(word.lower(), by_small, 1, cutoff=0.7)
+    return f" (did you mean {by_small[close[0]]!r}?)" if close else ""
 
 
 def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
@@ -102,24 +113,18 @@ def shown(value: object) -> str:
     return text if fits else f"an object of {type(value).__name__}"
 
 
-def require_words(place: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Raise InputError where a word is not known; of a former word, name the new one."""
+def require_words(
+    place: str, given: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
+) -> None:
+    """Raise InputError where a word is not known; of a former word, name the new one.
+
+    What was meant may be one of other words, too.
+    """
     allowed = list(known)
     for word in given:
         if word not in allowed:
             new = OLD_WORDS.get(word)
-            what = f"is now {new!r}" if new in allowed else "is not known"
-            refuse(f"{place}: {word!r} {what}", ", ".join(allowed))
-
-
-def refuse_old_words(function: Callable[P, R]) -> Callable[P, R]:
-    """Let a function raise InputError where it is called with a former word as keyword."""
-    known = list(inspect.signature(function).parameters)
-
-    @wraps(function)
-    def checked(*arguments: P.args, **keywords: P.kwargs) -> R:
-        old = [word for word in keywords if OLD_WORDS.get(word) in known and word not in known]
-        require_words(f"{function.__name__}()", old, known)
-        return function(*arguments, **keywords)
-
-    return checked
+            listed = ", ".join(allowed)
+            if new in allowed:
+                refuse(f"{place}: {word!r} is now {new!r}", listed)
+            refuse(f"{place}: {word!r} is not known{suggestion(word, [*allowed, *also])}", listed)

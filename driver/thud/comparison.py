@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
+import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from tqdm import tqdm
 
 from thud.case import Case, read_case
-from thud.checks import refuse, refuse_value, require_kind
+from thud.checks import refuse, refuse_value, require_choice, require_kind
+from thud.display import Displayed
 from thud.errors import InputError, PlausibilityWarning, ThudError
 from thud.files import replace_file
-from thud.impact import Impact, compute
+from thud.impact import FORCES, Impact, compute
 from thud.levels import SOURCES, get_bands
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
+from thud.plot.levels import common_source
 from thud.plot.look import save_all
 from thud.recording import Recording
 
 if TYPE_CHECKING:
-    import os
-
     from matplotlib.figure import Figure
 
-    from thud.levels import Criterion
+    from thud._schema import LevelsForce, LimitsSource
+    from thud.criteria import Criterion
 
 # Criteria after the octaves: name and unit, size of the unit, decimals.
 _ROWS = (
@@ -41,8 +43,8 @@ _ROWS = (
 )
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Displayed):
     """Impacts of the same drop, side by side.
 
     Attributes
@@ -59,14 +61,22 @@ class Comparison:
 
     impacts: dict[str, Impact | Recording]
     run_times: dict[str, float]
-    force: str | None = None
-    source: str = "rubber_ball"
+    force: LevelsForce | None = None
+    source: LimitsSource = "rubber_ball"
 
     @property
     def remarks(self) -> list[str]:
         """What is possible but not plausible, with the names of the impacts."""
         solved = {n: i for n, i in self.impacts.items() if isinstance(i, Impact)}
         return [f"{name}: {remark}" for name, i in solved.items() for remark in i.remarks]
+
+    def __repr__(self) -> str:
+        """Return the names of what is compared."""
+        return f"<Comparison: {', '.join(self.impacts)}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return self.table()
 
     def table(self) -> list[tuple[str, ...]]:
         """Return rows of text: names, force, method, criteria, peaks, times, verdicts.
@@ -78,7 +88,7 @@ class Comparison:
         octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
         rows = [
             ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
-            ("force", *map(self._force_of, impacts), ""),
+            ("force", *(impact.judged(self.force) for impact in impacts), ""),
             ("levels", *(impact.level_method for impact in impacts), ""),
         ]
         together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
@@ -91,16 +101,11 @@ class Comparison:
                     " to ".join(dict.fromkeys(ends)),
                 )
             )
-        rows.append(("peak force, N", *(f"{i.peak(self.force):.1f}" for i in impacts), ""))
+        rows.append(("peak force, N", *(_digits(i.peak(self.force)) for i in impacts), ""))
         if self.run_times:
             times = (self.run_times.get(name) for name in self.impacts)
             rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
         return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
-
-    def _force_of(self, impact: Impact | Recording) -> str:
-        """Return the force of an impact that is compared; a recording has only one."""
-        chosen = self.force if isinstance(impact, Impact) else None
-        return chosen or impact.judged_force
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
@@ -126,6 +131,11 @@ class Comparison:
         return [*pictures, page]
 
 
+def _digits(force: float) -> str:
+    """Return a force with a decimal, small ones with three digits."""
+    return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
+
+
 def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
     """Return the value of a criterion, and how it misses its limits."""
     if np.isnan(criterion.value):
@@ -134,10 +144,27 @@ def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
     return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
 
 
+# mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
+@overload
+def compare(
+    impacts: Mapping[str, Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
+@overload
+def compare(
+    impacts: Iterable[Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
 def compare(
     impacts: Mapping[str, Case | Impact | Recording] | Iterable[Case | Impact | Recording],
-    force: str | None = None,
-    source: str | None = None,
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
     *,
     progress: bool = False,
 ) -> Comparison:
@@ -170,6 +197,10 @@ def compare(
     PlausibilityWarning
         As `Comparison.remarks`.
     """
+    if force is not None:
+        require_choice("force", force, FORCES)
+    if source is not None:
+        require_choice("source", source, SOURCES)
     named = _named(impacts)
     solved: dict[str, Impact | Recording] = {}
     run_times = {}
@@ -193,13 +224,7 @@ def compare(
         listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
         message = f"&drop: height or gravity differs ({listed}); allowed: cases of the same drop"
         raise InputError(message)
-    sources = {i.case.limits.source for i in solved.values() if isinstance(i, Impact)}
-    if source is None and len(sources) > 1:
-        refuse(
-            f"&limits: source differs ({', '.join(sorted(sources))})",
-            "cases with one source, or the choice of one",
-        )
-    found = Comparison(solved, run_times, force, source or next(iter(sources), SOURCES[0]))
+    found = Comparison(solved, run_times, force, common_source(solved, source))
     for remark in found.remarks:
         warnings.warn(remark, PlausibilityWarning, stacklevel=2)
     return found
@@ -207,18 +232,19 @@ def compare(
 
 def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
     """Return what is compared by name, checked."""
-    allowed = "one or more cases, impacts or recordings, by name or in a list"
+    allowed = "one or more cases, impacts or recordings, by name or in a list (files: read_all)"
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:
         row = [impacts] if isinstance(impacts, Case | Impact | Recording) else impacts
-        if not isinstance(row, Iterable):
+        if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
             refuse_value("impacts", row, allowed)
         pairs = [(_name(given), given) for given in row]
     if not pairs:
         refuse("impacts is empty", allowed)
     named: dict[str, Case | Impact | Recording] = {}
     for name, given in pairs:
+        require_kind("name", name, str)
         require_kind(name, given, Case | Impact | Recording)
         # Cases from Python often share their name.
         names = chain([name], (f"{name} ({n})" for n in count(2)))
@@ -228,7 +254,7 @@ def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
 
 def _name(given: object) -> str:
     case = given.case if isinstance(given, Impact) else given
-    return case.name if isinstance(case, Case) else "recording"
+    return case.name if isinstance(case, Case) else type(given).__name__.lower()
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:

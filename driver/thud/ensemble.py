@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from tqdm import tqdm
 
-from thud._api import call, collect, ensemble_api, text
+from thud._api import call, call_through, collect, ensemble_api, text
 from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import (
@@ -22,8 +21,10 @@ from thud.checks import (
     require_whole,
 )
 from thud.impact import FORCES
+from thud.key import check_keywords
 from thud.keys import find_key
 from thud.levels import BANDWIDTHS, get_bands
+from thud.outcomes import Ensemble
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud._api import Bundle
+    from thud._schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
     from thud.key import Key
 
 MAX_THREADS = 1024
@@ -40,89 +42,20 @@ _CALL_TIME = 1.0
 _MAX_CALL = 2**17
 
 
-@dataclass(frozen=True, eq=False)
-class Ensemble:
-    """Outcomes of many drops; NaN where a drop could not be computed.
-
-    Attributes
-    ----------
-    parameters : dict of str to ndarray, shape (n_set,)
-        Parameters in which the drops differ.
-    status : ndarray of int, shape (n_set,)
-        0, or the exit code of the error: 1 bad input, 2 numerical failure.
-    reason : ndarray of str, shape (n_set,)
-        The sentence of the error.
-    contact_time : ndarray, shape (n_set,)
-        Time from first touch to release, s.
-    peak_force, peak_elastic_force : ndarray, shape (n_set,)
-        Maximum of the force on the floor and of the elastic force, N.
-    max_deflection : ndarray, shape (n_set,)
-        Maximum deflection, m.
-    restitution : ndarray, shape (n_set,)
-        Velocity at release over velocity at first touch.
-    impulse : ndarray, shape (n_set,)
-        Impulse given to the floor, N s.
-    levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
-        Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
-        verdict is based, and in the other bands of the case.
-    margin : ndarray, shape (n_set,)
-        Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
-    conforms : ndarray of bool, shape (n_set,)
-        Verdict of the standards on the force that the case judges.
-    elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
-        The same on the elastic force and on the force on the floor.
-    elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
-        Forces, N; None unless requested.
-    sample_rate : float
-        Samples per second, Hz.
-    """
-
-    parameters: dict[str, NDArray[Any]]
-    status: NDArray[np.int32]
-    reason: NDArray[np.object_]
-    contact_time: NDArray[np.float64]
-    peak_force: NDArray[np.float64]
-    peak_elastic_force: NDArray[np.float64]
-    max_deflection: NDArray[np.float64]
-    restitution: NDArray[np.float64]
-    impulse: NDArray[np.float64]
-    levels: dict[tuple[str, str], NDArray[np.float64]]
-    margin: NDArray[np.float64]
-    conforms: NDArray[np.bool_]
-    elastic_conforms: NDArray[np.bool_]
-    floor_conforms: NDArray[np.bool_]
-    elastic_force: NDArray[np.float64] | None
-    floor_force: NDArray[np.float64] | None
-    sample_rate: float
-
-    def __len__(self) -> int:
-        """Return the number of sets."""
-        return len(self.status)
-
-    @property
-    def elastic_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the elastic force, dB, shape (n_set, 5)."""
-        return self.levels["elastic", BANDWIDTHS[0]]
-
-    @property
-    def floor_octaves(self) -> NDArray[np.float64]:
-        """Octave levels of the force on the floor, dB, shape (n_set, 5)."""
-        return self.levels["floor", BANDWIDTHS[0]]
-
-
+@check_keywords
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
     parameters: Mapping[str, ArrayLike],
     case: Case | None = None,
     *,
-    model: str | None = None,
+    model: ModelName | None = None,
     threads: int | None = None,
     levels: bool = True,
-    bands: str | None = None,
+    bands: BandSet | None = None,
     forces: bool = False,
     sample_rate: float | None = None,
     duration: float | None = None,
     substeps: int | None = None,
-    source: str | None = None,
+    source: LimitsSource | None = None,
     progress: bool = False,
 ) -> Ensemble:
     """Drop many balls on a rigid floor.
@@ -168,6 +101,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Where a key is not known, arrays are not numeric or do not broadcast, the case, the bands
         or the number of threads are invalid, or the results do not fit in memory.
     """
+    from tqdm import tqdm  # noqa: PLC0415 - takes its time
+
     base = Case() if case is None else case
     require_kind("case", base, Case)
     if bands is not None:
@@ -184,7 +119,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
             sampling.substeps if substeps is None else substeps,
         ),
         levels=replace(base.levels, bands=bands or base.levels.bands),
-        limits=Limits(str(source)) if source is not None else base.limits,
+        limits=Limits(source) if source is not None else base.limits,
     )
     if base.model is None or (model is not None and model != base.model.name):
         base = replace(base, model=new_model(HollowSphere.name if model is None else model, {}))
@@ -226,6 +161,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer sets", error)
     force = results["force"]
     return Ensemble(
+        base,
         columns,
         results["status"],
         results["reason"],
@@ -242,8 +178,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
 
 
 def _by_bands(
-    level: NDArray[np.float64], wanted: str
-) -> dict[tuple[str, str], NDArray[np.float64]]:
+    level: NDArray[np.float64], wanted: LevelsBands
+) -> dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]:
     """Return levels by force and bands: octaves first, then other requested bands."""
     found = {}
     start = 0
@@ -270,7 +206,8 @@ def _compute(  # noqa: PLR0913 - those of the library
     count = len(numbers)
     # f2py knows no empty arrays: one set stands in for none.
     given = numbers if count else np.zeros((1, numbers.shape[1]))
-    status, outcome, level, conforms, margin, verdict, force, *left = ensemble_api.drop_many(
+    status, outcome, level, conforms, margin, verdict, force, *left = call_through(
+        ensemble_api.drop_many,
         content,
         _joined(columns),
         given.T,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from thud.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
 # Lists the files of a result directory that runs may replace.
 MANIFEST = ".thud"
@@ -44,26 +44,26 @@ def lock(folder: Path, result: Path) -> int:
 
 
 @contextmanager
-def on_interrupt(handler: Callable[[int, object], object] | signal.Handlers) -> Iterator[None]:
-    """Handle interrupts by another handler; only the main thread can, others leave it as it is."""
+def uninterrupted() -> Iterator[None]:
+    """Defer signals until a short operation is done; file libraries print errors otherwise.
+
+    Only the main thread handles signals; others have none to defer.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    usual = signal.signal(signal.SIGINT, handler)
+    held: list[int] = []
+    usual = {
+        number: signal.signal(number, lambda number, _: held.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, usual)
-
-
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Defer an interrupt until a short operation is done; file libraries print errors otherwise."""
-    held: list[int] = []
-    with on_interrupt(lambda number, _: held.append(number)):
-        yield
-    if held:
-        raise KeyboardInterrupt
+        for number, handler in usual.items():
+            signal.signal(number, handler)
+        if held:
+            signal.raise_signal(held[0])
 
 
 def replace_file(path: str | os.PathLike[str], content: bytes) -> None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import api, call, text
 from thud._schema import Ball, FiniteElement, Modes
 from thud.case import Case, case_text
 from thud.checks import require_kind
-from thud.errors import InputError
+from thud.display import Displayed
+from thud.errors import InputError, PlausibilityWarning
+from thud.key import check_keywords
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -20,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class FreeModes:
+class FreeModes(Displayed):
     """Axisymmetric elastic modes without twist, in ascending order, without the rigid motion.
 
     Nodes run from the lowest point to the highest and from the inner surface to the outer one;
@@ -43,6 +46,8 @@ class FreeModes:
         Nodes relative to the centre of the ball, m; nine per element.
     shape : ndarray, shape (n_mode, n_line, n_ring, 2)
         Displacements of maximum length 1, the lowest point moving upwards.
+    remarks : tuple of str
+        As `Impact.remarks`.
     """
 
     ball: Ball
@@ -52,8 +57,20 @@ class FreeModes:
     rigid_frequency: float
     start: NDArray[np.float64]
     shape: NDArray[np.float64]
+    remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return the frequencies, without the shapes."""
+        return f"<FreeModes: {', '.join(f'{f:.2f}' for f in self.frequency)} Hz>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        columns = zip(self.frequency, self.harmonic, self.participation, strict=True)
+        rows = [(f"{f:.2f}", f"{harmonic}", f"{part:.3f}") for f, harmonic, part in columns]
+        return [("frequency, Hz", "harmonic", "participation"), *rows]
 
 
+@check_keywords
 def free_modes(
     ball: Ball | None = None,
     count: int = Modes.count,
@@ -83,13 +100,21 @@ def free_modes(
         Names group, key, value and allowed range.
     NumericalError
         Where the modes cannot be computed.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `FreeModes.remarks`.
     """
     case = Case(
         ball=Ball() if ball is None else ball,
         model=None,
         modes=Modes(count, radial_elements, polar_elements),
     )
-    return new_modes(case.ball, call(api.free_modes, case_text(case)))
+    modes = new_modes(case.ball, call(api.free_modes, case_text(case)))
+    for remark in modes.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    return modes
 
 
 def new_modes(ball: Ball, found: Bundle) -> FreeModes:
@@ -103,6 +128,7 @@ def new_modes(ball: Ball, found: Bundle) -> FreeModes:
         modes["rigid_frequency"],
         np.stack((modes["r"], modes["z"]), axis=-1),
         np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
+        tuple(map(text, found.get("remarks", {}).values())),
     )
 
 

@@ -12,54 +12,33 @@ from thud._api import api, call, text
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_choice, require_kind
+from thud.display import MAKERS, Displayed
 from thud.errors import InputError, PlausibilityWarning
-from thud.levels import Conformity, force_exposure_levels, judge, peak_count
+from thud.levels import force_exposure_levels, judge, peak_count
+from thud.motion import Motion, new_motion
 
 if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud._api import Bundle
+    from thud._schema import (
+        BandSet,
+        LevelsForce,
+        LevelsMethod,
+        LimitsSource,
+        ModelName,
+        ModelOptions,
+    )
+    from thud.criteria import Conformity
 
-FORCES = ("elastic", "floor")
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Snapshots of the half section of the ball, the floor at height 0.
-
-    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
-    components are the distance from the axis and the height.
-
-    Attributes
-    ----------
-    time : ndarray, shape (n_snapshot,)
-        Times since the start of the record, s.
-    start : ndarray, shape (n_line, n_ring, 2)
-        Positions of the nodes before the impact, m.
-    position : ndarray, shape (n_snapshot, n_line, n_ring, 2)
-        Positions of the nodes, m.
-    velocity : ndarray, shape (n_snapshot, n_line, n_ring, 2)
-        Velocities of the nodes, m/s.
-    contact_pressure : ndarray, shape (n_snapshot, n_line)
-        Pressure on the floor at the nodes of the outer surface, Pa.
-    cavity_pressure : ndarray, shape (n_snapshot,)
-        Overpressure of the gas in the ball, Pa.
-    """
-
-    time: NDArray[np.float64]
-    start: NDArray[np.float64]
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    contact_pressure: NDArray[np.float64]
-    cavity_pressure: NDArray[np.float64]
-
-    def __repr__(self) -> str:
-        """Return the size of the snapshots, without their arrays."""
-        return f"<Motion: {len(self.time)} snapshots of {self.start[..., 0].size} nodes>"
+FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
 
 
 @dataclass(frozen=True, eq=False)
-class Impact:
+class Impact(Displayed):
     """Force and motion of one impact, sampled from first touch on.
 
     Attributes
@@ -141,6 +120,11 @@ class Impact:
             f"e {self.restitution:.3f}, peak {self.peak():.0f} N>"
         )
 
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        remarks = [("remark", remark, "", "") for remark in self.remarks]
+        return [*self.conformity().rows(), *remarks]
+
     @property
     def shell_force(self) -> NDArray[np.float64]:
         """Force of the shell F_B, N, shape (n_sample,)."""
@@ -162,34 +146,33 @@ class Impact:
             raise AttributeError(message)
         return self.parts[name]
 
-    def force(self, kind: str | None = None) -> NDArray[np.float64]:
+    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
 
         By default that which the case judges.
         """
-        return self.elastic_force if self._is_elastic(kind) else self.floor_force
+        return self.elastic_force if self.judged(kind) == "elastic" else self.floor_force
 
-    def peak(self, force: str | None = None) -> float:
+    def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, N; see `force` and `peak_force`."""
-        return self.peak_elastic_force if self._is_elastic(force) else self.peak_force
+        return self.peak_elastic_force if self.judged(force) == "elastic" else self.peak_force
+
+    def judged(self, force: LevelsForce | None = None) -> LevelsForce:
+        """Return a force, checked, or without it that which the case judges."""
+        chosen = self.case.levels.force if force is None else force
+        require_choice("force", chosen, FORCES)
+        return chosen
 
     @property
-    def judged_force(self) -> str:
-        """Force that the case judges, ``"floor"`` or ``"elastic"``."""
-        return self.case.levels.force
-
-    @property
-    def level_method(self) -> str:
+    def level_method(self) -> LevelsMethod:
         """Method of the levels, ``"exact"`` or ``"fft"``."""
         return self.case.levels.method
 
-    def _is_elastic(self, kind: str | None) -> bool:
-        chosen = kind or self.judged_force
-        require_choice("force", chosen, FORCES)
-        return chosen == "elastic"
-
     def levels(
-        self, bands: str = "octave", method: str | None = None, force: str | None = None
+        self,
+        bands: BandSet = "octave",
+        method: LevelsMethod | None = None,
+        force: LevelsForce | None = None,
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, dB, shape (n_band,).
 
@@ -209,7 +192,9 @@ class Impact:
             method or self.level_method,
         )
 
-    def conformity(self, source: str | None = None, force: str | None = None) -> Conformity:
+    def conformity(
+        self, source: LimitsSource | None = None, force: LevelsForce | None = None
+    ) -> Conformity:
         """Return the verdict of the standards.
 
         Parameters
@@ -229,11 +214,32 @@ class Impact:
             source or self.case.limits.source,
         )
 
+    def plot(self) -> Figure:
+        """Return a figure of the force that the case judges, and of its octave levels."""
+        figure: Figure = MAKERS["figure"](self)
+        return figure
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return histories, levels of both forces and numbers, with units and provenance.
+
+        Snapshots are left out. Raise InputError where xarray is not installed.
+        """
+        dataset: xr.Dataset = MAKERS["dataset"](self)
+        return dataset
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the histories over time, with the columns of ``force.csv`` and `channels`.
+
+        Raise InputError where pandas is not installed.
+        """
+        table: pd.DataFrame = MAKERS["table"](self)
+        return table
+
 
 def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     ball: Ball | None = None,
     drop: Drop | None = None,
-    model: str = "hollow_sphere",
+    model: ModelName | ModelOptions = "hollow_sphere",
     *,
     sample_rate: float = Sampling.sample_rate,
     duration: float = Sampling.duration,
@@ -248,7 +254,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         By default the rubber ball of the paper, from 1 m.
     model
         ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
-        one), ``"finite_element"``, ``"measured_modes"`` or ``"hunt_crossley"``.
+        one), ``"finite_element"``, ``"measured_modes"`` or ``"hunt_crossley"``; or an object of
+        the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.
     duration
@@ -317,16 +324,6 @@ def new_impact(case: Case, found: Bundle) -> Impact:
         channels=found.get("channels", {}),
         facts=found.get("facts", {}),
         remarks=tuple(map(text, found.get("remarks", {}).values())),
-        motion=_motion(**found["motion"]) if "motion" in found else None,
+        motion=new_motion(**found["motion"]) if "motion" in found else None,
         **scalars,
-    )
-
-
-def _motion(**fields: NDArray[np.float64]) -> Motion:
-    """Return snapshots with the axes in the order of `Motion`."""
-    return Motion(
-        **{
-            name: values if name == "start" else np.moveaxis(values, -1, 0)
-            for name, values in fields.items()
-        }
     )

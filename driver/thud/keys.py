@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from thud._schema import GROUPS, KEYS
+from thud.checks import refuse, suggestion
 from thud.errors import InputError
 from thud.key import Key
 
@@ -50,8 +51,8 @@ def find_key(name: str, model: str) -> tuple[Key, int | None]:
     match = re.fullmatch(r"(\w+)(?:\(([1-9]\d{0,3})\))?", str(name))
     key = known.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
-        message = f"{name!r} is not a key of {model}; allowed: {', '.join(known)}"
-        raise InputError(message)
+        hint = suggestion(str(name).partition("(")[0], known)
+        refuse(f"{name!r} is not a key of {model}{hint}", ", ".join(known))
     return key, int(match[2]) if match[2] else None
 
 

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast, get_args
 
 import numpy as np
 
 from thud._api import call_direct, level_api, trimmed
+from thud._schema import LevelsMethod
 from thud.checks import require_array, require_choice, require_real
+from thud.criteria import Conformity, Criterion
+from thud.display import Displayed
 from thud.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from numpy.typing import ArrayLike, NDArray
+
+    from thud._schema import BandSet, LimitsSource
 
 
 def _names(values: Iterable[bytes]) -> tuple[str, ...]:
@@ -25,12 +29,14 @@ def _names(values: Iterable[bytes]) -> tuple[str, ...]:
 
 
 _N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()
-BANDWIDTHS, SOURCES = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
+_sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
+BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
+SOURCES = cast("tuple[LimitsSource, ...]", _sources)
 _MAX_PEAKS = 2**31
 
 
-@dataclass(frozen=True)
-class Bands:
+@dataclass(frozen=True, repr=False)
+class Bands(Displayed):
     """Frequency bands of base 10 (IEC 61260-1), ascending; the arrays are read-only.
 
     Attributes
@@ -48,67 +54,19 @@ class Bands:
     lower: NDArray[np.float64]
     upper: NDArray[np.float64]
 
+    def __repr__(self) -> str:
+        """Return the nominal frequencies."""
+        return f"<Bands: {', '.join(f'{f:g}' for f in self.nominal)} Hz>"
 
-@dataclass(frozen=True)
-class Criterion:
-    """One quantity and the range that the standards require.
-
-    Attributes
-    ----------
-    name, unit : str
-        Name and unit of the quantity; levels in dB re 1 N.
-    value, lower, upper : float
-        Value of the source, and the limits, which are allowed values.
-    conforms : bool
-        Whether the value lies within the limits.
-    """
-
-    name: str
-    unit: str
-    value: float
-    lower: float
-    upper: float
-    conforms: bool
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        columns = vars(self)
+        rows = zip(*columns.values(), strict=True)
+        header = tuple(f"{name}, Hz" for name in columns)
+        return [header, *(tuple(f"{f:.4g}" for f in row) for row in rows)]
 
 
-@dataclass(frozen=True)
-class Conformity:
-    """Verdict on a source.
-
-    Attributes
-    ----------
-    source : str
-        Source whose limits apply.
-    criteria : tuple of Criterion
-        Octave levels, contact time, restitution, number of peaks, mass, drop height.
-    """
-
-    source: str
-    criteria: tuple[Criterion, ...]
-
-    @property
-    def conforms(self) -> bool:
-        """Whether all criteria are met."""
-        return all(criterion.conforms for criterion in self.criteria)
-
-    @property
-    def verdict(self) -> str:
-        """``"conforms"``, ``"does not conform"`` or ``"cannot be decided"``.
-
-        The last where all criteria are met but those whose value, NaN, is not known.
-        """
-        if self.conforms:
-            return "conforms"
-        missed = [criterion for criterion in self.criteria if not criterion.conforms]
-        known = any(not math.isnan(criterion.value) for criterion in missed)
-        return "does not conform" if known else "cannot be decided"
-
-    def __bool__(self) -> bool:
-        """Return whether all criteria are met."""
-        return self.conforms
-
-
-def get_bands(bands: str = "octave") -> Bands:
+def get_bands(bands: BandSet = "octave") -> Bands:
     """Return the octaves 31.5 to 500 Hz or the thirds 25 to 630 Hz.
 
     Parameters
@@ -121,15 +79,14 @@ def get_bands(bands: str = "octave") -> Bands:
     InputError
         Where `bands` is not one of these.
     """
-    if not isinstance(bands, str):
-        require_choice("bands", bands, BANDWIDTHS)
+    require_choice("bands", bands, BANDWIDTHS)
     return _bands(bands)
 
 
 @cache
 def _bands(name: str) -> Bands:
     """Return the bands of a name."""
-    (n_band,) = call_direct(level_api.count_bands, _word(name))
+    (n_band,) = call_direct(level_api.count_bands, name)
     columns = level_api.get_bands(name, n_band)
     for column in columns:
         column.setflags(write=False)
@@ -137,7 +94,10 @@ def _bands(name: str) -> Bands:
 
 
 def force_exposure_levels(
-    force: ArrayLike, sample_rate: float, bands: str = "octave", method: str = "exact"
+    force: ArrayLike,
+    sample_rate: float,
+    bands: BandSet = "octave",
+    method: LevelsMethod = "exact",
 ) -> NDArray[np.float64]:
     """Return the force exposure levels of a force record.
 
@@ -169,9 +129,10 @@ def force_exposure_levels(
         rate, the bands or the method are invalid.
     """
     count = len(get_bands(bands).nominal)
+    require_choice("method", method, get_args(LevelsMethod))
     record = _record(force)
     rate = _number("sample_rate", sample_rate)
-    (levels,) = call_direct(level_api.force_exposure, record, rate, bands, _word(method), count)
+    (levels,) = call_direct(level_api.force_exposure, record, rate, bands, method, count)
     result: NDArray[np.float64] = levels
     return result
 
@@ -211,7 +172,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     peaks: int,
     mass: float,
     drop_height: float,
-    source: str = "rubber_ball",
+    source: LimitsSource = "rubber_ball",
 ) -> Conformity:
     """Return the verdict of the standards on a source.
 
@@ -237,6 +198,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     InputError
         Where the source is not known or `levels` are not five numbers.
     """
+    require_choice("source", source, SOURCES)
     octaves = _record(levels, "levels")
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if octaves.shape != nominal.shape:
@@ -256,7 +218,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     }
     time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
     names, units, value, lower, upper, met = call_direct(
-        level_api.judge, _word(source), octaves, time, bounce, int(peaks), kilograms, height,
+        level_api.judge, source, octaves, time, bounce, int(peaks), kilograms, height,
         _N_CRITERION,
     )  # fmt: skip
     rows = zip(_names(names), _names(units), value, lower, upper, met, strict=True)
@@ -266,7 +228,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
     )
 
 
-def octave_limits(source: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
     count = len(get_bands(BANDWIDTHS[0]).nominal)
     octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
@@ -286,8 +248,3 @@ def _number(name: str, value: object) -> float:
         shown = "a very large number" if isinstance(error, OverflowError) else repr(value)
         message = f"{name} = {shown} is not a number; allowed: real numbers"
         raise InputError(message) from error
-
-
-def _word(value: object) -> bytes:
-    """Return a word in ASCII, for the library."""
-    return str(value).encode("ascii", "replace")

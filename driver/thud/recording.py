@@ -9,13 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.columns import read_table
+from thud.display import MAKERS, Displayed
 from thud.errors import InputError
-from thud.levels import Conformity, force_exposure_levels, judge, peak_count
+from thud.levels import force_exposure_levels, judge, peak_count
 
 if TYPE_CHECKING:
     import os
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from thud._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
+    from thud.criteria import Conformity
 
 # Fraction of the maximum force below which a recording counts as noise.
 NOISE = 0.01
@@ -31,7 +36,7 @@ DIGITS = 17
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(Displayed):
     """Recorded force of one impact.
 
     Attributes
@@ -91,6 +96,17 @@ class Recording:
         time = (np.arange(rows) - first) * step
         return cls(time, force.copy(), 1 / step, begin + first * step)
 
+    def __repr__(self) -> str:
+        """Return the main numbers of the recording, without its arrays."""
+        return (
+            f"<Recording, {len(self.time)} samples at {self.sample_rate:g} Hz: "
+            f"contact {1e3 * self.contact_time:.2f} ms, peak {self.peak_force:.0f} N>"
+        )
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return self.conformity().rows()
+
     @property
     def touch_time(self) -> float:
         """Time of first touch, s: 0."""
@@ -112,33 +128,37 @@ class Recording:
         """Not known from one impact: NaN."""
         return float("nan")
 
-    @property
-    def judged_force(self) -> str:
-        """Force that a force plate measures: ``"floor"``."""
+    def judged(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+        """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
     @property
-    def level_method(self) -> str:
+    def level_method(self) -> LevelsMethod:
         """Method of the levels: ``"exact"``."""
         return "exact"
 
-    def force(self, kind: str | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
+    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
         """Return the force, N, shape (n_sample,), for any `kind`."""
         return self.record
 
-    def peak(self, force: str | None = None) -> float:  # noqa: ARG002 - there is one
+    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - there is one
         """Return the maximum force, N."""
         return self.peak_force
 
     def levels(
-        self, bands: str = "octave", method: str | None = None, force: str | None = None
+        self,
+        bands: BandSet = "octave",
+        method: LevelsMethod | None = None,
+        force: LevelsForce | None = None,
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, dB, shape (n_band,); see `Impact.levels`."""
         return force_exposure_levels(
             self.force(force), self.sample_rate, bands, method or self.level_method
         )
 
-    def conformity(self, source: str = "rubber_ball", force: str | None = None) -> Conformity:
+    def conformity(
+        self, source: LimitsSource = "rubber_ball", force: LevelsForce | None = None
+    ) -> Conformity:
         """Return the verdict of the standards; see `Impact.conformity`.
 
         Restitution, mass and drop height are not known from one record: NaN.
@@ -152,6 +172,11 @@ class Recording:
             math.nan,
             source,
         )
+
+    def plot(self, source: LimitsSource = "rubber_ball") -> Figure:
+        """Return a figure of the force, and of its octave levels over the limits of a source."""
+        figure: Figure = MAKERS["figure"](self, source)
+        return figure
 
 
 def _even_grid(time: NDArray[np.float64], name: str) -> tuple[float, float]:

@@ -12,8 +12,10 @@ import numpy as np
 
 from thud._schema import SCALARS
 from thud.case import Case
+from thud.checks import refuse
 from thud.errors import InputError
-from thud.impact import Impact, Motion
+from thud.impact import Impact
+from thud.motion import Motion
 
 if TYPE_CHECKING:
     import os
@@ -47,6 +49,8 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         channels = folder / "channels.csv"
         found = _table(channels) if channels.exists() else {}
         motion = _read_motion(folder) if (folder / "motion.pvd").exists() else None
+    except FileNotFoundError as error:
+        refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"{directory}: cannot be read ({error}); allowed: the results of an impact"
         raise InputError(message) from error

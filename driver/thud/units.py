@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+import re
 from decimal import Decimal
 
-from thud.errors import InputError
+from thud.checks import refuse, require_kind, shown, suggestion
 
 # By the unit of a key: the allowed units and their power of ten.
 MULTIPLES: dict[str, dict[str, int]] = {
@@ -21,6 +23,8 @@ MULTIPLES: dict[str, dict[str, int]] = {
     "K": {"K": 0},
     "": {"1": 0, "%": -2},
 }
+# The beginning of a quantity.
+NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
 HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
 
@@ -33,9 +37,42 @@ def power_of(unit: object, key_unit: str, place: str) -> int:
     # Other units have no multiples.
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
     if not isinstance(unit, str) or unit not in multiples:
-        message = f"{place}: unit {unit!r} does not fit; allowed: {', '.join(multiples)}"
-        raise InputError(message)
+        hint = suggestion(unit, multiples)
+        refuse(f"{place}: unit {unit!r} does not fit{hint}", ", ".join(multiples))
     return multiples[unit]
+
+
+def quantity(text: str) -> float:
+    """Return a number with a unit in SI units; temperatures in degC.
+
+    Parameters
+    ----------
+    text
+        The number and one of the units that studies take, such as ``"32 mm"``.
+
+    Raises
+    ------
+    InputError
+        Where it is no finite number, or the unit is not known; lists the units.
+
+    Examples
+    --------
+    >>> quantity("32 mm")
+    0.032
+    """
+    require_kind("quantity", text, str)
+    units = {unit: power for multiples in MULTIPLES.values() for unit, power in multiples.items()}
+    match = NUMBER.match(text)
+    if match is None or not math.isfinite(float(match[1])):
+        refuse(f"quantity = {shown(text)} is not a number and its unit", "such as '32 mm'")
+    unit = text[match.end() :].strip()
+    if unit not in units:
+        what = f"unit {unit!r} is not known{suggestion(unit, units)}" if unit else "unit is missing"
+        refuse(f"quantity = {shown(text)}: {what}", ", ".join(units))
+    value = scaled(float(match[1]), units[unit])
+    if not math.isfinite(value):
+        refuse(f"quantity = {shown(text)} is too large", "finite numbers")
+    return value + 0.0
 
 
 def scaled(value: float, power: int) -> float:

@@ -16,11 +16,12 @@ module thud_api
    use thud_kinds, only: int64, int8, wp
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: load_case, outcome_type, run_case
+   use thud_system, only: begin_call, end_call, end_all_calls => end_calls
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_text, collect, describe_library, effective_case, free_modes, loss_factors, run, solve
+   public :: check_text, collect, describe_library, effective_case, end_calls, free_modes, loss_factors, run, solve
 
 contains
 
@@ -42,6 +43,12 @@ contains
       call bundle%copy_values(values)
       deallocate (bundle)
    end subroutine collect
+
+   !> Ends the calls that are running in other threads, as an interrupt does.
+   subroutine end_calls()
+
+      call end_all_calls()
+   end subroutine end_calls
 
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
@@ -109,11 +116,27 @@ contains
       type(error_type), allocatable :: error
 
       allocate (bundle)
+      call begin_call()
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
-      if (.not. allocated(error)) call add_history(bundle, results%history)
+      if (.not. allocated(error)) call add_results(bundle, case, results)
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine solve
+
+   !> Adds what a case has computed to a bundle.
+   subroutine add_results(bundle, case, results)
+      type(bundle_type), intent(inout) :: bundle
+      type(case_type), intent(in) :: case
+      type(results_type), intent(in) :: results
+      integer :: i
+
+      if (case%has_impact) call add_history(bundle, results%history)
+      if (case%has_modes) call add_modes(bundle, results%modes)
+      do i = 1, size(results%remark)
+         call bundle%add_text('remarks.'//to_text(i), trim(results%remark(i)))
+      end do
+   end subroutine add_results
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, history)
@@ -137,9 +160,6 @@ contains
       call bundle%add_array('samples.floor_force', n, history%floor_force)
       do i = 1, size(history%part_name)
          call bundle%add_array('parts.'//history%part_name(i), n, history%part(:, i))
-      end do
-      do i = 1, size(history%remark)
-         call bundle%add_text('remarks.'//to_text(i), trim(history%remark(i)))
       end do
       if (allocated(history%channel)) then
          do i = 1, size(history%channel_name)
@@ -171,10 +191,12 @@ contains
       type(error_type), allocatable :: error
 
       allocate (bundle)
+      call begin_call()
       call read_case(text, 'python', case, error)
       case%has_impact = .false.
       if (.not. allocated(error)) call compute_case(case, results, error)
-      if (.not. allocated(error)) call add_modes(bundle, results%modes)
+      if (.not. allocated(error)) call add_results(bundle, case, results)
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine free_modes
 
@@ -240,6 +262,7 @@ contains
       integer :: i
 
       allocate (bundle)
+      call begin_call()
       if (progress == 1) call begin_progress()
       call run_case(path, output, case, results, outcome, error)
       call end_progress()
@@ -252,9 +275,9 @@ contains
             call bundle%add_text('run_remarks.'//to_text(i), outcome%remarks(i)%text)
          end do
          call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
-         if (case%has_impact) call add_history(bundle, results%history)
-         if (case%has_modes) call add_modes(bundle, results%modes)
+         call add_results(bundle, case, results)
       end if
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine run
 

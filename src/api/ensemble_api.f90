@@ -8,6 +8,7 @@ module thud_ensemble_api
    use thud_kinds, only: int64, wp
    use thud_many, only: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
    use thud_sampling, only: get_sample_count
+   use thud_system, only: begin_call, end_call
    use thud_text, only: newline, split
    implicit none (type, external)
    private
@@ -90,6 +91,7 @@ contains
       character(len=:), allocatable :: reasons
 
       allocate (bundle)
+      call begin_call()
       call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
@@ -109,6 +111,7 @@ contains
          call bundle%add_text('reasons', reasons)
          call leave_many(many)
       end if
+      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine drop_many
 

@@ -7,6 +7,7 @@ module thud_level_api
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type, source_names
+   use thud_system, only: begin_call, end_call
    use thud_transform, only: get_low_pass
    implicit none (type, external)
    private
@@ -97,8 +98,10 @@ contains
       type(error_type), allocatable :: error
 
       levels = 0.0_wp
+      call begin_call()
       call find_bands(set, bands, error)
       if (.not. allocated(error)) call get_force_exposure_levels(force, sample_rate, bands, method, levels, error)
+      call end_call()
       call get_status(error, status, message)
    end subroutine force_exposure
 

@@ -50,7 +50,7 @@ contains
 
    !> Does what the command line asks for.
    subroutine execute(exit_code)
-      !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted.
+      !> 0 done, 1 bad input or usage, 2 numerical failure, 3 checked and not conforming, 130 interrupted, 143 terminated.
       integer, intent(out) :: exit_code
       type(request_type) :: request
       type(case_type), target :: case
@@ -232,7 +232,7 @@ contains
          //'  -h, --help         show this text'//newline &
          //'  --version          show the version'//newline//newline &
          //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming (--check),'//newline &
-         //'130 interrupted.'
+         //'130 interrupted, 143 terminated.'
    end function help
 
 end module thud_command_line

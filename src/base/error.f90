@@ -4,7 +4,7 @@ module thud_error
    implicit none (type, external)
    private
 
-   public :: error_type, bad_input, interrupted, numerical_failure, input_error, numerical_error, get_status
+   public :: error_type, bad_input, signal_base, numerical_failure, input_error, numerical_error, get_status
 
    !> The input cannot be used; also the exit code of the executable.
    integer, parameter :: bad_input = 1
@@ -12,12 +12,12 @@ module thud_error
    !> The computation broke down; also the exit code of the executable.
    integer, parameter :: numerical_failure = 2
 
-   !> The user has interrupted the work; also the exit code of the executable.
-   integer, parameter :: interrupted = 130
+   !> Codes of interrupts, and exit codes of the executable: this plus the number of the signal.
+   integer, parameter :: signal_base = 128
 
    !> An error, in one sentence for the user.
    type :: error_type
-      !> `bad_input`, `numerical_failure` or `interrupted`.
+      !> `bad_input`, `numerical_failure`, or `signal_base` plus the number of the signal.
       integer :: code = numerical_failure
       !> One sentence that names the place, the value and what is allowed.
       character(len=:), allocatable :: message

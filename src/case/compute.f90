@@ -7,7 +7,7 @@ module thud_compute
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
-   use thud_remarks, only: get_remarks
+   use thud_remarks, only: get_remarks, remark_length
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    implicit none (type, external)
@@ -36,6 +36,8 @@ module thud_compute
       type(verdict_type) :: verdict
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
+      !> What is possible but not plausible: [n_remark].
+      character(len=remark_length), allocatable :: remark(:)
    end type results_type
 
 contains
@@ -49,11 +51,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (case%has_modes) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, results%modes, error)
-      if (allocated(error) .or. .not. case%has_impact) return
-      associate (model => case%models(get_model_number(case))%model)
-         call model%solve(case%ball, case%drop, case%sampling, results%history, error)
-      end associate
-      if (.not. allocated(error)) call get_remarks(case, results%history, results%history%remark)
+      if (allocated(error)) return
+      if (case%has_impact) then
+         associate (model => case%models(get_model_number(case))%model)
+            call model%solve(case%ball, case%drop, case%sampling, results%history, error)
+         end associate
+      end if
+      if (.not. allocated(error)) call get_remarks(case, results%history, results%remark)
    end subroutine compute_case
 
    !> Levels and criteria of the force history of a case.

@@ -11,6 +11,7 @@ module thud_many
    use thud_field, only: check_fields, field_type, key_length, list_type
    use thud_force_history, only: force_count, get_scalars, outcome_count
    use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
+   use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count
@@ -210,7 +211,7 @@ contains
       !> Forces are wanted too.
       logical, intent(in) :: forces
       type(many_type), intent(inout) :: many
-      !> As of `check_drops`, or there is no space in memory.
+      !> As of `check_drops`, there is no space in memory, or an interrupt.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: left(:)
       integer :: n_drop, i
@@ -230,6 +231,7 @@ contains
       !$omp parallel num_threads(threads) if (size(left) > 1)
       call solve_singly()
       !$omp end parallel
+      call check_interrupt(error)
 
    contains
 
@@ -245,7 +247,7 @@ contains
          own%has_modes = .false.
          !$omp do schedule(dynamic)
          do drop = 1, size(left)
-            call solve_one(own, fields, columns, values(:, left(drop)), left(drop), many)
+            if (.not. is_interrupted()) call solve_one(own, fields, columns, values(:, left(drop)), left(drop), many)
          end do
          !$omp end do
       end subroutine solve_singly

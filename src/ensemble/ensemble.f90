@@ -11,6 +11,7 @@ module thud_ensemble
    use thud_constants, only: reference_force, reference_time
    use thud_error, only: error_type, input_error, numerical_error
    use thud_force_history, only: force_count
+   use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count, sampling_type
@@ -101,7 +102,7 @@ contains
       logical, intent(out) :: met(:, :)
       !> Forces, N, NaN without outcome; of no size where they are not wanted: [n_sample, force_count, n_set].
       real(wp), intent(out) :: forces(:, :, :)
-      !> The sampling cannot be used, its records do not fit into memory, or the source is not known.
+      !> The sampling cannot be used, its records do not fit into memory, the source is not known, or an interrupt.
       type(error_type), allocatable, intent(out) :: error
       type(source_limits_type) :: limits
       integer, allocatable :: order(:), first(:)
@@ -127,6 +128,7 @@ contains
          call set_workspace(workspace, sampling, limits, get_class_window(size(projections%window)))
          !$omp do schedule(dynamic)
          do block = 1, size(first) - 1
+            call check_interrupt(workspace%error)
             if (.not. allocated(workspace%error)) call run_block(workspace, order(first(block):first(block + 1) - 1))
          end do
          !$omp end do

@@ -13,6 +13,7 @@ module thud_finite_element
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
       max_steps, new_impact_run
+   use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
    use thud_motion, only: new_motion, take_snapshot
@@ -280,7 +281,7 @@ contains
       end if
    end subroutine follow_contact
 
-   !> Refuses a ball that cannot be computed any further.
+   !> Refuses a ball that cannot, or need not, be computed any further.
    subroutine check_run(run, time, first_energy, history, error)
       type(impact_run_type), intent(in) :: run
       !> Time since the record began, s; energy of the first sample, J.
@@ -291,6 +292,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: residual
 
+      call check_interrupt(error)
+      if (allocated(error)) return
       if (run%state%failure == cavity_closed) then
          error = numerical_error(trim(place(time))//' the cavity has no volume left; ' &
             //'allowed: a lower height, a stiffer ball')

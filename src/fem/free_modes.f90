@@ -6,6 +6,7 @@ module thud_free_modes
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type
+   use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_legendre, only: get_legendre
    use thud_mesh, only: get_mesh_fields, mesh_options_type, mesh_type, new_mesh
@@ -139,7 +140,7 @@ contains
       failed = .false.
       ! ARPACK keeps its state in static memory: one thread at a time.
       !$omp critical (arpack)
-      iterations: do
+      iterations: do while (.not. (failed .or. is_interrupted()))
          call dsaupd(ido, 'G', n, 'LM', count, eigenvalue_tolerance, resid, ncv, basis, n, iparam, ipntr, workd, workl, &
             size(workl), info)
          associate (x => workd(ipntr(1):ipntr(1) + n - 1), y => workd(ipntr(2):ipntr(2) + n - 1))
@@ -157,13 +158,14 @@ contains
                exit iterations
             end select
          end associate
-         if (failed) exit iterations
       end do iterations
-      if (failed) info = volume_lost
+      if (failed .or. is_interrupted()) info = volume_lost
       allocate (vector(n, count))
       if (info == 0) call dseupd(.true., 'A', select, eigenvalue, vector, n, matrices%shift, 'G', n, 'LM', count, &
          eigenvalue_tolerance, resid, ncv, basis, n, iparam(1:7), ipntr, workd, workl, size(workl), info)
       !$omp end critical (arpack)
+      call check_interrupt(error)
+      if (allocated(error)) return
       if (info /= 0) error = numerical_error('&modes: the Lanczos method fails (info = '//to_text(info) &
          //' of ARPACK); allowed: fewer modes, or a finer mesh')
    end subroutine find_eigenpairs

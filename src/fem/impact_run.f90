@@ -88,7 +88,7 @@ contains
    end function new_impact_run
 
    !> Number of steps in a sampling interval that keeps the run stable.
-   pure subroutine choose_step(run, interval, safety, min_steps, n_step)
+   subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
       !> Sampling interval, s; part of the limit of stability to be used.
       real(wp), intent(in) :: interval, safety

@@ -6,8 +6,9 @@
 module thud_mode_matrices
    use thud_ball, only: ball_type, get_density
    use thud_error, only: error_type, numerical_error
+   use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
-   use thud_lapack, only: dpbtrf, dpbtrs, dsbmv
+   use thud_lapack, only: dgemm, dpbtrf, dpbtrs, dpotf2, dsbmv, dsyrk, dtrsm
    use thud_mesh, only: mesh_type
    use thud_mixed_element, only: get_mixed_element, n_dilatation, n_node
    implicit none (type, external)
@@ -73,7 +74,9 @@ contains
       matrices%shift = -0.1_wp*ball%youngs_modulus/density/ball%outer_radius**2
       call number_unknowns(mesh, matrices)
       call assemble(mesh, shear_modulus, density, matrices)
-      call dpbtrf('L', matrices%n, matrices%n_band, matrices%factor, matrices%n_band + 1, info)
+      call factorise(matrices%n, matrices%n_band, matrices%factor, info)
+      call check_interrupt(error)
+      if (allocated(error)) return
       if (info /= 0) error = numerical_error('&ball: poisson_ratio or wall_thickness make the stiffness of the ball ' &
          //'too ill-conditioned for double precision; allowed: less extreme values')
    end subroutine new_mode_matrices
@@ -113,7 +116,7 @@ contains
    end subroutine number_unknowns
 
    !> Adds up the matrices of all elements.
-   pure subroutine assemble(mesh, shear_modulus, density, matrices)
+   subroutine assemble(mesh, shear_modulus, density, matrices)
       type(mesh_type), intent(in) :: mesh
       !> Shear modulus, Pa; density, kg/m3.
       real(wp), intent(in) :: shear_modulus, density
@@ -123,11 +126,18 @@ contains
       real(wp) :: distortion(2*n_node, 2*n_node), mass(n_node, n_node), inertia(2*n_node, 2*n_node)
       integer :: a, b, i, j, element, row, column
 
-      allocate (matrices%factor(0:matrices%n_band, matrices%n), matrices%mass(0:matrices%n_band, matrices%n), source=0.0_wp)
+      allocate (matrices%factor(0:matrices%n_band, matrices%n), matrices%mass(0:matrices%n_band, matrices%n))
       allocate (matrices%dilatation(n_dilatation, 2*n_node, size(matrices%place, 2)))
       inertia = 0.0_wp
+      do column = 1, matrices%n
+         ! The largest matrices fill gigabytes.
+         if (is_interrupted()) return
+         matrices%factor(:, column) = 0.0_wp
+         matrices%mass(:, column) = 0.0_wp
+      end do
       element = 0
       do j = 0, ubound(mesh%r, 1) - 2, 2
+         if (is_interrupted()) return
          do i = 0, ubound(mesh%r, 2) - 2, 2
             element = element + 1
             associate (place => matrices%place(:, element), dilatation => matrices%dilatation(:, :, element))
@@ -151,6 +161,49 @@ contains
          end do
       end do
    end subroutine assemble
+
+   !> Cholesky factor of a banded matrix. Wide bands take LAPACK minutes without a pause: they are factored by the
+   !> algorithm of its dpbtrf, block after block.
+   subroutine factorise(n, n_band, a, info)
+      !> Numbers of unknowns and of diagonals below the main one.
+      integer, intent(in) :: n, n_band
+      !> The matrix, then the factor, lower band: [n_band + 1, n].
+      real(wp), intent(inout) :: a(n_band + 1, n)
+      !> 0, or not where the matrix is not positive definite; not meant after an interrupt.
+      integer, intent(out) :: info
+      integer, parameter :: block = 32
+      ! The part of a block that is cut off by the band, a triangle.
+      real(wp) :: corner(block, block)
+      integer :: i, j, width, inside, cut
+
+      info = 0
+      if (is_interrupted()) return
+      if (n_band <= 2*block) call dpbtrf('L', n, n_band, a, n_band + 1, info)
+      if (n_band <= 2*block) return
+      corner = 0.0_wp
+      do i = 1, n, block
+         if (is_interrupted()) return
+         width = min(block, n - i + 1)
+         call dpotf2('L', width, a(1, i), n_band, info)
+         if (info /= 0) return
+         if (i + width > n) exit
+         inside = min(n_band - width, n - i - width + 1)
+         cut = min(width, n - i - n_band + 1)
+         call dtrsm('R', 'L', 'T', 'N', inside, width, 1.0_wp, a(1, i), n_band, a(1 + width, i), n_band)
+         call dsyrk('L', 'N', inside, width, -1.0_wp, a(1 + width, i), n_band, 1.0_wp, a(1, i + width), n_band)
+         if (cut <= 0) cycle
+         do j = 1, width
+            corner(:min(j, cut), j) = a(n_band + 2 - j:n_band + 1 - j + min(j, cut), i + j - 1)
+         end do
+         call dtrsm('R', 'L', 'T', 'N', cut, width, 1.0_wp, a(1, i), n_band, corner, block)
+         call dgemm('N', 'T', cut, inside, width, -1.0_wp, corner, block, a(1 + width, i), n_band, 1.0_wp, &
+            a(1 + n_band - width, i + width), n_band)
+         call dsyrk('L', 'N', cut, width, -1.0_wp, corner, block, 1.0_wp, a(1, i + n_band), n_band)
+         do j = 1, width
+            a(n_band + 2 - j:n_band + 1 - j + min(j, cut), i + j - 1) = corner(:min(j, cut), j)
+         end do
+      end do
+   end subroutine factorise
 
    !> Mass times displacements.
    pure subroutine apply_mass(matrices, x, y)
@@ -182,6 +235,7 @@ contains
       if (.not. matrices%incompressible) return
       pressure = 0.0_wp
       do iteration = 1, max_iterations
+         if (is_interrupted()) exit
          padded(:matrices%n) = x
          padded(matrices%n + 1) = 0.0_wp
          do element = 1, size(matrices%place, 2)

@@ -7,6 +7,7 @@
 module thud_stable_step
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
    use thud_floor_contact, only: floor_contact_type
+   use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    implicit none (type, external)
    private
@@ -41,7 +42,7 @@ contains
    end function get_first_direction
 
    !> Growth of a step, by some iterations of the power iteration.
-   pure subroutine find_growth(body, contact, position, velocity, interval, n_iteration, direction, growth)
+   subroutine find_growth(body, contact, position, velocity, interval, n_iteration, direction, growth)
       !> The body; it stays as it is.
       type(elastic_body_type), intent(inout) :: body
       type(floor_contact_type), intent(in) :: contact
@@ -55,7 +56,7 @@ contains
       !> Direction of the fastest motion, better after each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
       !> The growth; of the body from below, close after tens of iterations; of the springs of the floor from
-      !> above. Huge where there are no forces.
+      !> above. Huge where there are no forces, or after an interrupt.
       real(wp), intent(out) :: growth
       real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
       real(wp) :: step, thickness
@@ -74,7 +75,7 @@ contains
          step = trial*thickness/maxval(abs(direction))
          call get_internal_forces(body, position + step*direction, velocity + 2*step/interval*direction, interval, .false., &
             there, state)
-         if (state%failure /= no_failure) then
+         if (state%failure /= no_failure .or. is_interrupted()) then
             growth = huge(growth)
             return
          end if

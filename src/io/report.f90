@@ -114,10 +114,12 @@ contains
    end function get_levels_csv
 
    !> The scalars of a run as a namelist file.
-   function get_summary(case, history, verdict) result(text)
+   function get_summary(case, history, verdict, remark) result(text)
       type(case_type), intent(in) :: case
       type(force_history_type), intent(in) :: history
       type(verdict_type), intent(in) :: verdict
+      !> Remarks on the case: [n].
+      character(len=*), intent(in) :: remark(:)
       !> Text of `summary.nml`.
       character(len=:), allocatable :: text
       real(wp) :: scalars(size(scalar_fields))
@@ -129,7 +131,7 @@ contains
       do i = 1, size(scalars)
          text = text//line(trim(scalar_fields(i)%name), to_text(scalars(i)), trim(scalar_fields(i)%unit))
       end do
-      text = text//'/'//newline//newline//fact_group(history)//remark_group(history)//'&verdict'//newline &
+      text = text//'/'//newline//newline//fact_group(history)//remark_group(remark)//'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
@@ -161,13 +163,14 @@ contains
    end function fact_group
 
    !> Remarks as a namelist group.
-   function remark_group(history) result(text)
-      type(force_history_type), intent(in) :: history
+   function remark_group(remark) result(text)
+      !> The remarks: [n].
+      character(len=*), intent(in) :: remark(:)
       !> The group; empty where there are none.
       character(len=:), allocatable :: text
 
       text = ''
-      if (size(history%remark) > 0) text = '&remarks'//newline//line('remark', join_quoted(history%remark), '') &
+      if (size(remark) > 0) text = '&remarks'//newline//line('remark', join_quoted(remark), '') &
          //'/'//newline//newline
    end function remark_group
 

@@ -5,9 +5,10 @@
 !> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
-   use thud_error, only: error_type, input_error, interrupted
+   use thud_error, only: error_type, input_error
    use thud_file, only: read_text_file, text_file_type
    use thud_file_set, only: add_names, clear_workspace, manifest, read_names, replace_set
+   use thud_interrupt, only: check_interrupt
    use thud_system, only: can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
       get_system_message, keep_interrupts, list_directory, lock_directory, name_length, pass_interrupts, remove_file, &
       rename_file, resolve_path, write_text
@@ -198,7 +199,7 @@ contains
 
       if (status == 0 .or. allocated(error)) return
       if (status < 0) then
-         error = error_type(interrupted, 'interrupted; nothing was written')
+         call check_interrupt(error)
       else
          error = input_error('--output '//directory%path//': '//trim(directory%name)//' cannot be written (' &
             //get_system_message(status)//'); allowed: a directory that you may write to, with space on its disk')

@@ -12,7 +12,7 @@ module thud_run
    use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
    use thud_system, only: get_free_bytes
-   use thud_table, only: get_modes_table, get_table
+   use thud_table, only: get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
    implicit none (type, external)
    private
@@ -119,9 +119,8 @@ contains
       call write_results(outcome%directory, input, files, differs, error)
       if (allocated(error)) return
       if (differs) call outcome%add_remark(path, replaces//outcome%directory)
-      if (.not. case%has_impact) return
-      do i = 1, size(results%history%remark)
-         call outcome%add_remark(path, trim(results%history%remark(i)))
+      do i = 1, size(results%remark)
+         call outcome%add_remark(path, trim(results%remark(i)))
       end do
    end subroutine store_case
 
@@ -163,14 +162,15 @@ contains
          at = at + size(modes_names)
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
+      if (.not. case%has_impact) outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_impact) return
       associate (history => results%history, verdict => results%verdict)
          outcome%conforms = is_conforming(case, verdict)
-         outcome%table = outcome%table//newline//get_table(case, history, verdict)
+         outcome%table = outcome%table//newline//get_table(case, history, verdict)//get_defaults_line(case)
          files(at + 1:at + size(file_names))%name = file_names
          files(at + 1)%content = get_force_csv(history)
          files(at + 2)%content = get_levels_csv(case, verdict)
-         files(at + 3)%content = get_summary(case, history, verdict)
+         files(at + 3)%content = get_summary(case, history, verdict, results%remark)
          at = at + size(file_names)
          if (allocated(history%channel)) then
             at = at + 1

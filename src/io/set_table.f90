@@ -1,6 +1,6 @@
 !> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
-!> commas or blanks separate the values, which may stand in quotes; decimal commas are allowed but with commas
-!> between unquoted values; empty lines and what follows a `#` are skipped.
+!> commas or blanks separate the values, as in the first line; they may stand in quotes. Decimal commas are allowed
+!> where commas do not separate; empty lines and what follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
    use thud_error, only: error_type, input_error
@@ -10,7 +10,7 @@ module thud_set_table
    use thud_many, only: column_type, find_columns
    use thud_suggestion, only: get_suggestion
    use thud_system, only: directory_exists, path_length
-   use thud_text, only: join_quoted, lower_case, quoted, replaced, to_text
+   use thud_text, only: join_quoted, lower_case, newline, quoted, replaced, to_text
    implicit none (type, external)
    private
 
@@ -27,6 +27,8 @@ module thud_set_table
       character(len=path_length) :: path = ''
       !> Its lines.
       type(line_reader_type) :: reader
+      !> What separates their cells.
+      character(len=1) :: separator = ' '
       !> The keys of its columns: [n_column].
       type(column_type), allocatable :: columns(:)
       !> Their names: [n_column].
@@ -63,6 +65,7 @@ contains
       if (.not. (there .or. allocated(error))) error = input_error(path//': the table is empty; allowed: keys in the ' &
          //'first line and one set in each of the others')
       if (.not. allocated(error)) then
+         table%separator = get_separator(line)
          call split_line(table, line, table%names, error)
       end if
       if (.not. allocated(error)) then
@@ -138,50 +141,80 @@ contains
       if (.not. there) call close_lines(table%reader)
    end subroutine next_line
 
-   !> Cells of a line: the first of tab, semicolon and comma that it holds separates them, else blanks.
+   !> Separator of a table: the first of tab, semicolon, comma and blank that its first line holds.
+   pure function get_separator(line) result(separator)
+      !> The first line.
+      character(len=*), intent(in) :: line
+      !> A line feed, which no line holds, where there is one column.
+      character(len=1) :: separator
+      character(len=*), parameter :: known = achar(9)//';, '
+      character(len=len(line)) :: structure
+      integer :: i
+
+      structure = get_structure(adjustl(line))
+      separator = newline
+      do i = len(known), 1, -1
+         if (index(trim(structure), known(i:i)) > 0) separator = known(i:i)
+      end do
+   end function get_separator
+
+   !> Cells of a line.
    subroutine split_line(table, line, cells, error)
       type(set_table_type), intent(in) :: table
       character(len=*), intent(in) :: line
       !> The cells, without blanks and quotes around them: [n_cell].
       character(len=cell_length), allocatable, intent(out) :: cells(:)
-      !> There are too many, or one is too long.
+      !> There are too many, one is too long, or a quote is not closed.
       type(error_type), allocatable, intent(out) :: error
-      character(len=1), parameter :: tab = achar(9)
       character(len=len(line)) :: rest, structure
-      character(len=1) :: separator
       integer :: i, n, at, length, last
 
       rest = adjustl(line)
       structure = get_structure(rest)
-      separator = ' '
-      if (index(structure, ',') > 0) separator = ','
-      if (index(structure, ';') > 0) separator = ';'
-      if (index(structure, tab) > 0) separator = tab
       last = len_trim(rest)
-      ! Spreadsheets may end lines with their separator.
-      if (separator == ';') last = verify(structure(:last), '; ', back=.true.)
-      allocate (cells(max_columns))
-      n = 0
-      at = 1
-      do while (at <= last + merge(1, 0, separator /= ' '))
-         length = index(structure(at:last)//separator, separator) - 1
-         if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
-            error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
-               //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
-            return
-         end if
-         n = n + 1
-         cells(n) = adjustl(rest(at:at + length - 1))
-         at = at + length + 1
-         if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
-      end do
+      associate (separator => table%separator)
+         ! Spreadsheets may end lines with their separator.
+         if (separator == ';') last = verify(structure(:last), '; ', back=.true.)
+         allocate (cells(max_columns))
+         n = 0
+         at = 1
+         do while (at <= last + merge(1, 0, separator /= ' '))
+            length = index(structure(at:last)//separator, separator) - 1
+            if (n == max_columns .or. len_trim(adjustl(rest(at:at + length - 1))) > cell_length) then
+               error = line_error(table, 'it has too many values or one that is too long; allowed: up to ' &
+                  //to_text(max_columns)//' values of up to '//to_text(cell_length)//' characters')
+               return
+            end if
+            n = n + 1
+            cells(n) = adjustl(rest(at:at + length - 1))
+            at = at + length + 1
+            if (separator == ' ') at = at + max(0, verify(structure(at:)//'x', ' ') - 1)
+         end do
+      end associate
       cells = cells(:n)
       do i = 1, n
-         length = len_trim(cells(i))
-         if (length > 1 .and. scan(cells(i)(1:1), '''"') == 1) cells(i) = cells(i)(2:length - 1)
+         call unquote(table, cells(i), error)
+         if (allocated(error)) return
          cells(i) = replaced(cells(i), ',', '.')
       end do
    end subroutine split_line
+
+   !> Removes the quotes around a cell, and the blanks inside them.
+   subroutine unquote(table, cell, error)
+      type(set_table_type), intent(in) :: table
+      character(len=cell_length), intent(inout) :: cell
+      !> The quote is not closed.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: last
+
+      if (scan(cell(1:1), '''"') == 0) return
+      last = len_trim(cell)
+      if (last > 1 .and. cell(last:last) == cell(1:1)) then
+         cell = adjustl(cell(2:last - 1))
+      else
+         error = line_error(table, 'a quote is not closed: '//trim(cell)//'; allowed: quotes that begin and end in one cell')
+      end if
+   end subroutine unquote
 
    !> A line with quoted text made of `x`, in which separators do not separate.
    pure function get_structure(line) result(structure)

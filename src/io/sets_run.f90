@@ -15,7 +15,7 @@ module thud_sets_run
    use thud_run, only: load_case, outcome_type, replaces
    use thud_set_report, only: get_set_header, get_set_rows
    use thud_set_table, only: open_set_table, read_sets, set_table_type
-   use thud_table, only: get_force_title, get_span_row
+   use thud_table, only: get_defaults_line, get_force_title, get_span_row
    use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
    private
@@ -80,6 +80,7 @@ contains
          //to_text(tally%sets)//' sets have no results, such as: '//trim(tally%failure))
       outcome%conforms = tally%conforming == tally%sets
       call describe(case, table, tally, outcome%table)
+      outcome%table = outcome%table//get_defaults_line(case)
    end subroutine run_sets
 
    !> Computes and writes chunk after chunk.
@@ -180,6 +181,8 @@ contains
       if (tally%computed == 0) return
       octaves = get_octaves()
       do i = 1, octave_count
+         ! Levels of different forces or methods have no common range.
+         if (any(table%names == 'force') .or. any(table%names == 'method')) exit
          text = text//get_span_row('level, '//get_band_name(octaves(i))//' Hz octave', tally%span(i + 1, :), 2, 'dB')
       end do
       text = text//get_span_row('contact time', 1.0e3_wp*tally%span(1, :), 3, 'ms')

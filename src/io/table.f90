@@ -12,7 +12,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_force_title, get_modes_table, get_span_row, get_table
+   public :: get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
 
 contains
 
@@ -53,8 +53,6 @@ contains
             //to_text(count(conforms(criteria)))//' of '//to_text(size(criteria))//' criteria.'//newline &
             //'  Levels in dB re 1 N, method '//trim(case%level_method)//'.'//newline
       end associate
-      if (case%left_out /= '') text = text//'  Defaults hold for'//trim(case%left_out)//', which the file leaves out.' &
-         //newline
 
    contains
 
@@ -73,6 +71,16 @@ contains
       end function level_row
 
    end function get_table
+
+   !> Which groups a file has left out.
+   function get_defaults_line(case) result(line)
+      type(case_type), intent(in) :: case
+      !> A line; empty where there are none.
+      character(len=:), allocatable :: line
+
+      line = ''
+      if (case%left_out /= '') line = '  Defaults hold for'//trim(case%left_out)//', which the file leaves out.'//newline
+   end function get_defaults_line
 
    !> Name of a force in words.
    pure function get_force_title(force) result(title)

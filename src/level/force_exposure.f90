@@ -12,6 +12,7 @@ module thud_force_exposure
    use thud_band, only: band_type
    use thud_constants, only: pi, reference_force, reference_time
    use thud_error, only: error_type, input_error
+   use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_text, only: join_quoted, quoted, to_text
    use thud_transform, only: get_autocorrelation, get_power_spectrum
@@ -46,7 +47,7 @@ contains
       character(len=*), intent(in) :: method
       !> 10 lg(band energy/(1 N^2 s)), dB: [n_band].
       real(wp), intent(out) :: levels(:)
-      !> The record or the rate cannot be used, or the method is unknown.
+      !> The record or the rate cannot be used, the method is unknown, or an interrupt.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: energy(size(bands))
       real(wp) :: resolution
@@ -66,6 +67,8 @@ contains
          error = input_error('the level method '//quoted(method)//' is not known; allowed: '//join_quoted(level_methods))
          return
       end select
+      call check_interrupt(error)
+      if (allocated(error)) return
       ! Rounding errors of a band are about this part of the whole energy, which limits the resolution.
       resolution = epsilon(1.0_wp)*sum(force(first:last)**2)/sample_rate
       levels = 10*log10(max(energy, resolution)/(reference_force**2*reference_time))
@@ -155,7 +158,9 @@ contains
             correlation(lag) = correlation(lag)/lag
          end if
       end do
+      energy = 0.0_wp
       do i = 1, size(lower)
+         if (is_interrupted()) exit
          middle = pi*(upper(i) + lower(i))/sample_rate
          half_width = pi*(upper(i) - lower(i))/sample_rate
          energy(i) = 2/(pi*sample_rate)*(half_width*correlation(0) + 2*get_wave_sum(correlation(1:), middle, half_width))

@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
+   public :: dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
 
    interface
       !> Generalised symmetric eigenproblem.
@@ -105,6 +105,16 @@ module thud_lapack
          real(wp), intent(inout) :: ab(ldab, *)
          integer, intent(out) :: info
       end subroutine dpbtrf
+
+      !> Cholesky factor of a small matrix.
+      pure subroutine dpotf2(uplo, n, a, lda, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: uplo
+         integer, intent(in) :: n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: info
+      end subroutine dpotf2
 
       !> Solution with the Cholesky factor of a banded matrix.
       pure subroutine dpbtrs(uplo, n, kd, nrhs, ab, ldab, b, ldb, info)

@@ -7,7 +7,7 @@ module thud_force_history
    private
 
    public :: continue_to_zero, force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
-   public :: outcome_count, remark_length, scalar_fields
+   public :: outcome_count, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
@@ -21,9 +21,6 @@ module thud_force_history
 
    !> Length of the name of a part of the force.
    integer, parameter :: part_name_length = 24
-
-   !> Length of a remark.
-   integer, parameter :: remark_length = 240
 
    !> Force of one impact and the numbers that describe it.
    type :: force_history_type
@@ -51,8 +48,6 @@ module thud_force_history
       character(len=8), allocatable :: fact_unit(:)
       !> These numbers: [n_fact].
       real(wp), allocatable :: fact(:)
-      !> What is possible but not plausible: [n_remark].
-      character(len=remark_length), allocatable :: remark(:)
       !> Velocity towards the floor at first touch, m/s.
       real(wp) :: impact_velocity = 0.0_wp
       !> Snapshots of the deformed source, of models that take some.

@@ -4,6 +4,7 @@ module thud_lumped
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_force_history, only: force_history_type, max_residual, new_force_history
+   use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -96,6 +97,8 @@ contains
             if (released) exit march
          end do
          call record_sample(source, state, i, history)
+         call check_interrupt(error)
+         if (allocated(error)) return
       end do march
       if (.not. released) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration) &

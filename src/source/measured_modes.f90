@@ -8,6 +8,7 @@ module thud_measured_modes
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
    use thud_force_history, only: force_history_type, max_residual, new_force_history
+   use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -122,6 +123,8 @@ contains
       substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
       released = .false.
       march: do i = 1, n_sample
+         call check_interrupt(error)
+         if (allocated(error)) return
          time = (i - 1)*step
          call get_motion(modes, v0, time, history%deflection(i), history%velocity(i), history%part(i, 1))
          do j = 1, substeps
@@ -140,7 +143,8 @@ contains
       history%part(1, 1) = history%part(1, 1)/2
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
-      call finish(modes, release_time(modes, v0, time - step/substeps, time), history)
+      call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
+      if (allocated(error)) return
       if (history%restitution < 0.0_wp) then
          error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
             //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
@@ -222,13 +226,15 @@ contains
 
    !> Scalars of the impact. The equation of each mode makes the impulse the change of momentum;
    !> quadrature of the force checks it.
-   pure subroutine finish(modes, contact_time, history)
+   subroutine finish(modes, contact_time, history, error)
       !> The modes: [n_mode].
       type(mode_type), intent(in) :: modes(:)
       !> Time of release, s.
       real(wp), intent(in) :: contact_time
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
+      !> An interrupt.
+      type(error_type), allocatable, intent(out) :: error
       real(wp) :: deflection, velocity, force, impulse, loss, energy, power, stored, weight
       integer :: i, n_interval
 
@@ -237,6 +243,7 @@ contains
       impulse = 0.0_wp
       loss = 0.0_wp
       do i = 0, n_interval
+         if (is_interrupted()) exit
          call get_motion(modes, history%impact_velocity, contact_time*i/n_interval, deflection, velocity, force, power, &
             stored)
          weight = contact_time/(3*n_interval)*merge(1, merge(4, 2, mod(i, 2) == 1), mod(i, n_interval) == 0)
@@ -252,6 +259,7 @@ contains
       energy = sum(modes%mass)/2*history%impact_velocity**2
       history%energy_residual = abs(stored + loss - energy)/energy
       history%peak_elastic_force = history%peak_force
+      call check_interrupt(error)
    end subroutine finish
 
 end module thud_measured_modes

@@ -5,6 +5,7 @@
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
+#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,28 +13,37 @@
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <time.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t deferred = 0, interrupted = 0;
+// Of the module thud_interrupt: loops that poll it end their work.
+extern volatile sig_atomic_t thud_latest_signal;
+
+static volatile sig_atomic_t deferred = 0;
 static const char interruption[] = "\nthud: interrupted; nothing was written\n";
+static const int ending_signals[] = {SIGINT, SIGTERM};
 
 static void interrupt(int number)
 {
-   (void)number;
-   if (deferred && !interrupted) {
-      interrupted = 1;
+   static time_t first;
+
+   if (deferred && !thud_latest_signal) {
+      thud_latest_signal = number;
+      first = time(NULL);
       return;
    }
+   // Some callers send a signal to the process and to its group.
+   if (deferred && time(NULL) <= first + 1) return;
 
    // The terminal has shown ^C, perhaps after a line of progress.
    const char *text = isatty(STDERR_FILENO) ? interruption : interruption + 1;
 
-   if (write(STDERR_FILENO, text, strlen(text)) < 0) _exit(130);
-   _exit(130);
+   if (write(STDERR_FILENO, text, strlen(text)) < 0) _exit(128 + number);
+   _exit(128 + number);
 }
 
 // Prepares the process of the executable: a write to a full file or a closed pipe is an error and not the end, no
-// file gets the number of a closed screen, and an interrupt ends the process with a sentence.
+// file gets the number of a closed screen, and SIGINT or SIGTERM ends the process with a sentence.
 void thud_prepare_process(void)
 {
    struct sigaction action = {.sa_handler = SIG_IGN}, before;
@@ -44,7 +54,75 @@ void thud_prepare_process(void)
    sigaction(SIGXFSZ, &action, NULL);
    action.sa_handler = interrupt;
    action.sa_flags = SA_RESTART;
-   if (sigaction(SIGINT, NULL, &before) == 0 && before.sa_handler != SIG_IGN) sigaction(SIGINT, &action, NULL);
+   for (int i = 0; i < 2; i++)
+      if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+         sigaction(ending_signals[i], &action, NULL);
+}
+
+// Handlers of the process that `note` calls first, and the library's calls that are running.
+static struct sigaction handlers[2];
+static volatile sig_atomic_t running = 0;
+static pthread_mutex_t calls = PTHREAD_MUTEX_INITIALIZER;
+
+static void note(int number, siginfo_t *information, void *context)
+{
+   static volatile sig_atomic_t nested = 0;
+   const struct sigaction *handler = &handlers[number == SIGTERM];
+
+   if (running) thud_latest_signal = number;
+   // Another library may have saved this handler and call it from its own.
+   if (nested) return;
+   nested = 1;
+   if (handler->sa_flags & SA_SIGINFO) handler->sa_sigaction(number, information, context);
+   else handler->sa_handler(number);
+   nested = 0;
+}
+
+// A forked process has none of the threads that were at work.
+static void forget(void)
+{
+   pthread_mutex_init(&calls, NULL);
+   running = 0;
+   thud_latest_signal = 0;
+}
+
+static void forget_in_children(void)
+{
+   pthread_atfork(NULL, NULL, forget);
+}
+
+// From now on a signal that the process handles ends the running calls, too.
+void thud_begin_call(void)
+{
+   static pthread_once_t once = PTHREAD_ONCE_INIT;
+   struct sigaction action;
+
+   pthread_once(&once, forget_in_children);
+   pthread_mutex_lock(&calls);
+   running++;
+   for (int i = 0; i < 2; i++) {
+      if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == note
+          || action.sa_handler == SIG_DFL || action.sa_handler == SIG_IGN) continue;
+      handlers[i] = action;
+      action.sa_sigaction = note;
+      action.sa_flags |= SA_SIGINFO;
+      sigaction(ending_signals[i], &action, NULL);
+   }
+   pthread_mutex_unlock(&calls);
+}
+
+// Ends the running calls.
+void thud_end_calls(void)
+{
+   if (running) thud_latest_signal = SIGINT;
+}
+
+// A call has ended.
+void thud_end_call(void)
+{
+   pthread_mutex_lock(&calls);
+   if (--running == 0) thud_latest_signal = 0;
+   pthread_mutex_unlock(&calls);
 }
 
 // From now on an interrupt is kept for `thud_write`.
@@ -71,13 +149,13 @@ int thud_open(const char *path)
    return open(path, O_RDONLY | O_CLOEXEC);
 }
 
-// Bytes that were read; 0 at the end, negative after an error.
+// Bytes that were read; 0 at the end, negative after an error or a signal that ends the work.
 ssize_t thud_read(int descriptor, char *bytes, size_t length)
 {
    ssize_t count;
 
    do count = read(descriptor, bytes, length);
-   while (count < 0 && errno == EINTR);
+   while (count < 0 && errno == EINTR && !thud_latest_signal);
    return count;
 }
 
@@ -93,7 +171,7 @@ int thud_create(const char *path)
 int thud_write(int descriptor, const char *bytes, size_t length)
 {
    while (length > 0) {
-      if (deferred && interrupted) return -1;
+      if (deferred && thud_latest_signal) return -1;
       ssize_t count = write(descriptor, bytes, length);
 
       if (count < 0 && errno == EINTR) continue;
@@ -126,7 +204,8 @@ int thud_flush(const char *path)
 }
 
 // Waits for the lock on a directory and takes it, by a descriptor; makes the directory where that is asked for.
-// Minus the number of the error where this user cannot write there. File systems without locks go without.
+// Minus the number of the error where this user cannot write there, or of EINTR after a signal that ends the work.
+// File systems without locks go without.
 int thud_lock_directory(const char *path, int make)
 {
    for (;;) {
@@ -143,7 +222,11 @@ int thud_lock_directory(const char *path, int make)
          close(descriptor);
          return -error;
       }
-      while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) continue;
+      while (flock(descriptor, LOCK_EX) != 0 && errno == EINTR) {
+         if (!thud_latest_signal) continue;
+         close(descriptor);
+         return -EINTR;
+      }
       // The previous owner of the lock may have renamed or removed the directory.
       if (fstat(descriptor, &locked) == 0 && lstat(path, &named) == 0 && locked.st_dev == named.st_dev
           && locked.st_ino == named.st_ino)

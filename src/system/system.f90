@@ -8,8 +8,8 @@ module thud_system
    public :: standard_error, standard_output
    public :: can_exchange, close_descriptor, create_file, directory_exists, exchange_directories, flush_directory
    public :: get_free_bytes, get_system_message, is_terminal, keep_interrupts, link_file, list_directory, lock_directory
-   public :: open_descriptor, pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path
-   public :: write_text
+   public :: begin_call, end_call, end_calls, open_descriptor, pass_interrupts, prepare_process, read_bytes, remove_file
+   public :: rename_file, resolve_path, write_text
 
    !> Descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
@@ -52,7 +52,7 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
    interface
-      !> Turns signals of full and closed outputs into errors, and an interrupt into a sentence.
+      !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a sentence.
       subroutine prepare_process() bind(c, name='thud_prepare_process')
          implicit none (type, external)
       end subroutine prepare_process
@@ -66,6 +66,21 @@ module thud_system
       subroutine pass_interrupts() bind(c, name='thud_pass_interrupts')
          implicit none (type, external)
       end subroutine pass_interrupts
+
+      !> Lets signals that the process handles set `latest_signal`, too. Every call of the library begins with it.
+      subroutine begin_call() bind(c, name='thud_begin_call')
+         implicit none (type, external)
+      end subroutine begin_call
+
+      !> Ends what `begin_call` has begun.
+      subroutine end_call() bind(c, name='thud_end_call')
+         implicit none (type, external)
+      end subroutine end_call
+
+      !> Ends all calls that are running.
+      subroutine end_calls() bind(c, name='thud_end_calls')
+         implicit none (type, external)
+      end subroutine end_calls
 
       subroutine c_get_error_text(number, text, length) bind(c, name='thud_get_error_text')
          import :: c_char, c_int, c_size_t

@@ -145,7 +145,7 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     ) as doomed:
         assert doomed.stdout
         address = doomed.stdout.readline().strip()
-        command = [sys.executable, "-m", "thud.cli", "sweep", str(study), "-q", "-o", str(tmp_path)]
+        command = [sys.executable, "-m", "thud", "sweep", str(study), "-q", "-o", str(tmp_path)]
         command += ["--scheduler", address]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         while not list(tmp_path.glob("some.partial/block_*.nc")):

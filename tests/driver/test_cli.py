@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
@@ -16,6 +16,7 @@ from thud import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     CaseFile = Callable[..., Path]
 
@@ -147,15 +148,75 @@ def test_figure_that_cannot_be_replaced_is_named(
     assert "outputs/case/force.png: Is a directory; allowed: " in capsys.readouterr().err
 
 
-def test_full_screen_is_an_error_without_a_traceback(case_file: CaseFile, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "thud.cli", "run", "--no-figures", str(case_file(MINIMAL))]
-    with Path("/dev/full").open("w") as full:
+@pytest.mark.parametrize(
+    ("arguments", "meant"),
+    [
+        (["swep", "study.toml"], "sweep"),
+        (["run", "case.nml", "--chekc"], "--check"),
+        (["sweep", "study.toml", "--backend", "thread"], "threads"),
+    ],
+)
+def test_misspelt_commands_and_options_are_told(
+    arguments: list[str], meant: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(arguments) == 1
+    assert f"(did you mean '{meant}'?)" in capsys.readouterr().err
+
+
+# All of them write to standard output; runs of two cases are told once.
+SPEAKING = (
+    "--help",
+    "--version",
+    "fit --help",
+    "run --no-figures case.nml other.nml",
+)
+
+
+@pytest.mark.parametrize(
+    ("screen", "unbuffered"),
+    [("> /dev/full", ""), ("> /dev/full", "1"), (">&-", ""), ("| head -c 0", "")],
+)
+@pytest.mark.parametrize("arguments", SPEAKING)
+def test_screen_that_takes_nothing_is_told_in_one_sentence(
+    arguments: str, screen: str, unbuffered: str, case_file: CaseFile, tmp_path: Path
+) -> None:
+    case_file(MINIMAL)
+    case_file(MINIMAL, "other.nml")
+    command = f"{{ {sys.executable} -m thud {arguments} 2> errors; echo $? > code; }} {screen}"
+    subprocess.run(
+        ["/bin/sh", "-c", command],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        check=False,
+    )
+    assert (tmp_path / "code").read_text() == "1\n"
+    errors = (tmp_path / "errors").read_text()
+    assert errors.count("thud-driver: standard output: ") == 1
+    assert "Traceback" not in errors
+    assert "ignored" not in errors
+
+
+@pytest.mark.parametrize("screen", ["> /dev/full", ">&-"])
+def test_errors_that_nobody_can_read_change_no_exit_code(
+    screen: str, case_file: CaseFile, tmp_path: Path
+) -> None:
+    case_file(MINIMAL)
+    case_file("&ball", "bad.nml")
+    for name, code in (("case", 0), ("bad", 1)):
+        command = f"{sys.executable} -m thud run --no-figures {name}.nml 2{screen}"
         done = subprocess.run(
-            command, stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path, check=False
+            ["/bin/sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=False
         )
-    assert done.returncode == 1
-    assert "Traceback" not in done.stderr
-    assert "standard output: No space left on device" in done.stderr
+        assert done.returncode == code
+        assert (
+            subprocess.run(
+                ["/bin/sh", "-c", f"{command} >&-"], cwd=tmp_path, check=False
+            ).returncode
+            == 1
+        )
+        # Errors do not end up among the results.
+        assert done.stdout.count("thud-driver") == 0
+        assert bool(done.stdout) == (code == 0)
 
 
 def test_interruption_is_not_a_traceback(
@@ -190,7 +251,7 @@ def test_interrupted_fit_does_not_say_that_it_is_kept(
     (tmp_path / "study.toml").write_text(
         "parameters.mass = {}\n[target]\nlevels = [39, 31, 23, 17, 12]"
     )
-    assert cli.main(["fit", "-q", "study.toml"]) == cli.INTERRUPTED
+    assert cli.main(["fit", "-q", "study.toml"]) == 130
     sentence = "thud-driver: interrupted; nothing is written\n"
     assert capsys.readouterr().err == sentence
     assert not list((tmp_path / "outputs/study").iterdir())

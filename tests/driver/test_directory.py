@@ -89,7 +89,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 def start(study: str, folder: Path, *more: str) -> subprocess.Popen[str]:
     """Start a study in a process of its own, and return when it has finished some of its sets."""
     (folder / "long.toml").write_text(study)
-    command = [sys.executable, "-m", "thud.cli", "sweep", "long.toml", "-q", "-o", "."]
+    command = [sys.executable, "-m", "thud", "sweep", "long.toml", "-q", "-o", "."]
     command += ["--workers", "1", *more]
     process = subprocess.Popen(command, cwd=folder, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 30

@@ -44,7 +44,7 @@ def single(parameters: dict[str, np.ndarray], i: int, **options: object) -> thud
 
 def results(ensemble: thud.Ensemble) -> dict[object, np.ndarray]:
     """Return everything that an ensemble computes but the forces, levels by force and bands."""
-    left_out = {"parameters", "sample_rate", "elastic_force", "floor_force", "levels"}
+    left_out = {"case", "parameters", "sample_rate", "elastic_force", "floor_force", "levels"}
     names = [f.name for f in dataclasses.fields(ensemble) if f.name not in left_out]
     return {name: getattr(ensemble, name) for name in names} | ensemble.levels
 

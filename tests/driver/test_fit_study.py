@@ -180,7 +180,7 @@ def test_fit_is_printed_even_if_it_cannot_be_saved(
         (
             "[target]",
             "[targets]",
-            r"'targets' is not known; allowed: name, case, fixed, parameters, target",
+            r"'targets' is not known .did you mean 'target'..; allowed: name, case, fixed",
         ),
         ("[target]", "case = 'no.nml'\n[target]", r"no.nml: there is no such file"),
         ("[target]", "starts = 1.5\n[target]", r"starts = 1.5 is not allowed; allowed: whole"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import json
 import math
@@ -136,6 +137,9 @@ def test_python_knows_what_was_added(copy: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert float(done.stdout) == pytest.approx(math.pi * math.sqrt(2.5 / 62000), rel=1e-9)
     assert "`&linear_spring`" in (copy / "docs/keys.md").read_text()
+    assert "model: Literal['linear_spring']" in ast.unparse(
+        ast.parse((copy / "driver/thud/_solve.pyi").read_text())
+    )
 
 
 def test_schema_of_the_repository_is_fresh(executable: str, tmp_path: Path) -> None:
@@ -145,6 +149,6 @@ def test_schema_of_the_repository_is_fresh(executable: str, tmp_path: Path) -> N
     schema = subprocess.run([executable, "--schema"], capture_output=True, check=True).stdout
     generate = [sys.executable, REPOSITORY / "driver/generate_schema.py", tmp_path]
     subprocess.run(generate, input=schema, check=True)
-    for name in ("driver/thud/_schema.py", "docs/keys.md"):
+    for name in ("driver/thud/_schema.py", "driver/thud/_solve.pyi", "docs/keys.md"):
         assert (tmp_path / name).read_text() == (REPOSITORY / name).read_text(), name
     assert {entry["group"] for entry in json.loads(schema)["keys"]} >= {"ball", "mesh", "limits"}

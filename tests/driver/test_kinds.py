@@ -40,7 +40,7 @@ def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
     kinds.write_text(kinds.read_text().replace("KINDS = {\n", f"KINDS = {{\n{line}"))
     (tmp_path / "mass.toml").write_text("design.size = 9\nparameters.mass.std = 0.1")
     for command in (
-        ["-m", "thud.cli", "scatter", "mass.toml"],
+        ["-m", "thud", "scatter", "mass.toml"],
         ["-c", "import thud; print(thud.scatter('mass.toml').table())"],
     ):
         done = subprocess.run(

@@ -15,6 +15,8 @@ from thud import cli
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from thud._schema import LevelsForce
+
 WITH_IMPACT = [path for path in INPUTS if thud.read_case(path).model]
 # The batches of the shell model repeat the single solver to this part of the peak, and dB.
 BATCH = 1e-9
@@ -58,12 +60,28 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
     )
     assert swept["conforms"].item() == conformity.conforms
 
+    drops = thud.solve_many({"height": [case.drop.height]}, case)
+    assert drops.conforms[0] == conformity.conforms
+    np.testing.assert_allclose(
+        drops.levels[case.levels.force, "octave"][0], levels, rtol=0, atol=1e3 * near
+    )
+    read = thud.read_results(f"outputs/{case.name}")
+    assert (read.peak(), read.levels().tolist()) == (impact.peak(), levels.tolist())
+    assert read.conformity() == conformity
 
-def test_fit_ends_with_the_impact_of_its_case() -> None:
-    case = thud.Case(ball=thud.Ball(youngs_modulus=1.5e6))
-    target = thud.LevelTarget(thud.solve().levels())
+
+@pytest.mark.parametrize("force", ["elastic", "floor"])
+def test_fit_to_its_own_levels_finds_the_ball_again(force: LevelsForce) -> None:
+    case = thud.Case(levels=thud.Levels(force=force))
+    target = thud.LevelTarget(thud.solve_case(case).levels())
     found = thud.fit(target, {"youngs_modulus": {"start": 1.5e6}}, case)
+    assert found.case.ball.youngs_modulus == pytest.approx(1.6e6, rel=1e-6)
     impact = thud.solve_case(found.case)
     assert found.impact.peak() == impact.peak()
     assert found.impact.levels().tolist() == impact.levels().tolist()
-    assert found.impact.conformity() == impact.conformity()
+
+
+def test_fit_to_an_impact_compares_the_force_that_it_judges() -> None:
+    case = thud.Case(levels=thud.Levels(force="elastic"))
+    found = thud.fit(thud.solve_case(case), {"youngs_modulus": {"start": 1.5e6}}, case)
+    assert found.case.ball.youngs_modulus == pytest.approx(1.6e6, rel=1e-6)

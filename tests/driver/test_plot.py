@@ -165,7 +165,7 @@ def test_figure_costs_one_file(tmp_path: Path) -> None:
     (package / "plot/force_loop.py").write_text(source)
     case = REPOSITORY / "inputs/rubber_ball_100cm.nml"
     for arguments in (["run", "-q", "-o", "out", str(case)], ["figures", "-q", "-o", "out/drawn"]):
-        command = [sys.executable, "-m", "thud.cli", *arguments]
+        command = [sys.executable, "-m", "thud", *arguments]
         place = {**os.environ, "PYTHONPATH": str(tmp_path)}
         subprocess.run(command, cwd=tmp_path, env=place, check=True)
     for name in ("out/force.svg", "out/force_loop.svg", "out/drawn/two_loops.svg"):

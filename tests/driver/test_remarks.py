@@ -19,9 +19,9 @@ DOUBTFUL = {
     "the wall has a density of 11": "&ball mass = 25 / &sampling duration = 0.2 /",
     "youngs_modulus = 1.6 Pa, rubbers have": "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
     " &sampling duration = 10, sample_rate = 2000 /",
-    "the paper's ball in the model 'hollow_sphere'; in 'finite_element' that ball has 2080000.0 Pa":
+    "the modulus of the paper's ball in the model 'hollow_sphere'; 'finite_element' needs 2.08 MPa":
     "&model name = 'finite_element' / &mesh radial_elements = 4, polar_elements = 32 /",
-    "the paper's ball in the model 'finite_element'; in 'modal_ball' that ball has 1600000.0 Pa":
+    "the modulus of the paper's ball in the model 'finite_element'; 'modal_ball' needs 1.60 MPa":
     "&ball youngs_modulus = 2.08e6 / &model name = 'modal_ball' /",
     "the force exposure level over all frequencies is -2": "&drop height = 1e-7 /"
     " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
@@ -69,6 +69,15 @@ def test_plausible_input_earns_no_remark(text: str, case_file: Callable[..., Pat
         assert thud.solve_case(thud.read_case(case_file(text))).remarks == ()
 
 
+def test_free_modes_with_the_modulus_of_the_shell_are_remarked() -> None:
+    with pytest.warns(thud.PlausibilityWarning, match="'finite_element' needs 2.08 MPa"):
+        found = thud.free_modes(radial_elements=4, polar_elements=16)
+    assert len(found.remarks) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        thud.free_modes(thud.Ball.standard(), radial_elements=4, polar_elements=16)
+
+
 def test_run_names_the_groups_that_are_left_out(
     case_file: Callable[..., Path],
     tmp_path: Path,
@@ -78,5 +87,7 @@ def test_run_names_the_groups_that_are_left_out(
     monkeypatch.chdir(tmp_path)
     assert cli.main(["run", "--no-figures", str(case_file("&drop height = 0.5 /"))]) == 0
     assert "Defaults hold for &ball &model, which the file leaves out." in capsys.readouterr().out
+    assert cli.main(["run", "--no-figures", "-o", "m", str(case_file("&modes count = 1 /"))]) == 0
+    assert "Defaults hold for &ball, which the file leaves out." in capsys.readouterr().out
     assert cli.main(["run", "--no-figures", "outputs/case/effective.nml"]) == 0
     assert "Defaults hold" not in capsys.readouterr().out

@@ -79,7 +79,7 @@ def procedures(text: str) -> list[tuple[str, int]]:
 
 def is_type_checking(node: ast.AST) -> bool:
     """Whether a node is `if TYPE_CHECKING:`, whose imports never run and so close no circle."""
-    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
 
 def imported_names(tree: ast.Module, package: str) -> set[str]:
@@ -88,7 +88,8 @@ def imported_names(tree: ast.Module, package: str) -> set[str]:
     Late are imports inside functions and, of a module with `__getattr__`, the names in its tables.
     """
     names: set[str] = set()
-    has_getattr = any(isinstance(n, ast.FunctionDef) and n.name == "__getattr__" for n in tree.body)
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    has_getattr = any(function.name == "__getattr__" for function in functions)
     waiting: list[ast.AST] = [tree]
     while waiting:
         node = waiting.pop()

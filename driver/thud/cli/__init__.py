@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
+import signal
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from thud._api import version
+from thud.checks import suggestion
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.run import run_cases
@@ -19,7 +22,10 @@ from thud.levels import SOURCES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-INTERRUPTED = 130
+    from _typeshed import SupportsWrite
+
+# Exit code after an interrupt: this, plus the number of the signal.
+INTERRUPTED = 128
 
 COMMANDS = {
     "run": Command(
@@ -74,21 +80,22 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with arguments, by default those of this process; return the exit code."""
+    kept = Command._field_defaults["kept"]
     try:
-        options = _parser().parse_args(arguments)
-    except SystemExit as stop:
-        # argparse exits with 2 for bad usage, which is a numerical failure here.
-        return InputError.exit_code if stop.code else 0
-    command = COMMANDS[options.name]
-    try:
-        if options.output is not None and not options.output.strip():
-            message = "--output has no value; allowed: a directory"
-            raise InputError(message)
-        code = command.function(options)
+        options = _parse(arguments)
+        if isinstance(options, int):
+            code = options
+        else:
+            command = COMMANDS[options.name]
+            kept = command.kept
+            if options.output is not None and not options.output.strip():
+                message = "--output has no value; allowed: a directory"
+                raise InputError(message)
+            code = command.function(options)
         sys.stdout.flush()
-    except KeyboardInterrupt:
-        print(f"thud-driver: interrupted; {command.kept}", file=sys.stderr)
-        return INTERRUPTED
+    except KeyboardInterrupt as interrupt:
+        print(f"thud-driver: interrupted; {kept}", file=sys.stderr)
+        return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
             # Standard output is full or closed: discard what is still buffered.
@@ -98,13 +105,40 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
+def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
+    """Return the options, or an exit code where argparse has shown its text."""
+    try:
+        return _parser().parse_args(arguments)
+    except SystemExit as stop:
+        # argparse exits with 2 for bad usage, which is a numerical failure here.
+        return InputError.exit_code if stop.code else 0
+
+
+class _Parser(argparse.ArgumentParser):
+    """Parser that names the word that was probably meant, and tells of a full or closed output."""
+
+    def error(self, message: str) -> NoReturn:
+        found = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
+        super().error(message + (suggestion(found[1], _words()) if found else ""))
+
+    def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
+        print(message, end="", file=file or sys.stderr)
+
+
+def _words() -> list[str]:
+    """Return commands, their options, and the choices of these."""
+    given = [one for command in COMMANDS.values() for one in command.arguments]
+    options = [name for names, _ in given for name in names if name.startswith("--")]
+    return [*COMMANDS, *options, *(word for _, more in given for word in more.get("choices", ()))]
+
+
 def _parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="thud-driver",
         description="Cases with figures, studies, and the figures of the paper.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
-        "3 not conforming (run --check), 130 interrupted.",
+        "3 not conforming (run --check), 130 interrupted, 143 terminated.",
     )
     parser.add_argument("--version", action="version", version=f"thud {version()}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="name")

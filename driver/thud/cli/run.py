@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -15,7 +14,7 @@ from thud._api import api, call, text
 from thud.case import Case, read_case
 from thud.cli.command import exit_code, sentence
 from thud.errors import InputError, ThudError
-from thud.files import add_files, on_interrupt
+from thud.files import add_files
 from thud.free_modes import new_modes
 from thud.impact import new_impact
 
@@ -37,6 +36,8 @@ def run_cases(options: argparse.Namespace) -> int:
         try:
             conforms = _run_case(path, options)
         except (ThudError, OSError) as error:
+            if isinstance(error, OSError) and error.filename is None:
+                raise  # of the screen, which is no better for the other cases
             tqdm.write(f"thud-driver: {sentence(error)}", file=sys.stderr)
             failure = exit_code(error)
             worst = failure if worst in (0, NOT_CONFORMING) else max(worst, failure)
@@ -59,10 +60,7 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[case.name] = path
-    # An interrupt ends the process at once: Python would wait for the library, and results are
-    # switched in one step.
-    with on_interrupt(signal.SIG_DFL):
-        found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
+    found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
     for remark in found.get("run_remarks", {}).values():
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))

@@ -6,6 +6,7 @@ from textwrap import fill
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
+from thud._schema import LevelsForce, LimitsSource
 from thud.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
@@ -19,8 +20,8 @@ _LETTERS = 20
 
 def comparison_page(
     impacts: Mapping[str, Impact | Recording],
-    force: str | None,
-    source: str,
+    force: LevelsForce | None,
+    source: LimitsSource,
     table: Sequence[Sequence[str]],
 ) -> Figure:
     """Draw forces, octave and third-octave levels of several impacts, and a table, on one page.

@@ -7,9 +7,9 @@ from string import Template
 from textwrap import wrap
 from typing import Any
 
-import numpy as np
 from plotly.offline import get_plotlyjs
 
+from thud._schema import BandSet, LevelsForce, LimitsSource
 from thud.impact import Impact
 from thud.levels import get_bands, octave_limits
 from thud.plot.force_history import TIME_LABEL, contact_force, force_label
@@ -25,13 +25,13 @@ _LINE = 30
 
 def comparison_html(
     impacts: Mapping[str, Impact | Recording],
-    force: str | None,
-    source: str,
+    force: LevelsForce | None,
+    source: LimitsSource,
     table: Sequence[Sequence[str]],
 ) -> str:
     """Return the page of `comparison_page` with interactive plots, readable on any screen."""
     forces: list[dict[str, Any]] = []
-    levels: dict[str, list[dict[str, Any]]] = {"octave": [], "third": []}
+    levels: dict[BandSet, list[dict[str, Any]]] = {"octave": [], "third": []}
     for i, (label, impact, kind) in enumerate(iterate_curves(impacts, force)):
         look = {
             "name": "<br>".join(html.escape(line) for line in wrap(label, _LINE)),
@@ -65,14 +65,14 @@ def comparison_html(
 
 def _points(x: Any, y: Any) -> dict[str, list[Any]]:  # noqa: ANN401 - numbers or texts
     """Return a curve, its values with as many digits as can be seen."""
-    return {"x": list(x), "y": np.round(y, 5).tolist()}
+    return {"x": list(x), "y": [float(f"{value:.6g}") + 0.0 for value in y]}
 
 
-def _names(bands: str) -> list[str]:
+def _names(bands: BandSet) -> list[str]:
     return [f"{frequency:g}" for frequency in get_bands(bands).nominal]
 
 
-def _tolerance(source: str) -> dict[str, Any]:
+def _tolerance(source: LimitsSource) -> dict[str, Any]:
     """Return the range of each octave as a grey box."""
     lower, upper = octave_limits(source)
     return {

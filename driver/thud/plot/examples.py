@@ -5,11 +5,8 @@ from functools import cache
 from thud._schema import Ball
 from thud.impact import Impact, solve
 
-# The modulus of the paper's published modes.
-PUBLISHED = Ball(youngs_modulus=2.08e6)
-
 
 @cache
 def solve_published(viscosity: str = "kelvin_voigt") -> Impact:
     """Return the impact of the ball of the published modes by finite elements."""
-    return solve(PUBLISHED, model="finite_element", viscosity=viscosity)
+    return solve(Ball.standard(), model="finite_element", viscosity=viscosity)

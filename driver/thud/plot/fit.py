@@ -132,6 +132,6 @@ def _draw_levels(fit: Fit, misfit: LevelMisfit, above: Axes, below: Axes) -> Non
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
     below.set_xlabel(f"{BAND_WORDS[misfit.bands]}, Hz", fontsize=SIZE)
-    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[misfit.kind]})", fontsize=SIZE)
+    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[fit.impact.judged(misfit.kind)]})", fontsize=SIZE)
     below.set_ylabel("(Fit − target)\n/ uncertainty", fontsize=SIZE)
     legend_above(above)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud._schema import Drop
+from thud._schema import Drop, LevelsForce
 from thud.impact import Impact, solve
 from thud.levels import record_force
 from thud.plot.examples import solve_published
@@ -29,7 +29,7 @@ MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
 
 
-def force_history(impacts: Mapping[str, Impact], force: str | None = None) -> Figure:
+def force_history(impacts: Mapping[str, Impact], force: LevelsForce | None = None) -> Figure:
     """Draw forces against time, below 1.25 kHz as force plates record them (paper, figure 2).
 
     Parameters
@@ -50,7 +50,7 @@ def force_history(impacts: Mapping[str, Impact], force: str | None = None) -> Fi
     return figure
 
 
-def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> None:
+def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | None) -> None:
     """Draw forces against time."""
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
         axes.plot(*contact_force(impact, kind), label=literal(name), **line_style(i))
@@ -59,7 +59,9 @@ def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: str | None) -> 
     axes.set_ylabel(force_label(impacts, force), fontsize=SIZE)
 
 
-def contact_force(impact: Curve, kind: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def contact_force(
+    impact: Curve, kind: LevelsForce
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time since first touch, ms, and force below 1.25 kHz, kN, while there is contact.
 
     Force plates record no more (paper, section 3); above it, meshes and modes ring.
@@ -71,7 +73,7 @@ def contact_force(impact: Curve, kind: str) -> tuple[NDArray[np.float64], NDArra
     return 1e3 * time[shown], 1e-3 * recorded[shown]
 
 
-def force_label(impacts: Mapping[str, Curve], force: str | None) -> str:
+def force_label(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
     """Return the label of an axis of forces."""
     return f"{force_words(impacts, force).capitalize()}\nbelow 1.25 kHz, kN"
 

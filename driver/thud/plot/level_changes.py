@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from thud._schema import ModalBall
+from thud._schema import LevelsForce, ModalBall
 from thud.impact import Impact, solve
 from thud.plot.look import (
     SIZE,
@@ -21,7 +21,7 @@ from thud.plot.look import (
 
 
 def level_changes(
-    reference: Impact, impacts: Mapping[str, Impact], force: str | None = None
+    reference: Impact, impacts: Mapping[str, Impact], force: LevelsForce | None = None
 ) -> Figure:
     """Draw how octave levels change against a reference.
 
@@ -41,11 +41,10 @@ def level_changes(
     """
     figure, axes = empty_axes(2.8)
     axes.axhline(0, color="0.45", linewidth=0.8)
-    base = reference.levels(force=force)
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        change = impact.levels(force=kind) - base
+        change = impact.levels(force=kind) - reference.levels(force=kind)
         axes.plot(
-            np.arange(len(base)), change, label=literal(name), **line_style(i), **marker_style(i)
+            np.arange(len(change)), change, label=literal(name), **line_style(i), **marker_style(i)
         )
     octave_axis(axes)
     axes.set_ylabel(level_label(impacts, force, "Change of the level, dB"), fontsize=SIZE)

@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from thud._schema import Levels
+from thud._schema import BandSet, Levels, LevelsForce, LevelsMethod, LimitsSource
+from thud.checks import refuse
 from thud.impact import Impact, solve
 from thud.levels import octave_limits
 from thud.plot.examples import solve_published
@@ -30,9 +31,9 @@ from thud.plot.look import (
 
 def levels(
     impacts: Mapping[str, Impact],
-    force: str | None = None,
-    source: str = "rubber_ball",
-    method: str | None = None,
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    method: LevelsMethod | None = None,
 ) -> Figure:
     """Draw octave levels over the tolerance band of the standards (paper, figure 3).
 
@@ -45,7 +46,7 @@ def levels(
     force
         ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: whose tolerance band is drawn.
+        ``"rubber_ball"`` or ``"tyre"``: of the tolerance band; by default that of the cases.
     method
         ``"exact"`` or ``"fft"``; by default that of each case.
 
@@ -56,10 +57,10 @@ def levels(
     """
     curves = list(iterate_curves(impacts, force))
     asked = {impact.case.levels.bands for _, impact, _ in curves}
-    bands = ["octave"] if asked == {"octave"} else ["octave", "third"]
+    bands: list[BandSet] = ["octave"] if asked == {"octave"} else ["octave", "third"]
     figure = new_figure(0.4 + 2.5 * len(bands))
     panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
-    draw_levels(panels, impacts, force, source, method)
+    draw_levels(panels, impacts, force, common_source(impacts, source), method)
     for axes in panels.values():
         axes.set_ylabel(level_label(impacts, force), fontsize=SIZE)
     legend_above(panels["octave"])
@@ -67,11 +68,11 @@ def levels(
 
 
 def draw_levels(
-    panels: Mapping[str, Axes],
+    panels: Mapping[BandSet, Axes],
     impacts: Mapping[str, Curve],
-    force: str | None,
-    source: str,
-    method: str | None = None,
+    force: LevelsForce | None,
+    source: LimitsSource,
+    method: LevelsMethod | None = None,
 ) -> None:
     """Draw levels in the axes of their bands; those of the octaves have the tolerance band."""
     draw_tolerance(panels["octave"], source)
@@ -86,7 +87,24 @@ def draw_levels(
         octave_axis(axes, bands)
 
 
-def draw_tolerance(axes: Axes, source: str) -> None:
+def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
+    """Return a source of limits, or without it that of the cases.
+
+    Raises
+    ------
+    InputError
+        Where the cases differ in it.
+    """
+    found = {i.case.limits.source for i in impacts.values() if isinstance(i, Impact)}
+    if source is None and len(found) > 1:
+        what = f"&limits: source differs ({', '.join(sorted(found))})"
+        refuse(what, "cases with one source, or the choice of one")
+    if source is not None:
+        return source
+    return found.pop() if found else "rubber_ball"
+
+
+def draw_tolerance(axes: Axes, source: LimitsSource) -> None:
     """Draw the range of each octave as a grey box with its nominal value."""
     lower, upper = octave_limits(source)
     octave_boxes(axes, lower, upper, f"Tolerance, {source.replace('_', ' ')}")
@@ -120,7 +138,7 @@ def _draw_fluxes() -> Figure:
     return levels(impacts, "elastic")
 
 
-IMPACT_FIGURES = {"levels": lambda impact: levels(named(impact), source=impact.case.limits.source)}
+IMPACT_FIGURES = {"levels": lambda impact: levels(named(impact))}
 DOCUMENTATION_FIGURES = {
     "figure3_levels": _draw_shell,
     "finite_element_levels": _draw_models,

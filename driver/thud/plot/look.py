@@ -15,6 +15,7 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
+from thud._schema import BandSet, LevelsForce
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.files import replace_file
@@ -129,8 +130,8 @@ def named(impact: Impact) -> dict[str, Impact]:
 
 
 def iterate_curves(
-    impacts: Mapping[str, Curve], force: str | None
-) -> Iterator[tuple[str, Curve, str]]:
+    impacts: Mapping[str, Curve], force: LevelsForce | None
+) -> Iterator[tuple[str, Curve, LevelsForce]]:
     """Yield label, impact and kind of force of each curve.
 
     Without `force` each case has the one that it judges. Labels say which where they differ.
@@ -145,30 +146,25 @@ def iterate_curves(
         raise InputError(message)
     for name, impact in impacts.items():
         require_kind(name, impact, Impact | Recording)
-    kinds = [_kind(impact, force) for impact in impacts.values()]
+    kinds = [impact.judged(force) for impact in impacts.values()]
     for (name, impact), kind in zip(impacts.items(), kinds, strict=True):
         which = f", {FORCE_WORDS[kind]}" if len(set(kinds)) > 1 else ""
         yield f"{name}{which}", impact, kind
 
 
-def force_words(impacts: Mapping[str, Curve], force: str | None) -> str:
+def force_words(impacts: Mapping[str, Curve], force: LevelsForce | None) -> str:
     """Return the words for the force of all curves, those for any where labels say which."""
     kinds = {kind for _, _, kind in iterate_curves(impacts, force)}
     return FORCE_WORDS[kinds.pop()] if len(kinds) == 1 else "force"
 
 
-def level_label(impacts: Mapping[str, Curve], force: str | None, what: str = LEVEL) -> str:
+def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, what: str = LEVEL) -> str:
     """Return the label of an axis of levels, with their force where labels do not say which."""
     words = force_words(impacts, force)
     return what if words == "force" else f"{what}\n({words})"
 
 
-def _kind(impact: Curve, force: str | None) -> str:
-    """Return the kind of force that is shown; a recording is of the floor."""
-    return force or impact.judged_force if isinstance(impact, Impact) else "floor"
-
-
-def octave_axis(axes: Axes, bands: str = "octave") -> None:
+def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:
     """Label the axis with the bands."""
     names = [f"{frequency:g}" for frequency in get_bands(bands).nominal]
     axes.set_xticks(np.arange(len(names)), names)

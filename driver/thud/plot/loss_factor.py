@@ -49,7 +49,7 @@ def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
 
 def _draw_viscosity(impact: Impact) -> Figure | None:
     """Draw the material of a model that has a viscous one."""
-    viscosity = impact.case.to_namelist().get("material", {}).get("viscosity", "none")
+    viscosity = str(impact.case.to_namelist().get("material", {}).get("viscosity", "none"))
     if viscosity == "none":
         return None
     model: Any = impact.case.model

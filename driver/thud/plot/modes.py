@@ -7,9 +7,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from thud._schema import Ball
 from thud.checks import require_kind
 from thud.free_modes import FreeModes, free_modes
-from thud.plot.examples import PUBLISHED
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure
 
@@ -64,4 +64,4 @@ def _draw_outline(axes: Axes, place: NDArray[np.float64]) -> None:
 
 
 MODES_FIGURES = {"modes": mode_shapes}
-DOCUMENTATION_FIGURES = {"figure4_free_modes": lambda: mode_shapes(free_modes(PUBLISHED))}
+DOCUMENTATION_FIGURES = {"figure4_free_modes": lambda: mode_shapes(free_modes(Ball.standard()))}

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from thud.checks import require_kind
 from thud.errors import InputError
 from thud.files import replace_file
-from thud.impact import Impact, Motion
+from thud.impact import Impact
+from thud.motion import Motion
 from thud.plot.examples import solve_published
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure
@@ -27,7 +28,7 @@ INSTANTS = 9
 # Nodes between two arrows, from pole to pole and through the wall.
 ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
-LABEL = "Displacement, mm"
+LABEL = "Displacement of the material, mm"
 
 
 def motion(impact: Impact, instants: int = INSTANTS) -> Figure:

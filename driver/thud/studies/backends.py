@@ -14,17 +14,22 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager, suppress
-from multiprocessing import connection, get_context, parent_process
-from threading import Thread
+from multiprocessing import get_context
+from threading import RLock, Thread
 from typing import TYPE_CHECKING, Any
 
+from tqdm import tqdm
+
+from thud._api import api
 from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
 from thud.ensemble import MAX_THREADS
 from thud.errors import NumericalError, ThudError
+from thud.extras import require_extra
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
+    from multiprocessing import connection
 
     from numpy.typing import NDArray
 
@@ -54,15 +59,17 @@ def run_blocks(
             for block in blocks:
                 if len(running) >= 2 * width:
                     _collect(running, keep)
-                running[executor.submit(evaluate, block)] = block
+                with _no_interrupt_in_processes():
+                    running[executor.submit(evaluate, block)] = block
             while running:
                 _collect(running, keep)
-        except BaseException:
-            # Running blocks are waited for and kept.
-            for future in list(running):
+        except BaseException as error:
+            # Running blocks are waited for and kept. After an interrupt the backend ends them.
+            interrupted = isinstance(error, KeyboardInterrupt)
+            for future in [] if interrupted else list(running):
                 if future.cancel():
                     del running[future]
-            done, _ = wait(running)
+            done, _ = wait(running, timeout=0 if interrupted else None)
             for future in done:
                 if not future.cancelled() and not future.exception():
                     with suppress(OSError):
@@ -112,7 +119,10 @@ def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) 
 def _open(
     backend: str, workers: int | None, scheduler: str | None
 ) -> Iterator[tuple[Executor, int]]:
-    """Open a backend; yield its executor and how many blocks run at once."""
+    """Open a backend; yield its executor and how many blocks run at once.
+
+    An interrupt ends the blocks that are running.
+    """
     if scheduler is not None:
         with _dask(scheduler) as opened:
             yield opened
@@ -120,36 +130,52 @@ def _open(
     width = workers or min(len(os.sched_getaffinity(0)), MAX_THREADS)
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
-            yield threads, width
+            try:
+                yield threads, width
+            except KeyboardInterrupt:
+                threads.shutdown(wait=False, cancel_futures=True)
+                api.end_calls()
+                raise
         return
     # Forked processes would inherit locks held by threads that they do not have.
     context = get_context("spawn")
-    with ProcessPoolExecutor(width, context, initializer=_follow_parent) as processes:
-        yield processes, width
+    end, held = context.Pipe(duplex=False)
+    with end, held, ProcessPoolExecutor(width, context, _follow_parent, (end,)) as processes:
+        try:
+            yield processes, width
+        except KeyboardInterrupt:
+            held.close()
+            raise
 
 
-def _follow_parent() -> None:
-    """Leave interrupts to the parent process, and end with it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = parent_process()
-    assert parent is not None  # noqa: S101 - this runs in processes that were started
+def _follow_parent(end: connection.Connection) -> None:
+    """End with the parent process, or when it closes the other end of a pipe."""
+    # The usual lock is a semaphore of the system, which processes that end like this leave behind.
+    tqdm.set_lock(RLock())
 
     def end_with_it() -> None:
-        # A killed parent cannot stop its processes.
-        connection.wait([parent.sentinel])
+        end.poll(None)
         os._exit(1)
 
     Thread(target=end_with_it, daemon=True).start()
 
 
 @contextmanager
-def _dask(address: str) -> Iterator[tuple[Executor, int]]:
+def _no_interrupt_in_processes() -> Iterator[None]:
+    """Block Ctrl-C, which terminals send to all processes, in those that are started meanwhile."""
+    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[tuple[Executor, int]]:
+    with require_extra("dask"):
         from distributed import Client  # noqa: PLC0415 - an optional package
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
         from distributed.comm.registry import get_backend  # noqa: PLC0415
-    except ModuleNotFoundError as error:
-        refuse(f"{error.name} is not installed", "pip install '.[studies,dask]'", error)
     try:
         # A client of an unknown kind of address would fail again when deleted.
         get_backend(parse_address(address)[0])
@@ -172,7 +198,11 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
             refuse(f"scheduler = {address!r} has no workers", "one with workers", error)
         width = sum(client.nthreads().values())
         with client.get_executor() as executor:
-            yield executor, width
+            try:
+                yield executor, width
+            except KeyboardInterrupt:
+                executor.shutdown(wait=False)
+                raise
 
 
 @contextmanager

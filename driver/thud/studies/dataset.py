@@ -16,8 +16,12 @@ from thud.studies.designs import makers
 from thud.studies.evaluation import LEVELS, SCALARS, level_names
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet
+    from thud.case import Case
     from thud.studies.parameter import Parameter
     from thud.studies.sets import Columns, SetStudy
 
@@ -55,10 +59,7 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
     `columns` holds their parameters by name, `found` what `evaluate` returns.
     """
     levels = level_names(study.case)
-    coordinates: dict[str, Any] = {
-        bands: (bands, get_bands(bands).nominal, {"units": "Hz", "long_name": "nominal frequency"})
-        for _, bands in levels.values()
-    }
+    coordinates: dict[str, Any] = band_coordinates(bands for _, bands in levels.values())
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
         coordinates[coordinate(parameter)] = ("set", values, _attributes(study, parameter))
@@ -68,6 +69,12 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
         dimensions = ("set", levels[name][1]) if name in levels else ("set",)
         variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
     return in_order(xr.Dataset(variables, coordinates, provenance(study)))
+
+
+def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:
+    """Return the nominal frequencies of bands by the names of their dimensions."""
+    attributes = {"units": "Hz", "long_name": "nominal frequency"}
+    return {bands: (bands, get_bands(bands).nominal, attributes) for bands in kinds}
 
 
 def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
@@ -96,17 +103,24 @@ def provenance(study: SetStudy) -> dict[str, str]:
         "identity": json.dumps(study.identity),
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
-        "model": study.model,
         "parameters": " ".join(map(coordinate, study.parameters)),
-        "judged_force": study.case.levels.force,
-        "limits": study.case.limits.source,
-        "case": f"{study.case.to_namelist()}",
+        **makers(study.design),
+        **origin(study.case),
+    }
+
+
+def origin(case: Case) -> dict[str, str]:
+    """Return the case of results and what has computed them."""
+    return {
+        "model": case.model.name if case.model else "",
+        "judged_force": case.levels.force,
+        "limits": case.limits.source,
+        "case": f"{case.to_namelist()}",
         "thud_version": version(),
         "compiler": compiler(),
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,
         "xarray_version": xr.__version__,
-        **makers(study.design),
         "machine": platform.machine(),
         "date_created": datetime.now(UTC).isoformat(timespec="seconds"),
     }

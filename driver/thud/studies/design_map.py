@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case
 from thud.checks import refuse
+from thud.display import Displayed
 from thud.keys import DENSITY
 from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
@@ -30,7 +31,7 @@ _AXES = 2
 
 
 @dataclass(frozen=True, eq=False)
-class DesignMap:
+class DesignMap(Displayed):
     """Margin and verdict over two parameters.
 
     Attributes
@@ -50,6 +51,16 @@ class DesignMap:
     axes: tuple[str, str]
     mark: tuple[float, float] | None
     mark_name: str
+
+    def __repr__(self) -> str:
+        """Return the axes, and how much conforms."""
+        conforms = self.dataset["conforms"]
+        count = f"{int(conforms.sum())} of {conforms.size} sets conform"
+        return f"<DesignMap, {' and '.join(self.axes)}: {count}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return [("", ""), *self.table()]
 
     def table(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the best place, and how much conforms."""

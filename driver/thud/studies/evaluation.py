@@ -15,6 +15,7 @@ from thud.levels import BANDWIDTHS
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet, LevelsForce
     from thud.case import Case
 
     Columns = dict[str, NDArray[Any]]
@@ -69,7 +70,7 @@ def evaluate(block: Block) -> Columns:
     }
 
 
-def level_names(case: Case) -> dict[str, tuple[str, str]]:
+def level_names(case: Case) -> dict[str, tuple[LevelsForce, BandSet]]:
     """Return force and bands of the levels of each set, by name.
 
     Octaves are always among them: the verdict needs them.

@@ -12,7 +12,6 @@ from thud.case import Case
 from thud.checks import (
     LARGEST_SEED,
     refuse,
-    refuse_old_words,
     refuse_value,
     require_kind,
     require_number,
@@ -21,6 +20,7 @@ from thud.checks import (
 )
 from thud.columns import read_table
 from thud.errors import FitWarning
+from thud.key import check_keywords
 from thud.recording import Recording
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
@@ -55,7 +55,7 @@ LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
 TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
 
 
-@refuse_old_words
+@check_keywords
 def fit(  # noqa: PLR0913 - options of a search
     target: ForceTarget | LevelTarget | Recording | Impact | tuple[ArrayLike, ArrayLike],
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],
@@ -224,8 +224,8 @@ class FitKind(Kind[FitStudy, Fit]):
         return f"{study.name}\n\n{result.table(study.units)}"
 
     def remarks(self, result: Fit) -> list[str]:
-        """Return the warnings."""
-        return list(result.warnings)
+        """Return the warnings, and what is not plausible in the impact that was found."""
+        return [*result.warnings, *result.impact.remarks]
 
     def succeeded(self, result: Fit) -> bool:
         """Return whether the search has converged."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
 
 from thud.checks import refuse, require_words
 from thud.studies.directory import save, take
@@ -46,7 +46,7 @@ class How(TypedDict, total=False):
         Remove results of another version of the study from the directory.
     """
 
-    backend: str | None
+    backend: Literal["threads", "processes", "dask"] | None
     workers: int | None
     scheduler: str | None
     yes: bool

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
-from thud.checks import refuse, require_choice
+from thud.checks import require_choice
+from thud.errors import InputError
+from thud.extras import require_extra
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from types import ModuleType
 
     from thud.studies.kind import Kind
@@ -42,11 +45,14 @@ KINDS = {
 }
 # Public names by the modules of this package.
 PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
+    "DesignMap": "design_map",
     "Fit": "fitting.result",
     "ForceTarget": "fitting.force_target",
     "LevelTarget": "fitting.level_target",
     "Parameter": "parameter",
+    "Sensitivity": "sensitivity",
     "Study": "study",
+    "Uncertainty": "uncertainty",
     "read_study": "kinds",
     "read_sweep": "blocks",
 }
@@ -54,10 +60,25 @@ PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
 
 def load(module: str) -> ModuleType:
     """Return a module of this package. Raises InputError where its dependencies are missing."""
-    try:
+    with require_extra("studies"):
         return importlib.import_module(f"thud.studies.{module}")
-    except ModuleNotFoundError as error:
-        refuse(f"{error.name} is not installed", "studies with pip install '.[studies]'", error)
+
+
+def public(name: str) -> object:
+    """Return a public object; where its packages are missing, a function that says so."""
+    try:
+        return getattr(load(PUBLIC[name]), name)
+    except InputError as error:
+        return _missing(str(error))
+
+
+def _missing(sentence: str) -> Callable[..., NoReturn]:
+    # Without them, dir, help and star imports still work.
+    def missing(*_: object, **__: object) -> NoReturn:
+        raise InputError(sentence)
+
+    missing.__doc__ = f"Not available: {sentence}."
+    return missing
 
 
 def get_kind(name: str) -> Kind[Any, Any]:

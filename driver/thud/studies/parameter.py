@@ -89,7 +89,7 @@ class Parameter:
         return self.key.kind in NUMBERS
 
     @property
-    def given(self) -> dict[str, Any]:
+    def given(self) -> dict[str, object]:
         """Its table, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
@@ -107,7 +107,7 @@ class Parameter:
             return len(self.values)
         return len(self.grid()) if self.key.kind == "whole" and self.count else self.count
 
-    def grid(self) -> NDArray[Any]:
+    def grid(self) -> NDArray[np.generic]:
         """Return the values of a grid."""
         if self.values is not None:
             return np.array(self.values)
@@ -117,7 +117,7 @@ class Parameter:
         values: NDArray[Any] = spaced(self.low, self.high, self.count)
         return np.unique(np.rint(values).astype(int)) if self.key.kind == "whole" else values
 
-    def quantile(self, share: NDArray[np.float64]) -> NDArray[Any]:
+    def quantile(self, share: NDArray[np.float64]) -> NDArray[np.generic]:
         """Return the values below which a share of all values lies."""
         if self.values is not None:
             return np.take(self.grid(), (share * len(self.values)).astype(int))
@@ -147,12 +147,12 @@ class Parameter:
     def __str__(self) -> str:
         """Return the parameter as it would stand in a file."""
         _, power = self.shown_unit
-        entries = {
-            word: [_in_unit(entry, power) for entry in value]
-            if word == "values"
-            else (value if word == "count" else _in_unit(value, power))
-            for word, value in self.given.items()
-        }
+        entries: dict[str, Any] = self.given
+        for word, value in entries.items():
+            if word == "values":
+                entries[word] = [_in_unit(entry, power) for entry in value]
+            elif word != "count":
+                entries[word] = _in_unit(value, power)
         return f"{{ {', '.join(f'{word} = {value!r}' for word, value in entries.items())} }}"
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from thud.checks import refuse
+from thud.display import Displayed
 from thud.levels import get_bands
 from thud.studies.dataset import coordinate
 from thud.studies.designs import MIN_SAMPLES
@@ -35,7 +36,7 @@ RESAMPLES = 200
 
 
 @dataclass(frozen=True, eq=False)
-class Sensitivity:
+class Sensitivity(Displayed):
     """Sobol indices of a study.
 
     Attributes
@@ -52,6 +53,15 @@ class Sensitivity:
     dataset: xr.Dataset
     indices: xr.Dataset
     left_out: int
+
+    def __repr__(self) -> str:
+        """Return parameters and outputs."""
+        names = ", ".join(map(str, self.indices["parameter"].values))
+        return f"<Sensitivity: {self.indices.sizes['output']} outputs to {names}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return self.table()
 
     def table(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: total indices of each output."""

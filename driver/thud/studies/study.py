@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
 # What studies are read from.
-Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, Any] | Study"
+Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"
 
 # What every study may hold.
 WORDS = ("name", "case", "fixed", "parameters")
@@ -102,7 +102,7 @@ def _shortened(text: str) -> str:
 
 @contextmanager
 def read_tables(
-    source: str | os.PathLike[str] | Mapping[str, Any],
+    source: str | os.PathLike[str] | Mapping[str, object],
 ) -> Iterator[tuple[dict[str, Any], Path, str]]:
     """Yield tables, folder and text of a study; InputErrors within the block name its file."""
     if isinstance(source, Mapping):
@@ -112,7 +112,7 @@ def read_tables(
     require_kind("study", source, str | Path)
     path = Path(source)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = _content(path)
         yield {"name": path.stem, **tomllib.loads(text)}, path.parent, text
     except InputError as error:
         message = f"{path}: {error}"
@@ -121,7 +121,14 @@ def read_tables(
         refuse(f"{path}: {error}", "TOML", error)
 
 
-def _text(source: Mapping[str, Any]) -> str:
+def _content(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        refuse(f"{error.strerror}", "a file that exists and can be read", error)
+
+
+def _text(source: Mapping[str, object]) -> str:
     """Return tables as JSON."""
     try:
         return json.dumps(source, default=_plain)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from thud.checks import refuse
+from thud.display import Displayed
 from thud.levels import get_bands, octave_limits
 from thud.studies.set_kind import SetKind
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud._schema import LimitsSource
     from thud.case import Case
     from thud.keys import Value
     from thud.studies.kind import How
@@ -31,7 +33,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True, eq=False)
-class Uncertainty:
+class Uncertainty(Displayed):
     """Distribution of the levels, and the probability of conformity.
 
     Attributes
@@ -48,10 +50,18 @@ class Uncertainty:
 
     dataset: xr.Dataset
     levels: NDArray[np.float64]
-    source: str
+    source: LimitsSource
     conforming: int
     computed: int
     failed: int
+
+    def __repr__(self) -> str:
+        """Return how many sets conform."""
+        return f"<Uncertainty, {self.source}: {self.conforming} of {self.computed} sets conform>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return self.table()
 
     @property
     def probability(self) -> float:

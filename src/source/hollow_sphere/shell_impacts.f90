@@ -6,6 +6,7 @@
 !> together, and each lane goes on at its own time.
 module thud_shell_impacts
    use thud_impact_batch, only: add_end, advance, finish_step, get_watched, impact_batch_type, is_finite, locate
+   use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    use thud_shell_batch, only: batch_size, state_batch_type
    use thud_shell_series, only: place_series, series_steps, will_last
@@ -101,6 +102,7 @@ contains
          if (n == nint(latest)) undisturbed = all(start < never .and. last >= never)
          call settle(impacts, compressing, real(n, wp), start, last, undisturbed, done)
          last_step = n
+         if (mod(n, series_steps) == 0) done = done .or. is_interrupted()
          if (done) exit
       end do
       call place_series(impacts%shell, impacts%states(impacts%now), start < never, impacts%series)

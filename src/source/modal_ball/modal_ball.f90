@@ -12,6 +12,7 @@ module thud_modal_ball
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
+   use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_lapack, only: dgemv
    use thud_legendre, only: get_legendre
@@ -169,6 +170,8 @@ contains
       basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
       allocate (step%omega(0), step%harmonic(0), step%fall(0, options%rings))
       do n = 0, options%static_harmonics
+         call check_interrupt(error)
+         if (allocated(error)) return
          if (n <= options%harmonics) then
             kept = options%radial_modes
             associate (static => options%static_families)
@@ -237,6 +240,7 @@ contains
          do j = 1, sampling%substeps
             n_step = (i - 1)*sampling%substeps + j
             call take_step(step, interval, ball%mass, height, state, contact, impulse, error)
+            call check_interrupt(error)
             if (allocated(error)) return
             if (contact%last > 0) then
                last = n_step

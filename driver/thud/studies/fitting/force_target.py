@@ -17,6 +17,8 @@ from thud.studies.fitting.misfit import Misfit, require_positive
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from thud._schema import LevelsForce
+
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 BELOW = 1250.0
 # Part of that frequency that rounded times leave open.
@@ -46,7 +48,7 @@ class ForceTarget:
         The force; of arrays: time, s, and force, N, both of shape (n_sample,).
     noise : float or None
         Standard deviation of the noise of one sample, N; None: it is estimated from the residual.
-    force : str
+    force : str or None
         ``"floor"`` (what a force plate measures) or ``"elastic"``: the force of the model, and
         of an impact as target.
     time_shift : bool or None
@@ -59,14 +61,16 @@ class ForceTarget:
 
     record: Recording | Impact | tuple[ArrayLike, ArrayLike]
     noise: float | None = None
-    force: str = "floor"
+    force: LevelsForce | None = None
     time_shift: bool | None = None
     below: float = BELOW
     window: tuple[float, float] | None = None
 
     def misfit(self) -> ForceMisfit:
         """Return what the fit needs of the target."""
-        require_choice("target: force", self.force, FORCES)
+        if self.force is not None:
+            require_choice("target: force", self.force, FORCES)
+        kind = self.force or (self.record.judged() if isinstance(self.record, Impact) else "floor")
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
@@ -85,7 +89,7 @@ class ForceTarget:
                 f"target: the force ends with {last / force.max():.0%} of its peak",
                 "a record of a whole impact",
             )
-        return ForceMisfit(time, force, rate, self.noise, self.force, self.below, free_shift=shift)
+        return ForceMisfit(time, force, rate, self.noise, kind, self.below, free_shift=shift)
 
     def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         given = self.record
@@ -134,7 +138,7 @@ class ForceMisfit(Misfit):
         force: NDArray[np.float64],
         sample_rate: float,
         noise: float | None,
-        kind: str,
+        kind: LevelsForce,
         below: float,
         *,
         free_shift: bool,

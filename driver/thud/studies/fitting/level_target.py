@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet, LevelsForce
     from thud.impact import Impact
 
 
@@ -37,22 +38,24 @@ class LevelTarget:
         Nominal mid frequencies of the levels, Hz; None: all bands.
     contact_time, restitution : tuple of float or None
         Value and standard deviation, s and 1.
-    force : str
-        ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared.
+    force : str or None
+        ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared; None: that
+        which its case judges.
     """
 
     levels: Sequence[float]
     uncertainty: float | Sequence[float] | None = None
-    bands: str = "octave"
+    bands: BandSet = "octave"
     frequencies: Sequence[float] | None = None
     contact_time: tuple[float, float] | None = None
     restitution: tuple[float, float] | None = None
-    force: str = "floor"
+    force: LevelsForce | None = None
 
     def misfit(self) -> LevelMisfit:
         """Return what the fit needs of the target."""
         require_choice("target: bands", self.bands, BANDWIDTHS)
-        require_choice("target: force", self.force, FORCES)
+        if self.force is not None:
+            require_choice("target: force", self.force, FORCES)
         nominal = get_bands(self.bands).nominal.tolist()
         asked = nominal
         if self.frequencies is not None:

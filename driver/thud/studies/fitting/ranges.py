@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._schema import KEYS
-from thud.checks import refuse, require_kind
+from thud.checks import refuse, require_kind, suggestion
 from thud.errors import InputError
 from thud.keys import limits, put
 from thud.studies.parameter import fitted
@@ -75,7 +75,8 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
     if name not in known:
         model = case.model.name if case.model else ""
         refuse(
-            f"[parameters] {name} is not a parameter of {model} that can be fitted",
+            f"[parameters] {name} is not a parameter of {model} that can be fitted"
+            f"{suggestion(name, known)}",
             ", ".join(known),
         )
     return fitted(name, given, case.model.name)  # type: ignore[union-attr]

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from thud._api import version
 from thud.case import case_text
-from thud.checks import refuse_old_words
+from thud.display import Displayed
+from thud.key import check_keywords
 from thud.studies.directory import save
 from thud.studies.fitting.inference import coverage_factor
 from thud.tables import format_rows
@@ -34,7 +35,7 @@ Units: TypeAlias = "Mapping[str, tuple[str, float]]"
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class Fit(Displayed):
     """The best parameters of a model for a target, and their uncertainty; SI units.
 
     Attributes
@@ -127,7 +128,7 @@ class Fit:
         """Time of first touch in the record, s."""
         return self.values.get(SHIFT, 0.0)
 
-    @refuse_old_words
+    @check_keywords
     def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
         """Return confidence intervals by name, Student's t where the noise is estimated.
 
@@ -140,9 +141,20 @@ class Fit:
         high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()
         return dict(zip(self.names, zip(low, high, strict=True), strict=True))
 
+    def __repr__(self) -> str:
+        """Return the values, and whether the search has converged."""
+        shown = zip(self.names, self.estimate, self.units, strict=True)
+        values = ", ".join(f"{name} {value:.4g} {unit}".strip() for name, value, unit in shown)
+        return f"<Fit, {'' if self.converged else 'not '}converged: {values}>"
+
     def table(self, units: Units | None = None) -> str:
         """Return the fit as text; `units` as in `shown_units`."""
-        rows = [("parameter", "value", "standard error", f"{self.confidence:.0%} interval", "unit")]
+        return "\n".join([format_rows(self.rows(units)), "", *self._remarks()])
+
+    def rows(self, units: Units | None = None) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        interval = f"{self.confidence:.0%} interval"
+        rows: list[tuple[str, ...]] = [("parameter", "value", "standard error", interval, "unit")]
         intervals = self.intervals()
         for name, (shown, factor) in self.shown_units(units).items():
             value, error = self.values[name] / factor, self.standard_errors[name] / factor
@@ -150,7 +162,7 @@ class Fit:
             digits = _digits(value, error)
             interval = f"{low:.{digits}g} to {high:.{digits}g}" if np.isfinite(error) else "unknown"
             rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, shown))
-        return "\n".join([format_rows(rows), "", *self._remarks()])
+        return rows
 
     def shown_units(self, units: Units | None = None) -> dict[str, tuple[str, float]]:
         """Return name and SI factor of the unit of each parameter; `units` override the default."""
@@ -178,7 +190,7 @@ class Fit:
         """Return the fit as text, with its warnings."""
         return "\n".join([self.table(), *(f"Warning: {text}." for text in self.warnings)])
 
-    def summary(self) -> dict[str, Any]:
+    def summary(self) -> dict[str, object]:
         """Return the numbers of the fit for JSON: None where they are not finite."""
         intervals = self.intervals()
         return {

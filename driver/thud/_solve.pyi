@@ -1,0 +1,141 @@
+"""The calls of `thud.solve` by model, for type checkers.
+
+Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
+"""
+
+from collections.abc import Sequence
+from typing import Literal, TypedDict, Unpack, overload
+
+from thud._schema import (
+    Ball,
+    Drop,
+    FiniteElementLaw,
+    FiniteElementTreatment,
+    FiniteElementViscosity,
+    HollowSphereMomentumFlux,
+    ModalBallDampingLaw,
+    ModelName,
+    ModelOptions,
+)
+from thud.impact import Impact
+
+class SamplingOptions(TypedDict, total=False):
+    sample_rate: float
+    duration: float
+    substeps: int
+
+class HollowSphereOptions(SamplingOptions, total=False):
+    momentum_flux: HollowSphereMomentumFlux
+
+class ModalBallOptions(SamplingOptions, total=False):
+    harmonics: int
+    radial_modes: int
+    static_harmonics: int
+    rings: int
+    damping_law: ModalBallDampingLaw
+    loss_factor: float
+    loss_frequency: float
+    cavity_gas: bool
+    static_families: Sequence[int]
+
+class FiniteElementOptions(SamplingOptions, total=False):
+    bounces: int
+    flight_before: float
+    flight_after: float
+    step_safety: float
+    radial_elements: int
+    polar_elements: int
+    law: FiniteElementLaw
+    mooney_share: float
+    bulk_ratio: float
+    viscosity: FiniteElementViscosity
+    loss_factor: float
+    loss_frequency: float
+    prony_share: Sequence[float]
+    prony_time: Sequence[float]
+    treatment: FiniteElementTreatment
+    penalty_ratio: float
+    snapshot_interval: float
+
+class MeasuredModesOptions(SamplingOptions, total=False):
+    frequency: Sequence[float]
+    damping_ratio: Sequence[float]
+    effective_mass: Sequence[float]
+    allow_mass_mismatch: bool
+
+class HuntCrossleyOptions(SamplingOptions, total=False):
+    stiffness: float
+    contact_time: float
+    exponent: float
+    damping: float
+    restitution: float
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., model: Literal["hollow_sphere"] = ...,
+    **options: Unpack[HollowSphereOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``hollow_sphere``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["modal_ball"],
+    **options: Unpack[ModalBallOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``modal_ball``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["modal_ball"],
+    **options: Unpack[ModalBallOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``modal_ball``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["finite_element"],
+    **options: Unpack[FiniteElementOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``finite_element``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["finite_element"],
+    **options: Unpack[FiniteElementOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``finite_element``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["measured_modes"],
+    **options: Unpack[MeasuredModesOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``measured_modes``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["measured_modes"],
+    **options: Unpack[MeasuredModesOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``measured_modes``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["hunt_crossley"],
+    **options: Unpack[HuntCrossleyOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``hunt_crossley``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["hunt_crossley"],
+    **options: Unpack[HuntCrossleyOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``hunt_crossley``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., model: ModelName | ModelOptions = ...,
+    **options: Unpack[SamplingOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor."""

@@ -1,0 +1,133 @@
+"""The process of ``thud-driver``: its signals and its screen.
+
+Imports nothing but small modules of the standard library: an interrupt and a closed output have
+their sentence from the first moment, while the rest is imported, too.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from contextlib import suppress
+from threading import Timer
+from typing import TYPE_CHECKING, Any, TextIO, cast
+
+if TYPE_CHECKING:
+    from types import FrameType
+
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Time in which another signal is a copy of the first: some callers send it to process and group, s.
+_COPIES = 1.0
+# Time between two attempts to interrupt, and time after which an import is not waited for, s.
+_PAUSE, _PATIENCE = 0.005, 0.4
+
+
+def main() -> int:
+    """Run the command line of this process; return the exit code."""
+    _handle(_end)
+    _open_screen()
+    from thud.cli import main as run  # noqa: PLC0415 - takes its time
+
+    interrupt = _Interrupt()
+    sys.unraisablehook = interrupt.retry
+    _handle(interrupt)
+    try:
+        code = run()
+    except Exception:
+        # Compiled modules, such as those that draw, turn an interrupt into an error of their own.
+        if not interrupt.number:
+            raise
+        code = _say(interrupt.number)
+    _handle(signal.SIG_IGN)
+    return code
+
+
+def _handle(handler: Any) -> None:  # noqa: ANN401 - as `signal.signal` takes it
+    """Handle signals that end the process, unless it was started to ignore them."""
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, handler)
+
+
+def _end(number: int, _: FrameType | None) -> None:
+    os._exit(_say(number))
+
+
+def _say(number: int) -> int:
+    """Say that the process was interrupted; return the exit code."""
+    with suppress(OSError):
+        os.write(2, b"thud-driver: interrupted; finished results are kept\n")
+    return 128 + number
+
+
+class _Interrupt:
+    """Handler that raises KeyboardInterrupt with the number of the signal, once."""
+
+    def __init__(self) -> None:
+        self.first = 0.0
+        self.number = 0
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        if not self.first:
+            self.first = time.monotonic()
+            self.number = number
+            self.attempt(number, frame)
+        elif time.monotonic() > self.first + _COPIES:
+            _end(number, frame)
+
+    def attempt(self, number: int, frame: FrameType | None) -> None:
+        """Raise it, but not during an import: modules lose or print what they do not expect."""
+        while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+            frame = frame.f_back
+        if not frame:
+            signal.signal(number, self)
+            raise KeyboardInterrupt(number)
+        if time.monotonic() > self.first + _PATIENCE:
+            _end(number, frame)
+        self.again(number)
+
+    def again(self, number: int) -> None:
+        """Try again a little later."""
+        signal.signal(number, self.attempt)
+        timer = Timer(_PAUSE, signal.raise_signal, (number,))
+        timer.daemon = True
+        timer.start()
+
+    def retry(self, lost: sys.UnraisableHookArgs) -> None:
+        """Take up what a callback, such as one of a weak reference, could not raise."""
+        if isinstance(lost.exc_value, KeyboardInterrupt):
+            self.again(*lost.exc_value.args or SIGNALS[:1])
+        else:
+            sys.__unraisablehook__(lost)
+
+
+def _open_screen() -> None:
+    """Give closed descriptors a place, so that no file gets their number, and cannot be written."""
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_WRONLY if number == 0 else os.O_RDONLY)
+    sys.stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
+    sys.stderr = cast("TextIO", _Lossy(sys.stderr or os.fdopen(2, "w", closefd=False)))
+
+
+class _Lossy:
+    """Standard error; what it cannot take is lost, and the work goes on."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the stream has
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        with suppress(OSError):
+            self._stream.write(text)
+        return len(text)
+
+    def flush(self) -> None:
+        with suppress(OSError):
+            self._stream.flush()

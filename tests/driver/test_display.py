@@ -1,0 +1,158 @@
+"""Text, HTML, figures, datasets and tables of results."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import thud
+from thud.display import html_table
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from thud.display import Displayed
+
+MASS = {"mass": {"low": 2.4, "high": 2.6}}
+
+
+@cache
+def impact() -> thud.Impact:
+    return thud.solve(thud.Ball.standard(), model="finite_element")
+
+
+def results() -> list[Displayed]:
+    many = thud.solve_many({"mass": [2.5, -1.0]})
+    judged = impact().conformity()
+    record = thud.Recording(impact().time, impact().floor_force, impact().sample_rate)
+    modes = thud.free_modes(count=2, radial_elements=2, polar_elements=16)
+    grid = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
+    studies = [
+        thud.design_map({"parameters": grid}),
+        thud.uncertainty({"parameters": MASS, "design": {"size": 4}}),
+        thud.sensitivity({"parameters": MASS, "design": {"size": 4}}),
+        thud.fit(thud.solve(), ["mass"]),
+        thud.compare({"one": impact(), "two": record}),
+    ]
+    basics = [impact(), judged, judged.criteria[0], many, modes, record, thud.get_bands("third")]
+    return [*basics, thud.Case(modes=thud.Modes()), *studies]
+
+
+def test_results_have_a_line_and_a_table() -> None:
+    for result in results():
+        text = repr(result)
+        assert "\n" not in text
+        assert "array" not in text
+        assert len(text) < 120
+        assert text.startswith(f"<{type(result).__name__}")
+        title, table = ET.fromstring(f"<html>{result._repr_html_()}</html>")  # noqa: S314
+        assert title.text == text[1:-1]
+        assert [[cell.text or "" for cell in row] for row in table] == [
+            list(r) for r in result.rows()
+        ]
+        widths = {len(row) for row in result.rows()}
+        assert len(widths) == 1
+
+
+def test_texts_name_verdicts_and_numbers() -> None:
+    assert repr(impact().conformity()) == "<Conformity, rubber_ball: conforms>"
+    shell = thud.solve().conformity()
+    missed = "octave_125, octave_250, octave_500"
+    assert repr(shell) == f"<Conformity, rubber_ball: does not conform in {missed}>"
+    assert repr(shell.criteria[2]) == (
+        "<Criterion, octave 125: 18.95 dB is too low, allowed 21.5 to 24.5>"
+    )
+    assert shell.rows()[-1] == ("all criteria", "", "", "does not conform")
+    many = thud.solve_many({"mass": [2.5, -1.0]})
+    assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 1 failed>"
+    assert repr(thud.Case("one", model=None, modes=thud.Modes())) == "<Case one: free modes>"
+
+
+def test_unknown_criteria_are_not_met() -> None:
+    record = thud.Recording(impact().time, impact().floor_force, impact().sample_rate)
+    verdicts = {name: verdict for name, _, _, verdict in record.conformity().rows()}
+    assert verdicts["restitution"] == "is not known"
+    assert verdicts["all criteria"] == "cannot be decided"
+
+
+def test_remarks_are_shown() -> None:
+    with pytest.warns(thud.PlausibilityWarning):
+        odd = thud.solve(thud.Ball(mass=0.5, youngs_modulus=1e5))
+    assert [row[1] for row in odd.rows() if row[0] == "remark"] == list(odd.remarks)
+    assert odd.remarks
+
+
+def test_html_is_escaped() -> None:
+    case = thud.Case("<script>&")
+    assert "<script>" not in case._repr_html_()
+    assert "&lt;script&gt;&amp;" in case._repr_html_()
+    assert html_table([("<",), ('"&',)]).count("&") == 3
+
+
+def test_figure_shows_force_and_levels() -> None:
+    history, octaves = impact().plot().axes
+    assert history.get_xlabel() == "Time since first touch, ms"
+    (line,) = [line for line in octaves.lines if len(line.get_xdata()) == 5]
+    np.testing.assert_array_equal(line.get_ydata(), impact().levels())
+    record = thud.Recording(impact().time, impact().floor_force, impact().sample_rate)
+    _, octaves = record.plot("tyre").axes
+    labels = octaves.get_legend_handles_labels()[1]
+    assert labels == ["Tolerance, tyre", "Nominal", "recording"]
+
+
+def test_dataset_of_an_impact_has_units_and_provenance(tmp_path: Path) -> None:
+    found = impact().to_xarray()
+    np.testing.assert_array_equal(found["floor_force"], impact().floor_force)
+    np.testing.assert_array_equal(found["contact_radius"], impact().channels["contact_radius_m"])
+    assert found["contact_radius"].attrs["units"] == "m"
+    assert found["velocity"].attrs["units"] == "m/s"
+    assert found["minimum_volume_ratio"].attrs["units"] == "1"
+    np.testing.assert_array_equal(found["time"], impact().time)
+    third = impact().levels("third", force="elastic")
+    np.testing.assert_array_equal(found["elastic_third_level"], third)
+    assert found["third"].values.tolist() == thud.get_bands("third").nominal.tolist()
+    assert float(found["peak_force"]) == impact().peak_force
+    assert bool(found["conforms"])
+    assert all({"units", "long_name"} <= set(entry.attrs) for entry in found.variables.values())
+    assert thud.Case.from_text(found.attrs["case"]) == impact().case
+    assert found.attrs["thud_version"] == thud.__version__
+    found.to_netcdf(tmp_path / "impact.nc", engine="h5netcdf")
+    xr.testing.assert_equal(xr.load_dataset(tmp_path / "impact.nc", engine="h5netcdf"), found)
+
+
+def test_dataset_of_an_ensemble_is_that_of_a_study() -> None:
+    heights = {"height": [0.5, 1.0, 500.0]}
+    many = thud.solve_many(heights, bands="third", forces=True)
+    found = many.to_xarray()
+    fixed = {"bands": "both"}
+    study = thud.sweep({"parameters": {"height": {"values": heights["height"]}}, "fixed": fixed})
+    names = set(study.data_vars) & set(found.data_vars)
+    assert {"floor_level", "elastic_third_level", "margin", "reason"} <= names
+    for name in names:
+        np.testing.assert_array_equal(found[name].values, study[name].values)
+        assert found[name].attrs == study[name].attrs
+    np.testing.assert_array_equal(found["floor_force"], many.floor_force)
+    assert found["time"].values[-1] == pytest.approx(many.case.sampling.duration, abs=1e-4)
+    assert found["height"].values.tolist() == heights["height"]
+    assert found.attrs["case"] == study.attrs["case"].replace("'both'", "'third'")
+    # Keys that are named as results are.
+    lumped = thud.solve_many({"contact_time": [0.02], "restitution": [0.8]}, model="hunt_crossley")
+    assert float(lumped.to_xarray()["hunt_crossley_contact_time"][0]) == 0.02
+
+
+def test_table_of_an_impact_has_the_columns_of_its_files() -> None:
+    table = impact().to_dataframe()
+    assert table.index.name == "time_s"
+    assert list(table)[:4] == [
+        "deflection_m",
+        "velocity_m_per_s",
+        "elastic_force_N",
+        "floor_force_N",
+    ]
+    np.testing.assert_array_equal(table["floor_force_N"], impact().floor_force)
+    assert set(impact().channels) < set(table)

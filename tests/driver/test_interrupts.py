@@ -1,0 +1,271 @@
+"""Interrupts of long work, from Python, from ``thud`` and from ``thud-driver``."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from conftest import MINIMAL
+
+import thud
+from thud.files import uninterrupted
+from thud.levels import peak_count, record_force
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+# The aim is one second; machines that test may be busy.
+LIMIT = 20.0
+# All of these take longer than that, some of them minutes.
+FINE = {"radial_elements": 16, "polar_elements": 512}
+WORK: dict[str, Callable[[], object]] = {
+    "finite elements": lambda: thud.solve(model="finite_element", **FINE),
+    "bounces": lambda: thud.solve(model="finite_element", bounces=100, duration=10.0),
+    "modes in contact": lambda: thud.solve(
+        model="modal_ball", sample_rate=2e5, duration=1.0, substeps=400
+    ),
+    "shell": lambda: thud.solve(sample_rate=4e6, substeps=1000, duration=0.025),
+    "batches": lambda: thud.solve_many(
+        {"height": np.linspace(0.5, 1.5, 64)},
+        threads=2,
+        sample_rate=4e6,
+        substeps=1000,
+        duration=0.025,
+    ),
+    "drops": lambda: thud.solve_many(
+        {"height": np.linspace(0.5, 1.5, 40)},
+        thud.Case(model=thud.FiniteElement(**FINE)),
+        threads=2,
+    ),
+    "free modes": lambda: thud.free_modes(radial_elements=64, polar_elements=1024),
+}
+LONG = "&ball /\n&drop /\n&model name = 'finite_element' /\n&mesh {} /\n".format(
+    " ".join(f"{key} = {value}" for key, value in FINE.items())
+)
+KEPT = "thud-driver: interrupted; finished results are kept\n"
+DRIVER = [sys.executable, "-c", "import sys, thud_driver; sys.exit(thud_driver.main())"]
+
+
+@contextmanager
+def sender(delay: float) -> Iterator[None]:
+    """Send SIGINT to this process after a while, unless the block has ended before."""
+    command = f"sleep {delay}; kill -INT {os.getpid()}"
+    with subprocess.Popen(["/bin/sh", "-c", command]) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def interrupt(work: Callable[[], object], delay: float = 0.2) -> None:
+    """Interrupt work, which has to end within the limit, and not by itself."""
+    start = time.monotonic()
+    with sender(delay), pytest.raises(KeyboardInterrupt):
+        work()
+    assert time.monotonic() < start + delay + LIMIT
+
+
+def ended(process: subprocess.Popen[str], number: int) -> str:
+    """Send a signal to a process that has to end within the limit; return its errors.
+
+    They end with the last of the processes that it has started.
+    """
+    process.send_signal(number)
+    _, errors = process.communicate(timeout=LIMIT)
+    assert process.returncode == 128 + number
+    return errors
+
+
+@pytest.mark.parametrize("work", WORK.values(), ids=WORK)
+def test_interrupt_ends_a_call_and_leaves_the_interpreter_whole(work: Callable[[], object]) -> None:
+    before = thud.solve().floor_force
+    interrupt(work)
+    assert np.array_equal(thud.solve().floor_force, before)
+
+
+def test_numbers_after_an_interrupt_between_two_calls_are_right() -> None:
+    impact = thud.solve()
+    before = record_force(impact.floor_force, impact.sample_rate)
+    with pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+    assert np.array_equal(record_force(impact.floor_force, impact.sample_rate), before)
+    assert peak_count(impact.floor_force, impact.sample_rate) == 1
+
+
+def test_driver_that_waits_for_another_writer_can_be_ended(tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text(MINIMAL)
+    (tmp_path / ".out.part").mkdir()
+    command = [*DRIVER, "run", "--no-figures", "-q", "case.nml", "-o", "out"]
+    other = os.open(tmp_path / ".out.part", os.O_RDONLY)
+    try:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+            time.sleep(2.5)
+            assert process.poll() is None
+            assert ended(process, signal.SIGTERM) == KEPT
+    finally:
+        os.close(other)
+    assert not (tmp_path / "out").exists()
+
+
+def test_interrupt_ends_calls_in_other_threads() -> None:
+    with ThreadPoolExecutor(2) as threads:
+        futures = [threads.submit(WORK["finite elements"]) for _ in range(2)]
+        interrupt(futures[0].result)
+    assert all(isinstance(future.exception(), KeyboardInterrupt) for future in futures)
+
+
+def test_call_goes_on_where_the_handler_returns() -> None:
+    seen: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: seen.append(number))
+    options: dict[str, Any] = {"sample_rate": 1e6, "substeps": 40}
+    try:
+        with sender(0.1):
+            found = thud.solve(**options)
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    assert seen == [signal.SIGINT]
+    assert np.array_equal(found.floor_force, thud.solve(**options).floor_force)
+
+
+def test_ignored_interrupt_is_ignored() -> None:
+    usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with sender(0.1):
+            thud.solve(sample_rate=1e6, substeps=40)
+    finally:
+        signal.signal(signal.SIGINT, usual)
+
+
+def test_forked_process_does_not_wait_for_calls_of_its_parent() -> None:
+    code = """
+import os, signal, threading, time, thud
+long = lambda: thud.solve(model="finite_element", radial_elements=16, polar_elements=512)
+threading.Thread(target=long, daemon=True).start()
+time.sleep(0.3)
+child = os.fork()
+if child:
+    os._exit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+timer.start()
+try:
+    long()
+except KeyboardInterrupt:
+    thud.solve()
+    os._exit(7)
+"""
+    done = subprocess.run([sys.executable, "-c", code], check=False, timeout=2 * LIMIT)
+    assert done.returncode == 7
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("copies", [1, 2], ids=["once", "twice"])
+def test_executable_ends_sets_and_leaves_nothing(
+    executable: str, number: int, copies: int, tmp_path: Path
+) -> None:
+    (tmp_path / "long.nml").write_text(LONG)
+    (tmp_path / "sets.csv").write_text("height\n" + "1.0\n" * 8)
+    command = [executable, "long.nml", "--sets", "sets.csv", "--threads", "2"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        while not (tmp_path / "outputs/.long_sets.part/sets.csv").exists():
+            time.sleep(0.01)
+        # Some callers send a signal to the process and to its group.
+        for _ in range(copies - 1):
+            process.send_signal(number)
+            time.sleep(0.01)
+        assert ended(process, number) == "thud: interrupted; nothing was written\n"
+    assert not list((tmp_path / "outputs").iterdir())
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.1, 0.2, 0.4])
+def test_interrupt_at_the_start_of_the_driver_is_one_sentence(delay: float, tmp_path: Path) -> None:
+    (tmp_path / "long.nml").write_text(LONG)
+    # Prints a line when it handles signals.
+    code = """
+import sys, thud_driver
+handle = thud_driver._handle
+thud_driver._handle = lambda handler: (handle(handler), print(flush=True))
+sys.exit(thud_driver.main())
+"""
+    command = [sys.executable, "-c", code, "run", "-q", "long.nml"]
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout
+        process.stdout.readline()
+        time.sleep(delay)
+        assert ended(process, signal.SIGINT) == KEPT
+
+
+def test_interrupt_that_a_compiled_module_makes_an_error_of_is_one_sentence() -> None:
+    code = """
+import signal, sys, thud_driver
+from thud import cli
+
+def draw(*_):
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        raise TypeError("incompatible function arguments")
+
+cli.main = lambda: draw()
+sys.exit(thud_driver.main())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == KEPT
+    assert done.returncode == 130
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupted_cases_keep_those_that_are_done(number: int, tmp_path: Path) -> None:
+    (tmp_path / "short.nml").write_text(MINIMAL)
+    (tmp_path / "long.nml").write_text(LONG)
+    command = [*DRIVER, "run", "-q", "--no-figures", "short.nml", "long.nml"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        while not (tmp_path / "outputs/short/summary.nml").exists():
+            time.sleep(0.01)
+        time.sleep(0.2)
+        assert ended(process, number) == KEPT
+    assert [path.name for path in (tmp_path / "outputs").iterdir()] == ["short"]
+    assert thud.read_results(tmp_path / "outputs/short").contact_time > 0
+
+
+@pytest.mark.parametrize("backend", ["threads", "processes"])
+def test_interrupted_study_waits_for_no_block(backend: str, tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(
+        "parameters.height = {low = 0.9, high = 1.1}\ndesign = {kind = 'random', size = 40}\n"
+        "fixed = {model = 'finite_element', radial_elements = 16, polar_elements = 512}\n"
+    )
+    command = [*DRIVER, "sweep", "-q", "study.toml", "--backend", backend, "--workers", "2"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        while not (tmp_path / "outputs/study/study.partial").exists():
+            time.sleep(0.01)
+        time.sleep(1.0)
+        assert ended(process, signal.SIGINT) == KEPT
+
+
+def test_main_thread_alone_defers_signals() -> None:
+    done = []
+
+    def defer() -> None:
+        with uninterrupted():
+            if threading.current_thread() is threading.main_thread():
+                signal.raise_signal(signal.SIGINT)
+            done.append(1)
+
+    with pytest.raises(KeyboardInterrupt):
+        defer()
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(defer).result()
+    assert done == [1, 1]

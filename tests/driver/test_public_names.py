@@ -1,0 +1,284 @@
+"""Every public name: found, documented, typed, and with a hint where it is misspelt."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import os
+import pydoc
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, get_origin
+
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import impact, units
+from thud._schema import KEYS, MODELS
+from thud.studies import kinds
+from thud.studies.parameter import fitted
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+DRIVER = REPOSITORY / "driver"
+SCRIPT = Path(__file__).with_name("user_script.py")
+# What NumPy's own types hold: shapes of any dimension, data of any type.
+NUMPY = r"tuple\[Any, \.\.\.\]|numpy\.(dtype|generic)\[Any\]"
+WRONG = {
+    'thud.solve(momentum_flux="retardin")': "call-overload",
+    'thud.solve(model="finite_elements")': "call-overload",
+    "thud.solve(loss_factor=0.2)": "call-overload",
+    "thud.solve(height=1.0)": "call-overload",
+    'thud.solve(model="finite_element", viscosity="kelvin")': "call-overload",
+    'thud.solve(None, None, "modal_ball", harmonic=8)': "call-overload",
+    'thud.FiniteElement(law="hooke")': "arg-type",
+    'thud.Levels(force="elastik")': "arg-type",
+    'thud.solve().levels("fifth")': "arg-type",
+    'thud.solve().conformity(source="football")': "arg-type",
+    'thud.solve_many({}, model="cube")': "arg-type",
+    'thud.get_bands("fifth")': "arg-type",
+    "thud.slove()": "attr-defined",
+    "thud.Ball(radius=0.1)": "call-arg",
+}
+
+
+def late_imports() -> dict[str, str]:
+    """Return the modules of the names that are imported at first use."""
+    late = vars(thud)["_LATE"]
+    table = {name: f"thud.{module}" if module else "thud" for name, module in late.items()}
+    return table | {name: f"thud.studies.{module}" for name, module in kinds.PUBLIC.items()}
+
+
+def test_every_public_name_is_found_and_documented() -> None:
+    assert set(dir(thud)) == {*thud.__all__, "__version__"}
+    assert len(set(thud.__all__)) == len(thud.__all__)
+    for name in thud.__all__:
+        found = getattr(thud, name)
+        assert inspect.getdoc(found) or get_origin(found), name
+    text = pydoc.plain(pydoc.render_doc(thud))
+    assert all(name in text for name in thud.__all__)
+
+
+def test_types_are_part_of_the_package() -> None:
+    package = Path(thud.__file__).parent
+    for name in ("py.typed", "_core.pyi", "_solve.pyi"):
+        assert (package / name).read_bytes() == (DRIVER / "thud" / name).read_bytes()
+
+
+def test_typing_imports_are_those_at_first_use() -> None:
+    tree = ast.parse((DRIVER / "thud/__init__.py").read_text())
+    blocks = [
+        n for n in tree.body if isinstance(n, ast.If) and ast.unparse(n.test) == "TYPE_CHECKING"
+    ]
+    (block,) = blocks
+    found = {
+        alias.asname: node.module
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.asname
+    }
+    assert found == late_imports() | {"solve": "thud._solve"}
+
+
+def test_calls_of_each_model_are_those_of_solve() -> None:
+    tree = ast.parse((DRIVER / "thud/_solve.pyi").read_text())
+    wanted = list(inspect.signature(impact.solve).parameters.values())
+    shared = {parameter.name for parameter in wanted if parameter.kind is parameter.KEYWORD_ONLY}
+    options = {
+        node.name: {line.target.id for line in node.body if isinstance(line, ast.AnnAssign)}  # type: ignore[union-attr]
+        for node in tree.body
+        if isinstance(node, ast.ClassDef)
+    }
+    assert options.pop("SamplingOptions") == shared
+    assert list(options) == [f"{kind.__name__}Options" for kind in MODELS.values()]
+    for kind in MODELS.values():
+        assert options[f"{kind.__name__}Options"] == {f.name for f in dataclasses.fields(kind)}
+    calls = [node.args for node in tree.body if isinstance(node, ast.FunctionDef)]
+    for call in calls:
+        names = [argument.arg for argument in (*call.args, *call.kwonlyargs)]
+        assert names == ["ball", "drop", "model"]
+    given = {ast.unparse((call.args + call.kwonlyargs)[-1].annotation or call) for call in calls}
+    assert given == {*(f"Literal['{name}']" for name in MODELS), "ModelName | ModelOptions"}
+
+
+def test_users_script_touches_every_name_and_runs(tmp_path: Path) -> None:
+    nodes = ast.walk(ast.parse(SCRIPT.read_text()))
+    used = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
+    assert {f"thud.{name}" for name in thud.__all__} <= used
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    command = [sys.executable, SCRIPT]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert "<Uncertainty, rubber_ball: 0 of 8 sets conform>" in done.stdout
+
+
+@pytest.fixture(scope="module")
+def checked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
+    """Return what mypy says of the user's script, of all names and of wrong calls, by file."""
+    folder = tmp_path_factory.mktemp("typed")
+    (folder / "script.py").write_text(SCRIPT.read_text())
+    (folder / "wrong.py").write_text("\n".join(["import thud", *WRONG]))
+    lines = ["import thud"]
+    for name in thud.__all__:
+        found = getattr(thud, name)
+        lines.append(f"reveal_type(thud.{name})")
+        if inspect.isclass(found) and not issubclass(found, Exception):
+            fields = (
+                [f.name for f in dataclasses.fields(found)]
+                if hasattr(found, "__match_args__")
+                else []
+            )
+            lines.append(f"def see_{name}(it: thud.{name}) -> None:")
+            names = dict.fromkeys([*fields, *dir(found)])
+            lines += [f"    reveal_type(it.{one})" for one in names if not one.startswith("_")]
+            lines.append("    return")
+    (folder / "names.py").write_text("\n".join(lines))
+    command = [sys.executable, "-m", "mypy", "--strict", *sorted(folder.glob("*.py"))]
+    environment = {**os.environ, "MYPYPATH": str(DRIVER)}
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False, env=environment
+    )
+    said: dict[str, list[str]] = {"script": [], "wrong": [], "names": []}
+    for line in done.stdout.splitlines():
+        if match := re.match(r"(\w+)\.py:", line):
+            said[match[1]].append(line)
+    assert said["names"], done.stdout + done.stderr
+    return said
+
+
+def test_users_script_is_typed(checked: dict[str, list[str]]) -> None:
+    assert checked["script"] == []
+
+
+def test_no_public_name_is_of_any_type(checked: dict[str, list[str]]) -> None:
+    assert not [line for line in checked["names"] if "Revealed type is" not in line]
+    assert len(checked["names"]) > len(thud.__all__)
+    loose = [line for line in checked["names"] if re.search(r"\bAny\b", re.sub(NUMPY, "", line))]
+    assert loose == []
+
+
+def test_wrong_calls_are_errors_of_type_checkers(checked: dict[str, list[str]]) -> None:
+    errors = [
+        re.match(r"wrong\.py:(\d+): error: .*\[([\w-]+)\]$", line) for line in checked["wrong"]
+    ]
+    found = {int(match[1]): match[2] for match in errors if match}
+    assert found == dict(enumerate(WRONG.values(), start=2))
+
+
+def test_names_whose_packages_are_missing_say_so_when_called() -> None:
+    code = """if True:
+        import pydoc, sys
+        sys.modules["xarray"] = None
+        import thud
+        from thud import *
+        assert "sweep" in dir(thud) and "sweep" in pydoc.render_doc(thud)
+        for call in (sweep, thud.solve().to_xarray, thud.solve().to_dataframe, thud.Sensitivity):
+            try:
+                call()
+            except thud.InputError as error:
+                print(error)
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    sentence = "xarray is not installed; allowed: pip install h5netcdf h5py SALib xarray zarr\n"
+    assert done.stdout == 4 * sentence, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("call", "sentence"),
+    [
+        (lambda: thud.solve(height=1.0), "&hollow_sphere: 'height' is a key of Drop; allowed: "),
+        (lambda: thud.solve(bounces=2), "'bounces' is a key of FiniteElement; allowed: momentum"),
+        (lambda: thud.solve(loss_factor=1), "is a key of ModalBall and FiniteElement; allowed: "),
+        (lambda: thud.solve(force="floor"), "'force' is a key of Levels; allowed: "),
+        (lambda: thud.solve_many({}, mass=2.0), r"solve_many\(\): 'mass' is a key of Ball; all"),
+        (lambda: thud.free_modes(mass=2.0), r"free_modes\(\): 'mass' is a key of Ball; allowed: "),
+        (lambda: thud.Ball(height=1.0), r"Ball\(\): 'height' is a key of Drop; allowed: outer_r"),
+        (lambda: thud.Ball(drop=1.0), r"Ball\(\): 'drop' is a key of Case; allowed: outer_radius"),
+        (lambda: thud.Ball(mas=1.0), r"'mas' is not known \(did you mean 'mass'\?\); allowed: "),
+        (lambda: thud.Case(levles=0), r"not known \(did you mean 'levels'\?\); allowed: name, "),
+        (lambda: thud.solve(model="Hollow_Sphere"), r"did you mean 'hollow_sphere'\?\); allowed"),
+        (lambda: thud.solve_many({"heigth": 1}), r"sphere \(did you mean 'height'\?\); allowed"),
+        (lambda: thud.get_bands("octav"), r"\(did you mean 'octave'\?\); allowed: 'octave', 'th"),
+        (lambda: thud.solve().conformity("rubberball"), r"\(did you mean 'rubber_ball'\?\); all"),
+        (lambda: thud.fit(thud.solve(), ["mas"]), r"be fitted \(did you mean 'mass'\?\); allow"),
+        (lambda: thud.read_study({}, "swep"), r"\(did you mean 'sweep'\?\); allowed: 'sweep'"),
+        (
+            lambda: thud.sweep({"parameters": {"height": {"vales": [1]}}}),
+            r"height: 'vales' is not known \(did you mean 'values'\?\); allowed: values, low",
+        ),
+        (lambda: thud.sweep({}, worker=2), r"'worker' is not known \(did you mean 'workers'\?\)"),
+        (
+            lambda: thud.solve(model=thud.FiniteElement(), bounces=2),
+            "an object of FiniteElement beside bounces; allowed: options in the object",
+        ),
+    ],
+)
+def test_misplaced_and_misspelt_words_are_told(call: Callable[[], object], sentence: str) -> None:
+    with pytest.raises(thud.InputError, match=sentence):
+        call()
+
+
+def test_misspelt_names_are_told() -> None:
+    with pytest.raises(AttributeError, match=r"attribute 'slove' \(did you mean 'solve'\?\)$"):
+        thud.slove  # noqa: B018
+    with pytest.raises(AttributeError, match=r"attribute 'cube'$"):
+        thud.cube  # noqa: B018
+
+
+def test_model_may_be_an_object() -> None:
+    options = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
+    one = thud.solve(None, None, options)
+    other = thud.solve(model="hunt_crossley", contact_time=0.02, restitution=0.8)
+    assert (one.floor_force == other.floor_force).all()
+
+
+def test_standard_ball_conforms() -> None:
+    impact = thud.solve(
+        thud.Ball.standard(),
+        model="finite_element",
+        viscosity="kelvin_voigt",
+        loss_factor=0.2,
+        loss_frequency=74.0,
+    )
+    assert impact.conformity()
+    assert impact.remarks == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [("32 mm", 0.032), ("2.08MPa", 2.08e6), (" -1e3 ms", -1.0), ("5 %", 0.05), ("20 degC", 20.0)],
+)
+def test_quantity_is_in_si_units(text: str, value: float) -> None:
+    assert thud.quantity(text) == value
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("32", "quantity = '32': unit is missing; allowed: m, cm, mm, "),
+        ("32 MM", r"unit 'MM' is not known \(did you mean 'mm'\?\); allowed: m, cm, "),
+        ("5 inch", "quantity = '5 inch': unit 'inch' is not known; allowed: m, "),
+        ("5 m m", "unit 'm m' is not known"),
+        ("mm", "quantity = 'mm' is not a number and its unit; allowed: such as '32 mm'"),
+        ("1e999 m", "is not a number and its unit"),
+        ("nan m", "is not a number and its unit"),
+        (0.032, "quantity = 0.032 is not allowed; allowed: an object of str"),
+    ],
+)
+def test_quantity_does_not_guess(text: str, sentence: str) -> None:
+    with pytest.raises(thud.InputError, match=sentence):
+        thud.quantity(text)
+
+
+@pytest.mark.parametrize("name", ["height", "youngs_modulus", "mass", "sample_rate", "duration"])
+def test_quantity_takes_the_units_of_studies(name: str) -> None:
+    (unit,) = {key.unit for key in KEYS if key.name == name}
+    for multiple in units.MULTIPLES[unit]:
+        parameter = fitted(name, {"start": 3.1, "unit": multiple}, "hollow_sphere")
+        assert thud.quantity(f"3.1 {multiple}") == parameter.start

@@ -1,0 +1,69 @@
+"""A script of a user that touches every public name; test_public_names.py runs and checks it."""
+
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+from tempfile import mkdtemp
+
+import thud
+
+folder = Path(mkdtemp())
+names: tuple[thud.ModelName, ...] = ("hollow_sphere", "modal_ball")
+ball = thud.Ball(outer_radius=thud.quantity("8.9 cm"))
+impacts: dict[str, thud.Impact] = {name: thud.solve(ball, model=name) for name in names}
+lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
+impacts["lumped"] = thud.solve(ball, thud.Drop(height=1.0), lumped)
+flagship = thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt")
+motion: thud.Motion | None = flagship.motion
+others = thud.HollowSphere("none"), thud.ModalBall(rings=40), thud.MeasuredModes(frequency=[30.0])
+laws = thud.loss_factors(thud.FiniteElement(viscosity="constant_loss"), [50.0, 100.0])
+levels = thud.Levels(bands="third")
+case = thud.Case("mine", ball, sampling=thud.Sampling(duration=0.04), levels=levels)
+thud.write_case(case, folder / "mine.nml")
+subprocess.run([sys.executable, "-m", "thud", "run", "mine.nml"], cwd=folder, check=True)
+again = (
+    thud.solve_case(thud.read_case(folder / "mine.nml")),
+    thud.read_results(folder / "outputs/mine"),
+)
+verdict: thud.Conformity = thud.judge([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
+missed: list[thud.Criterion] = [one for one in verdict.criteria if not one.conforms]
+modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_elements=16)
+bands: thud.Bands = thud.get_bands("third")
+thirds = thud.force_exposure_levels(flagship.floor_force, flagship.sample_rate, "third", "fft")
+many: thud.Ensemble = thud.solve_many({"height": [0.5, 1.0]}, case, source=thud.Limits().source)
+record = thud.Recording(flagship.time, flagship.floor_force, flagship.sample_rate)
+page: thud.Comparison = thud.compare({**impacts, "record": record}, force="floor")
+cases = thud.read_all([folder / "mine.nml"])
+for figure in (flagship.plot(), record.plot("tyre"), thud.plot.levels(impacts), page.figure()):
+    thud.plot.save(figure, folder / "figure.png")
+tables = flagship.to_dataframe().describe(), flagship.to_xarray().sizes, many.to_xarray().sizes
+height = {"height": thud.Parameter(values=[0.5, 1.0])}
+mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
+modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
+study: thud.Study = thud.read_study({"parameters": height})
+thud.sweep(study, folder / "sweep")
+kept = thud.read_sweep(folder / f"sweep/{study.name}.nc")
+chart: thud.DesignMap = thud.design_map({"parameters": height | modulus})
+spread: thud.Uncertainty = thud.uncertainty({"design": {"size": 8}, "parameters": mass})
+shares: thud.Sensitivity = thud.sensitivity({"design": {"size": 4}, "parameters": mass})
+targets = (
+    thud.ForceTarget(impacts["hollow_sphere"]),
+    thud.LevelTarget(many.floor_octaves[1].tolist()),
+)
+problems: list[type[thud.ThudError]] = [thud.InputError, thud.NumericalError]
+with warnings.catch_warnings(action="ignore", category=thud.FitWarning):
+    found: list[thud.Fit] = [thud.fit(target, ["youngs_modulus"]) for target in targets]
+warnings.simplefilter("ignore", thud.PlausibilityWarning)
+results = [
+    thud.comparison.compare(impacts),
+    *again,
+    modes,
+    bands,
+    many,
+    *found,
+    chart,
+    spread,
+    shares,
+]
+print(*results, *missed, sep="\n")
