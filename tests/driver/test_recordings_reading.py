@@ -6,6 +6,7 @@ import math
 import os
 import struct
 import time
+import tomllib
 import tracemalloc
 import zlib
 from functools import cache
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 import scipy.io
 import soundfile
+from conftest import REPOSITORY
 from recording_files import DURATION, PEAK, SOUND, WITH_UNIT, WRITERS, broadcast_chunk, half_sine
 
 from thud.errors import InputError
@@ -81,7 +83,7 @@ def test_samples_have_the_levels_of_their_spectrum(rate: float) -> None:
     np.testing.assert_allclose(found, sampled_levels(rate), atol=5e-4)
 
 
-def read_all(path: Path, **given: Any) -> tuple[Signal, NDArray[np.float64]]:
+def read_all(path: Path, **given: Any) -> tuple[Signal, NDArray[np.float64]]:  # noqa: ANN401
     (signal,) = open_signals(path, **given)
     return signal, signal.read(0, signal.n_sample)
 
@@ -170,7 +172,7 @@ def test_polarity_of_a_record_without_quiet(cut: float, tmp_path: Path) -> None:
 def test_unclear_polarity_is_refused(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(0, 300, 4000)
     path = write_sound(tmp_path / "noise.wav", noise)
-    with pytest.raises(InputError, match="the sign is not clear, the force goes .* polarity = "):
+    with pytest.raises(InputError, match=r"the sign is not clear, the force goes .* polarity = "):
         open_signals(path)
     assert open_signals(path, polarity="positive")
 
@@ -397,7 +399,7 @@ def write_pulse(path: Path, name: str, values: NDArray[np.float64] | None = None
     return target
 
 
-def refusal(path: Path, **given: Any) -> str:
+def refusal(path: Path, **given: Any) -> str:  # noqa: ANN401
     """Return the sentence by which a file is refused."""
     if path.name.startswith("pcm"):
         given = {"calibration": 5000.0, **given}
@@ -434,7 +436,7 @@ def test_cut_off_files_are_refused(name: str, share: float, tmp_path: Path) -> N
 def test_values_that_are_not_finite_are_refused(name: str, value: float, tmp_path: Path) -> None:
     force = half_sine(8000.0)
     force[100] = value
-    if name == "text.uff" or name == "binary.uff":
+    if name in {"text.uff", "binary.uff"}:
         path = write_pulse(tmp_path, name)
         data = path.read_bytes()
         exact = half_sine(8000.0)[100]
@@ -562,11 +564,11 @@ def test_long_tables_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
-    """A gibibyte of zeros in a mebibyte."""
+    """A quarter of a gibibyte of zeros in a quarter of a mebibyte."""
     path = write_pulse(tmp_path, "packed.mat")
     packer = zlib.compressobj(9)
-    begin = struct.pack("<IIIIIIIIIIII", 14, 2**30 + 56, 6, 8, 6, 0, 5, 8, 1, 2**27, 1, 2**16 + 70)
-    packed = packer.compress(begin) + b"".join(packer.compress(bytes(2**20)) for _ in range(1024))
+    begin = struct.pack("<IIIIIIIIIIII", 14, 2**28 + 56, 6, 8, 6, 0, 5, 8, 1, 2**25, 1, 2**16 + 70)
+    packed = packer.compress(begin) + b"".join(packer.compress(bytes(2**20)) for _ in range(256))
     packed += packer.flush()
     path.write_bytes(path.read_bytes()[:128] + struct.pack("<II", 15, len(packed)) + packed)
     tracemalloc.start()
@@ -667,6 +669,39 @@ def test_missing_packages_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     path = write_pulse(tmp_path, "plate.tdms")
     monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
     assert "TDMS files need the package nptdms, which is not installed" in refusal(path)
+
+
+# --- the examples
+
+
+def test_examples_hold_their_truth() -> None:
+    """Peaks of the recorded force are those of the truth but for plate, hum, drift and noise."""
+    folder = REPOSITORY / "inputs/recordings"
+    config = read_config(folder / "lab.toml")
+    truth = tomllib.loads((folder / "truth.toml").read_text())
+    assert len(truth["drop"]) == 8
+    for drop in truth["drop"]:
+        (signal,) = open_signals(
+            folder / drop["file"], calibration=config.calibration, polarity=config.polarity
+        )
+        assert signal.calibration_uncertainty == 0.005
+        for one in [drop, *drop.get("bounces", [])]:
+            begin = round(one["onset"] * signal.sample_rate)
+            # The plate rings on after the contact, to 1 % in Q ln(100) / (pi f0) = 33 ms.
+            end = round((one["onset"] + one["contact_time"] + 0.033) * signal.sample_rate)
+            force = signal.read(begin - 200, end) - signal.read(begin - 1200, begin - 200).mean()
+            assert abs(force[:190]).max() < 20
+            # Hum of 3 N and drift of 1 N over the contact.
+            assert force[200:].sum() / signal.sample_rate == pytest.approx(one["impulse"], abs=0.2)
+
+
+def test_tables_of_the_examples_are_those_of_the_sounds() -> None:
+    folder = REPOSITORY / "inputs/recordings"
+    for number in range(1, 6):
+        _, table = read_all(folder / f"drop_{number}.csv")
+        sound, force = read_all(folder / f"drop_{number}.wav", calibration=5000.0)
+        begin = round(0.11 * sound.sample_rate)
+        np.testing.assert_allclose(table, force[begin : begin + table.size], atol=0.006)
 
 
 # --- arrays, calibration records, configuration

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import resource
 import select
@@ -63,6 +64,9 @@ def _report(action: Callable[[Path], object], path: Path, kind: str, writer: int
         _, hard = resource.getrlimit(resource.RLIMIT_AS)
         allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
         resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
+        # What dies here leaves no dump and no words.
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        faulthandler.disable()
         with guarded(path, kind):
             action(path)
         code = 0
