@@ -269,6 +269,7 @@ def test_what_does_not_fit_is_told(given: dict[str, Any], words: str, tmp_path: 
         ("1e3 counts/kN", None, 2.0**23),
         ("-5 kN/FS", None, 5000.0),
         (5000, None, 5000.0),
+        (np.float32(5000), None, 5000.0),
         (Calibration("5 kN/FS", 0.01, "certificate 7"), None, 5000.0),
     ],
 )
@@ -357,6 +358,13 @@ def test_date_of_a_broadcast_file(tmp_path: Path) -> None:
     path.write_bytes(data[:4] + total + data[8:12] + extra + data[12:])
     (signal,) = open_signals(path, calibration="5000 N/FS")
     assert signal.date == "2024-05-06 10:11:12"
+
+
+def test_damage_behind_the_samples_is_no_matter(tmp_path: Path) -> None:
+    path = tmp_path / "plate.wav"
+    soundfile.write(path, half_sine(8000.0) / 5000, 8000, "PCM_24")
+    path.write_bytes(path.read_bytes() + b"LIST" + struct.pack("<I", 10**6) + b"abc")
+    assert read_all(path, calibration=5000)[1].max() == pytest.approx(1500, rel=1e-6)
 
 
 def test_netcdf_is_scaled_by_its_attributes(tmp_path: Path) -> None:
@@ -464,6 +472,8 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     assert "is empty" in refusal(tmp_path / "empty.wav")
     assert "cannot be read" in refusal(tmp_path / "a\0b.wav")
     assert "cannot be read" in refusal(tmp_path / ("a" * 5000))
+    with pytest.raises(InputError, match="recording = 7 is not allowed; allowed: an object of str"):
+        open_signals(7)  # type: ignore[arg-type]
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root reads every file")
@@ -501,7 +511,7 @@ def test_files_of_holes_are_refused_at_once(name: str, tmp_path: Path) -> None:
         (b"time,force\n1,2\n", "is no WAV file by its first bytes"),
         (b"CDF\x01" + bytes(100), "NetCDF 4"),
         (b"PK\x03\x04" + bytes(100), "saved as CSV"),
-        (b"RIFF\xff\xff\xff\xffWAVE", "cannot be read as WAV"),
+        (b"RIFF\xff\xff\xff\xffWAVE", "has no samples that can be found"),
         (b"fLaC" + bytes(100), "cannot be read as"),
         (b"TDSm" + bytes(100), "is cut off in the segment"),
         (b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read as HDF5"),
