@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import pickle
 import struct
 import time
 import tomllib
@@ -139,6 +140,16 @@ def test_pieces_are_those_of_the_whole(name: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="samples 0 to 321; allowed: samples 0 to 320"):
         signal.read(0, 321)
     assert len(signal.checksum) == 64
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_signals_go_to_other_processes(name: str, tmp_path: Path) -> None:
+    exact = half_sine(8000.0)
+    integer = name.startswith("pcm")
+    WRITERS[name](tmp_path / name, exact / FULL_SCALE if integer else exact, 8000.0, "N")
+    signal, force = read_all(tmp_path / name, calibration=FULL_SCALE if integer else None)
+    copy = pickle.loads(pickle.dumps(signal))  # noqa: S301 - its own
+    np.testing.assert_array_equal(copy.read(0, copy.n_sample), force)
 
 
 @pytest.mark.parametrize("name", ["comma.csv", "plate.h5", "text.uff", "plate.tdms", "packed.mat"])
