@@ -321,6 +321,8 @@ def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:
         ("; Abtastrate = 8,0 kHz\n; Einheit = kN\n", "{k};"),
         ("fs\t8000\nForce\n[kN]\n", "{k}\t"),
         ("t_ms F_kN\n", "{ms} {v}"),
+        ("Sample rate in Hz\t8000\nKraft in kN\n", "{v}"),
+        ("Zeit / s;Kraft / kN\n", "{t};{k}"),
         ("Messung Nr. 3\nDatum;06.05.2024\n\nZeit;Kraft\ns;kN\n", "{t};{k}"),
         ("time (s)\tforce / kN\tstate\n", "{t}\t{v}\tok"),
         ('"time","Force, kN"\n', "{t},{v}"),
