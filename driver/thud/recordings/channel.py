@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 # Maximum size of files that are read as a whole, bytes.
-WHOLE = 2**28
+WHOLE = 2**27
 # Maximum number of bytes that a library may ask for at once.
 AT_ONCE = 2**26
 # Maximum number of characters of a library's message that are shown.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.checks import refuse, require_choice, require_number
+from thud.checks import refuse, require_choice, require_kind, require_number
 from thud.recordings.channel import MIB, Channel, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES, doubt, find_sign, scan
 from thud.recordings.formats import read_channels
@@ -95,6 +95,7 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
 
     To open a pipe could block; a hole of gigabytes is read for minutes.
     """
+    require_kind("recording", path, str | os.PathLike)
     file = Path(path)
     name = shown_path(file)
     try:

@@ -7,6 +7,8 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from thud.checks import refuse
 
 # By unit: the unit it is a multiple of, and the multiple.
@@ -138,7 +140,7 @@ def newtons_per_unit(
         if base != "N":
             refuse(f"{place}: the values are in {unit} and no calibration is given", EXAMPLES)
         return multiple, f"values in {unit}", 0.0
-    if isinstance(calibration, int | float) and not isinstance(calibration, bool):
+    if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
             refuse(f"{place}: calibration = {calibration!r} is not allowed", EXAMPLES)
         return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", 0.0

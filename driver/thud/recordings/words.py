@@ -46,7 +46,7 @@ TIME_UNITS = {
 # "Force [kN]", "Force (kN)", "Force / kN", "Force in kN", "Force_kN", "Force, kN".
 TITLE = (
     re.compile(r"(?P<name>[^\[\](){}]*)[\[({](?P<unit>[^\[\](){}]{0,20})[\])}]\s*"),
-    re.compile(r"(?P<name>.*\S)(?:\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s/,_]{1,12})\s*"),
+    re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s/,_]{1,12})\s*"),
 )
 NUMBER = re.compile(r"\s*(?P<number>[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)")
 # Longer titles and values carry no such words.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from thud.checks import refuse
 from thud.recordings.channel import Channel, guarded, shown_path
+from thud.recordings.probe import look
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -14,16 +15,31 @@ if TYPE_CHECKING:
 
 # Bytes at the begin of a file by which its format is found.
 HEAD = 4096
+TOUCHED = 8
 HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 class Format(NamedTuple):
-    """A format: its name, module, suffixes, and whether the first bytes of a file are its own."""
+    """A format.
+
+    Attributes
+    ----------
+    name, module : str
+        Name for messages, and name of the module that reads it.
+    suffixes : tuple of str
+        Suffixes that promise it.
+    begins : callable
+        Whether the first bytes of a file are its own.
+    looks : bool
+        Whether its library hangs, dies or fills memory on damaged files, and looks first in a
+        process of its own.
+    """
 
     name: str
     module: str
     suffixes: tuple[str, ...]
     begins: Callable[[bytes], bool]
+    looks: bool = False
 
 
 def _is_uff(head: bytes) -> bool:
@@ -43,7 +59,8 @@ FORMATS = (
     Format("FLAC", "audio", (".flac",), lambda head: head[:4] == b"fLaC"),
     Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
     Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
-           lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))),
+           lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
+           looks=True),
     Format("MATLAB", "matlab", (".mat",), lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}),
     Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
     Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
@@ -80,6 +97,15 @@ def read_channels(path: Path) -> list[Channel]:
         what = f"is no {promised.name} file" if promised else "is of no known format"
         refuse(f"{name}: {what} by its first bytes", f"{kinds} files")
     module = importlib.import_module(f"{__name__}.{found.module}")
+    if found.looks:
+        look(lambda file: _touch(module.read_channels(file)), path, found.name)
     with guarded(path, found.name):
         channels: list[Channel] = module.read_channels(path)
         return channels
+
+
+def _touch(channels: list[Channel]) -> None:
+    """Read the first and the last sample of some channels."""
+    for one in channels[:TOUCHED]:
+        one.samples(0, 1)
+        one.samples(one.n_sample - 1, one.n_sample)

@@ -94,12 +94,10 @@ def _read_chunks(file: BinaryIO, name: str) -> str:
     """
     size = os.fstat(file.fileno()).st_size
     lengths: dict[bytes, int] = {}
-    date = ""
+    date, missing = "", None
     for kind, begin, length in _chunks(file, lengths, size):
-        if begin + length > size:
-            refuse(
-                f"{name}: is cut off, {begin + length - size} bytes are missing", "a complete file"
-            )
+        if kind == b"data":
+            missing = begin + length - size
         if kind == b"ds64":
             file.seek(begin)
             lengths[b"data"] = struct.unpack("<QQ", file.read(16))[1]
@@ -108,6 +106,10 @@ def _read_chunks(file: BinaryIO, name: str) -> str:
             text = file.read(CLOCK.stop)
             parts = (text[part].strip(b"\0 ").decode("ascii", "replace") for part in (DATE, CLOCK))
             date = " ".join(part for part in parts if part.isprintable() and part)
+    if missing is None:
+        refuse(f"{name}: has no samples that can be found", "an undamaged WAV file")
+    if missing > 0:
+        refuse(f"{name}: is cut off, {missing} bytes are missing", "a complete file")
     return date
 
 

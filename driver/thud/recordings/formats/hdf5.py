@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 MOST_OBJECTS = 10_000
 MOST_ATTRIBUTES = 256
 DEEPEST = 32
-# Maximum number of values of an attribute, and of bytes of a chunk.
-WORDY = 64
+# Maximum numbers of bytes of a header's value and of a chunk.
+LONGEST_WORD = 4096
 LARGEST_CHUNK = 2**26
 # More than this, a packed dataset does not shrink.
 PACKED = 1100
@@ -44,6 +44,7 @@ MOST_COLUMNS = 256
 # Longer times are not read.
 MOST_TIMES = 2**22
 # Classes of MATLAB that are vectors of numbers in the file but mean something else.
+MATLAB_CLASS = frozenset({"matlabclass"})
 MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
 
 
@@ -119,16 +120,19 @@ def _walk(h5py: Any, file: Any, path: Path) -> list[_Found]:  # noqa: ANN401 - a
         if depth > DEEPEST:
             refuse(f"{shown_path(path)}: groups more than {DEEPEST} deep", "a recording")
         group = file[place or "/"]
-        header = [*_attributes(group), *above]
+        header = [*_attributes(h5py, group), *above]
         vectors = []
         for key, entry in _entries(h5py, group, seen, shown_path(path)):
             if isinstance(entry, h5py.Group):
                 waiting.append((f"{place}/{key}", depth + 1, header))
-            elif entry.size == 1:
-                header.insert(0, (key, text_of(entry[()]) if entry.dtype.itemsize <= MIB else ""))
+            elif _is_word(h5py, entry.shape, entry.dtype) and not entry.chunks:
+                header.insert(0, (key, text_of(entry[()])))
             elif _is_channel(entry, f"{shown_path(path)}: {shown_text(key)}", path):
                 vectors.append((f"{place}/{key}", entry))
-        found += [_Found(key, data, [*_attributes(data), *header]) for key, data in vectors]
+        for key, data in vectors:
+            own = _attributes(h5py, data)
+            if find_word(own, MATLAB_CLASS) not in MATLAB_OTHERS:
+                found.append(_Found(key, data, [*own, *header]))
     return found
 
 
@@ -152,18 +156,26 @@ def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple
             yield key, entry
 
 
-def _attributes(entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - of a library
-    """Return the short attributes of an object as text."""
+def _attributes(h5py: Any, entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - a library
+    """Return the attributes of an object that hold one number or text."""
     if len(entry.attrs) > MOST_ATTRIBUTES:
         return []
+    found = ((key, entry.attrs.get_id(key)) for key in entry.attrs)
     return [
         (key, text_of(entry.attrs[key]))
-        for key in entry.attrs
-        if np.prod(entry.attrs.get_id(key).shape) <= 1
-        and entry.attrs.get_id(key).dtype.kind in "iufSUO"
-        and entry.attrs.get_id(key).dtype.itemsize <= WORDY * WORDY
-        and not key.isupper()  # REFERENCE_LIST and the like
+        for key, one in found
+        if _is_word(h5py, one.shape, one.dtype)
     ]
+
+
+def _is_word(h5py: Any, shape: tuple[int, ...], dtype: Any) -> bool:  # noqa: ANN401 - a library
+    """Whether a value is one number or text; damaged files claim any number of them."""
+    is_text = h5py.check_string_dtype(dtype) is not None
+    return (
+        math.prod(shape) == 1
+        and (dtype.kind in "iufSU" or is_text)
+        and dtype.itemsize <= LONGEST_WORD
+    )
 
 
 def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of a library
@@ -172,11 +184,9 @@ def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of 
         return False
     if max(data.shape) < SHORTEST or math.prod(data.shape) // max(data.shape) > MOST_COLUMNS:
         return False
-    if text_of(data.attrs.get("MATLAB_class")) in MATLAB_OTHERS:
-        return False
     if data.is_virtual or data.external:
         refuse(f"{name}: lies in another file", "the other file")
-    size = data.size * data.dtype.itemsize
+    size = math.prod(data.shape) * data.dtype.itemsize
     held = data.id.get_storage_size() * (PACKED if data.chunks else 1)
     if size > held or (not data.chunks and size > path.stat().st_size):
         refuse(f"{name}: claims {size} bytes and holds {held} at most", "an undamaged HDF5 file")

@@ -5,7 +5,9 @@ from __future__ import annotations
 import logging
 import os
 import struct
+import weakref
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
@@ -27,54 +29,68 @@ LEAD = struct.Struct("<4sIIQQ")
 
 @dataclass(frozen=True)
 class TdmsSamples:
-    """One channel of a TDMS file, opened for each piece."""
+    """One channel of a TDMS file, which stays open: its description may be long."""
 
-    path: Path
+    file: _OpenFile
     group: str
     name: str
 
     def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the samples from start to before stop."""
-        nptdms = library("nptdms", "TDMS")
-        with (
-            guarded(self.path, "TDMS"),
-            self.path.open("rb") as file,
-            nptdms.TdmsFile.open(BoundedFile(file, shown_path(self.path))) as tdms,
-        ):
-            return np.asarray(tdms[self.group][self.name][start:stop], dtype=np.float64)
+        with guarded(self.file.path, "TDMS"):
+            channel = self.file.tdms[self.group][self.name]
+            return np.asarray(channel[start:stop], dtype=np.float64)
+
+
+class _OpenFile:
+    """A TDMS file that is opened when it is needed, also in another process."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[type[_OpenFile], tuple[Path]]:
+        return _OpenFile, (self.path,)
+
+    @cached_property
+    def tdms(self) -> Any:  # noqa: ANN401 - of the library
+        """The file of the library; closed with this object."""
+        file = self.path.open("rb")
+        weakref.finalize(self, file.close)
+        return library("nptdms", "TDMS").TdmsFile.open(BoundedFile(file, shown_path(self.path)))
 
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the numeric channels of a TDMS file."""
-    nptdms = library("nptdms", "TDMS")
+    library("nptdms", "TDMS")
     # What it warns of is refused here.
     logging.getLogger("nptdms").setLevel(logging.ERROR)
-    with path.open("rb") as file:
-        _require_complete(file, shown_path(path))
-    with path.open("rb") as file, nptdms.TdmsFile.open(BoundedFile(file, shown_path(path))) as tdms:
-        found = [(group, one) for group in tdms.groups() for one in group.channels()]
-        if len(found) > MOST_CHANNELS:
-            refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MOST_CHANNELS}")
-        size = path.stat().st_size
-        return [
-            _channel(path, size, number, (tdms, group, one))
-            for number, (group, one) in enumerate(found, start=1)
-            if one.dtype.kind in "iuf" and len(one)
-        ]
+    with path.open("rb") as raw:
+        _require_complete(raw, shown_path(path))
+    file = _OpenFile(path)
+    found = [(group, one) for group in file.tdms.groups() for one in group.channels()]
+    if len(found) > MOST_CHANNELS:
+        refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MOST_CHANNELS}")
+    return [
+        _channel(file, number, group, one)
+        for number, (group, one) in enumerate(found, start=1)
+        if one.dtype.kind in "iuf" and len(one)
+    ]
 
 
-def _channel(path: Path, size: int, number: int, owned: tuple[Any, Any, Any]) -> Channel:
-    """Return a channel of a TDMS file, of the file, its group and itself."""
-    tdms, group, one = owned
+def _channel(file: _OpenFile, number: int, group: Any, one: Any) -> Channel:  # noqa: ANN401
+    """Return a channel of a TDMS file."""
+    size = file.path.stat().st_size
     if len(one) > size:  # a sample has at least a byte
-        refuse(f"{shown_path(path)}: {len(one)} samples in {size} bytes", "an undamaged TDMS file")
-    owners = [owner.properties for owner in (one, group, tdms)]
+        refuse(
+            f"{shown_path(file.path)}: {len(one)} samples in {size} bytes", "an undamaged TDMS file"
+        )
+    owners = [owner.properties for owner in (one, group, file.tdms)]
     items = [(str(key), text_of(value)) for owner in owners for key, value in owner.items()]
     return Channel(
         name=one.name,
         number=number,
         n_sample=len(one),
-        samples=TdmsSamples(path, group.name, one.name),
+        samples=TdmsSamples(file, group.name, one.name),
         unit=find_word(items, UNIT),
         sample_rate=find_rate(items),
         date=find_word(items, DATE),

@@ -42,7 +42,8 @@ LONGEST = 2**16
 LONGEST_HEADER = 1000
 MOST_NUMBERS = 2**24
 MOST_COLUMNS = 256
-# Lines that are converted at once.
+# Characters that are read and lines that are converted at once.
+PIECE = 2**20
 BLOCK = 2**14
 SHORTEST = 8
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+")
@@ -67,6 +68,7 @@ class _Table:
     header: list[tuple[str, object]] = field(default_factory=list)
     titles: list[list[str]] = field(default_factory=list)
     first: int = 1
+    width: int = 0
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line."""
@@ -102,19 +104,19 @@ def read_channels(path: Path) -> list[Channel]:
 
 
 def _lines(text: TextIO, name: str) -> Iterator[str]:
-    """Yield the lines of a text; raise InputError where one is too long."""
-    while line := text.readline(LONGEST + 1):
-        if len(line) > LONGEST or "\0" in line:
-            what = "holds zero bytes" if "\0" in line else f"is longer than {LONGEST} characters"
+    """Yield the lines of a text without their ends; raise InputError where one is too long."""
+    while piece := text.read(PIECE):
+        lines = (piece + text.readline(LONGEST + 1)).removesuffix("\n").split("\n")
+        if max(map(len, lines)) > LONGEST or "\0" in piece:
+            what = "holds zero bytes" if "\0" in piece else f"is longer than {LONGEST} characters"
             refuse(f"{name}: a line {what}", ALLOWED)
-        yield line
+        yield from lines
 
 
 def _read_header(lines: Iterator[str], table: _Table) -> list[str]:
     """Sort the lines above the numbers into a table; return the first lines of numbers."""
     above: list[str] = []
-    line = next(lines, "")
-    while line and len(above) <= LONGEST_HEADER:
+    for line in itertools.islice(lines, LONGEST_HEADER):
         separator, comma = _separator(line.partition("#")[0].strip())
         probe = _Table(table.name, separator, comma)
         cells = probe.cells(probe.clean(line))
@@ -129,7 +131,6 @@ def _read_header(lines: Iterator[str], table: _Table) -> list[str]:
                 _sort_header(above, table, 1)
             return [line]
         above.append(line)
-        line = next(lines, "")
     return refuse(f"{table.name}: cannot be read (no numbers)", ALLOWED)
 
 
@@ -170,61 +171,69 @@ def _sort_header(above: list[str], table: _Table, columns: int) -> None:
             table.header.append((pair[0], re.split(r"[\t;]", pair[1].strip(" :=\t;,"))[0]))
 
 
-def _read_numbers(lines: Iterator[str], table: _Table) -> NDArray[np.float64]:
-    """Return the numbers of the lines, shape (n_row, n_column); NaN in columns of words."""
+def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.float64]]:
+    """Return the columns of numbers of the lines by their place; columns of words are left out."""
+    first = next(lines)
+    cells = table.cells(table.clean(first))
+    used = [i for i, cell in enumerate(cells) if _number(cell) is not None]
+    if len(cells) > MOST_COLUMNS:
+        refuse(f"{table.name}: {len(cells)} columns", f"up to {MOST_COLUMNS}")
+    table.width = len(cells)
     blocks: list[NDArray[np.float64]] = []
-    used: list[int] = []
-    width = rows = 0
-    number = table.first
+    lines = itertools.chain([first], lines)
+    number, count = table.first, 0
     while block := list(itertools.islice(lines, BLOCK)):
-        kept = [(i, text) for i, line in enumerate(block, number) if (text := table.clean(line))]
-        number += len(block)
-        if kept and not width:
-            cells = table.cells(kept[0][1])
-            width = len(cells)
-            if width > MOST_COLUMNS:
-                refuse(f"{table.name}: {width} columns", f"up to {MOST_COLUMNS}")
-            used = [i for i, cell in enumerate(cells) if _number(cell) is not None]
-        if kept:
-            blocks.append(_convert(kept, table, width, used))
-            rows += len(kept)
-        if rows * len(used) > MOST_NUMBERS:
+        values = _convert(block, table, used)
+        if values is None:
+            values = _convert_each(block, number, table, used)
+        blocks.append(values)
+        number, count = number + len(block), count + values.size
+        if count > MOST_NUMBERS:
             refuse(
                 f"{table.name}: more than {MOST_NUMBERS / 1e6:.1f} million numbers as text",
                 "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
             )
-    values = np.full((rows, width), np.nan)
-    values[:, used] = np.concatenate(blocks)
-    return values
+    return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(used)}
 
 
-def _convert(
-    kept: list[tuple[int, str]], table: _Table, width: int, used: list[int]
+def _convert(block: list[str], table: _Table, used: list[int]) -> NDArray[np.float64] | None:
+    """Return the numbers of some lines; None where one is empty, has comments or is wrong."""
+    separator = table.separator
+    joined = "\n".join(block)
+    if separator is None:
+        counts = {len(line.split()) for line in block}
+    else:
+        counts = {line.count(separator) + 1 for line in block}
+    if counts != {table.width} or "#" in joined:
+        return None
+    lines = joined.replace(",", ".").split("\n") if table.decimal_comma else block
+    try:
+        return np.loadtxt(
+            lines, delimiter=separator, comments=None, usecols=used, ndmin=2, dtype=np.float64
+        )
+    except (ValueError, OverflowError):
+        return None
+
+
+def _convert_each(
+    block: list[str], first: int, table: _Table, used: list[int]
 ) -> NDArray[np.float64]:
     """Return the numbers of some lines; raise InputError where one has others or other columns."""
-    separator = table.separator
-    if separator is None:
-        counts = {len(text.split()) for _, text in kept}
-    else:
-        counts = {text.count(separator) + 1 for _, text in kept}
-    try:
-        if counts == {width}:
-            return np.loadtxt(
-                [text for _, text in kept],
-                delimiter=separator, comments=None, usecols=used, ndmin=2, dtype=np.float64,
-            )  # fmt: skip
-    except (ValueError, OverflowError):
-        pass
-    for number, text in kept:
+    rows = []
+    for number, line in enumerate(block, first):
+        text = table.clean(line)
+        if not text:
+            continue
         cells = table.cells(text)
-        wrong = next((cells[i] for i in used if i < len(cells) and _number(cells[i]) is None), None)
-        if wrong is not None:
-            refuse(
-                f"{table.name}: line {number}: {shown_text(wrong)[:40]!r} is not a number", ALLOWED
-            )
-        if len(cells) != width:
-            refuse(f"{table.name}: line {number}: {len(cells)} columns, {width} above it", ALLOWED)
-    return np.array([[_number(table.cells(text)[i]) for i in used] for _, text in kept], float)
+        row = [_number(cells[i]) if i < len(cells) else 0.0 for i in used]
+        if None in row:
+            wrong = shown_text(cells[used[row.index(None)]])[:40]
+            refuse(f"{table.name}: line {number}: {wrong!r} is not a number", ALLOWED)
+        if len(cells) != table.width:
+            what = f"{len(cells)} columns, {table.width} above it"
+            refuse(f"{table.name}: line {number}: {what}", ALLOWED)
+        rows.append(row)
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(used))
 
 
 def _number(cell: str) -> float | None:
@@ -235,24 +244,23 @@ def _number(cell: str) -> float | None:
         return None
 
 
-def _channels(table: _Table, values: NDArray[np.float64]) -> list[Channel]:
+def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Channel]:
     """Return the columns of a table but that of the times."""
-    rows, width = values.shape
+    numeric = list(values)
+    rows = len(values[numeric[0]])
     if rows < SHORTEST:
-        refuse(
-            f"{table.name}: {rows} rows of {width} numbers", f"{SHORTEST} rows or more of numbers"
-        )
-    titles, units = _titles(table, width)
-    numeric = [i for i in range(width) if not np.isnan(values[:, i]).all()]
+        what = f"{rows} rows of {len(numeric)} numbers"
+        refuse(f"{table.name}: {what}", f"{SHORTEST} rows or more of numbers")
+    titles, units = _titles(table, table.width)
     rate = find_rate(table.header)
     steps: tuple[str, ...] = ()
     time = next((i for i in numeric if is_time(titles[i]) or _is_time_unit(units[i])), None)
-    if time is None and len(numeric) > 1 and (rate is None or _are_times(values[:, numeric[0]])):
+    if time is None and len(numeric) > 1 and (rate is None or _are_times(values[numeric[0]])):
         time = numeric[0]
     if time is not None and len(numeric) > 1:
         numeric.remove(time)
         scale = TIME_UNITS.get(units[time].casefold(), 1.0)
-        _, step, steps = even_grid(values[:, time] * scale, table.name)
+        _, step, steps = even_grid(values[time] * scale, table.name)
         if rate is not None and abs(step * rate - 1) > SAME_RATE:
             refuse(
                 f"{table.name}: {rate:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
@@ -264,7 +272,7 @@ def _channels(table: _Table, values: NDArray[np.float64]) -> list[Channel]:
             name=titles[i],
             number=i + 1,
             n_sample=rows,
-            samples=ArraySamples(np.ascontiguousarray(values[:, i])),
+            samples=ArraySamples(values[i]),
             unit=units[i],
             sample_rate=rate,
             date=find_word(table.header, DATE),
