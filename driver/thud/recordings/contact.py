@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.recordings.flanks import Flank, find_touch
+from thud.recordings.flanks import SMOOTHING, Flank, find_touch
 from thud.recordings.noise import Background, fit_background
 
 if TYPE_CHECKING:
@@ -225,9 +225,17 @@ def _touch(  # noqa: PLR0913, PLR0917 - what a flank is
     edges = edges[(edges >= 0) & (edges <= len(force))]
     cells = _cells(edges, rate, middle)
     under, covariance = background.predict(cells)
-    value = _means(force, edges) - under
-    noise = background.variances[0] / 2 / (cells[1] - cells[0])
-    covariance += np.diag(noise + (FLOOR * background.peak) ** 2)
+    low, high = max(edges[0] - 1, 0), min(edges[-1] + 1, len(force))
+    smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[edges[0] - low :]
+    value = _means(smooth, edges - edges[0]) - under
+    # Weights of the samples in the smoothed means.
+    count = np.diff(edges)
+    weights = np.zeros((len(count), edges[-1] - edges[0] + 2))
+    cell = np.repeat(np.arange(len(count)), count)
+    for shift, weight in enumerate(SMOOTHING):
+        weights[cell, np.arange(len(cell)) + shift] += weight / count[cell]
+    covariance += background.variances[0] * rate / 2 * weights @ weights.T
+    covariance += (FLOOR * background.peak) ** 2 * np.eye(len(value))
     time = (cells[0] + cells[1]) / 2 + middle
     if turned:
         flank = Flank(-time[::-1], value[::-1], covariance[::-1, ::-1], background.peak, 1 / rate)
