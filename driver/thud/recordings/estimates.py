@@ -86,11 +86,14 @@ class Drop:
     remarks: tuple[str, ...]
     contact: Contact
 
-    def band_energy(self, lower: float, upper: float) -> tuple[float, float, float]:
+    def band_energy(
+        self, lower: float, upper: float, *, exact: bool = False
+    ) -> tuple[float, float, float]:
         """Return the energy of the force in a band, N2 s, that of the noise, and a deviation.
 
         The energy is that of the gate less the expected energy of the noise in it; the last is
-        its standard deviation (docs/recordings_theory.md, section 4).
+        its standard deviation (docs/recordings_theory.md, section 4). Where the force is exact,
+        without noise, nothing is subtracted.
         """
         first, stop = self.gate
         force, time = self.force[first:stop], self.time[first:stop]
@@ -103,10 +106,12 @@ class Drop:
         value = functionals @ force
         covariance = self.contact.covariance_of(functionals)
         noise = float(np.trace(covariance))
-        variance = 4 * float(value @ covariance @ value)
-        # The mean of the first term is too large by twice the second.
-        variance = max(variance - 4 * float((covariance**2).sum()), 0.0)
-        variance += 2 * float((covariance**2).sum()) + (noise * self.contact.noise_doubt) ** 2
+        second = float((covariance**2).sum())
+        variance = 4 * float(value @ covariance @ value) + 2 * second
+        if exact:
+            return float(value @ value), noise, math.sqrt(variance)
+        # The first term is too large by twice the second, on the mean.
+        variance = max(variance - 4 * second, 2 * second) + (noise * self.contact.noise_doubt) ** 2
         return float(value @ value) - noise, noise, math.sqrt(variance)
 
 

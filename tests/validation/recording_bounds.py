@@ -1,0 +1,273 @@
+"""Errors of drops in random recordings against the bounds that noise sets.
+
+    python tests/validation/recording_bounds.py [realisations]
+
+prints tables by level and colour of the noise; the bounds are derived in
+docs/recordings_theory.md, section 6.
+"""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import thud
+from thud.errors import InputError
+from thud.recordings import contact as contact_module
+from thud.recordings.contact import Contact, Estimate
+from thud.recordings.drops import find_windows
+from thud.recordings.estimates import Drop, measure_drop
+from thud.recordings.noise import MAINS, Background
+from thud.recordings.signal import Signal
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
+from synthetic import coloured_noise, noise_density
+
+NOISES = (60, 50, 40, 30, 20)
+COLOURS = ("white", "pink", "brown")
+RATES = (8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3)
+SHAPES = ("half sine", "shell", "modal", "finite elements")
+FINE = 192_000.0
+HEIGHT, MASS, GRAVITY = 1.0, 2.5, 9.81
+BANDS = thud.get_bands()
+# Noise of each band known to 1 % of it: the least relative error of a bound.
+HARMONICS = (1.0, 0.5, 0.3)
+
+
+@cache
+def pulse(shape: str) -> tuple[np.ndarray, float]:
+    """Return the samples of a pulse at FINE from first touch on, N, and its contact time, s."""
+    if shape == "half sine":
+        time = np.arange(int(0.02 * FINE) + 1) / FINE
+        return 1500 * np.sin(np.pi * time / 0.02), 0.02
+    file = {"shell": "100cm", "modal": "modal", "finite elements": "fe"}[shape]
+    case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"rubber_ball_{file}.nml")
+    drop, model = case.drop, case.model
+    del drop, model
+    from dataclasses import replace
+
+    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.05)))
+    last = int(np.ceil(impact.exact_contact_time * FINE)) + 1
+    return impact.floor_force[:last], impact.exact_contact_time
+
+
+@dataclass
+class Draw:
+    """One random recording."""
+
+    seed: int
+    shape: str
+    noise: int
+    colour: str
+    rate: float
+    before: float
+    after: float
+    offset: float
+    drift: float
+    mains: float
+    hum: float
+
+    @classmethod
+    def random(cls, seed: int) -> Draw:
+        """Return the draw of a seed."""
+        rng = np.random.default_rng(seed)
+        return cls(
+            seed,
+            SHAPES[rng.choice(4, p=(0.5, 0.2, 0.15, 0.15))],
+            NOISES[seed % 5],
+            COLOURS[seed // 5 % 3],
+            RATES[rng.integers(len(RATES))] * rng.uniform(1, 1.0001),
+            *np.exp(rng.uniform(np.log(0.005), 0, 2)),
+            rng.uniform(-0.05, 0.05),
+            rng.uniform(-0.05, 0.05),
+            MAINS[rng.integers(2)],
+            10 ** rng.uniform(-4, -2),
+        )
+
+
+@dataclass
+class Result:
+    """Errors, stated deviations and bounds: five levels' energies, contact time, restitution."""
+
+    error: np.ndarray
+    stated: np.ndarray
+    bound: np.ndarray
+    decibels: np.ndarray
+
+
+def realise(seed: int) -> tuple[Draw, Result | str]:
+    """Return the errors of one random recording, or why it was refused."""
+    draw = Draw.random(seed)
+    rng = np.random.default_rng(10_000_000 + seed)
+    force, contact_time = pulse(draw.shape)
+    peak = float(force.max())
+    rate = draw.rate
+    n = int((draw.before + contact_time + draw.after) * rate)
+    onset = draw.before + rng.uniform() / rate
+    time = np.arange(n) / rate - onset
+    clean = np.interp(time, np.arange(len(force)) / FINE, force, left=0, right=0)
+    deviation = peak * 10 ** (-draw.noise / 20)
+    record = clean + peak * (draw.offset + draw.drift * time)
+    for k, part in enumerate(HARMONICS, start=1):
+        wave = np.sin(2 * np.pi * k * draw.mains * time + rng.uniform(0, 2 * np.pi))
+        record += draw.hum * peak * part * wave
+    record += coloured_noise(n, rate, deviation, draw.colour, rng)
+    try:
+        window = find_windows(Signal.from_array(record, rate))[0]
+        drop = measure_drop(window, height=HEIGHT, mass=MASS)
+    except InputError as error:
+        return draw, str(error)
+    oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
+    energy, bounds, stated, error = [], [], [], []
+    for lower, upper in zip(BANDS.lower, BANDS.upper, strict=True):
+        truth, _, bound = oracle.band_energy(lower, upper, exact=True)
+        value, _, spread = drop.band_energy(lower, upper)
+        energy.append(truth)
+        bounds.append(bound)
+        stated.append(spread)
+        error.append(value - truth)
+    decibels = 10 * np.log10(np.maximum(1 + np.array(error) / energy, 1e-9))
+    error += [
+        drop.contact_time.value - contact_time,
+        drop.restitution.value - restitution.value,
+    ]
+    stated += [drop.contact_time.uncertainty, drop.restitution.uncertainty]
+    bounds += [flank_bound(draw, oracle, peak, contact_time), restitution.uncertainty]
+    return draw, Result(np.array(error), np.array(stated), np.array(bounds), decibels)
+
+
+def oracle_drop(
+    draw: Draw,
+    clean: np.ndarray,
+    onset: float,
+    contact_time: float,
+    deviation: float,
+    drop: Drop,
+) -> tuple[Drop, Estimate]:
+    """Return the drop of the best linear estimate: noise and contact are known; no error."""
+    from dataclasses import replace
+
+    rate = draw.rate
+    first, last = int(np.ceil(onset * rate)), int((onset + contact_time) * rate) + 1
+    variances = np.zeros(5)
+    density = noise_density(rate, deviation, draw.colour)
+    variances[COLOURS.index(draw.colour)] = density
+    variances[0] = max(variances[0], 1e-12 * float(clean.max()) ** 2)
+    peak = float(clean.max())
+    variances[3 + MAINS.index(draw.mains)] = (draw.hum * peak) ** 2 / 2
+    middle = (first + last) / 2 / rate
+    saved = contact_module.QUIET_CELLS
+    contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
+    try:
+        quiet, mean = contact_module._quiet(clean, first, last, rate, middle)
+    finally:
+        contact_module.QUIET_CELLS = saved
+    background = Background(quiet, mean, variances, peak)
+    edges = contact_module._even_edges(first, last, rate)
+    _, covariance = background.predict(contact_module._cells(edges, rate, middle))
+    contact = Contact(
+        Estimate(onset, 0),
+        Estimate(onset + contact_time, 0),
+        peak,
+        (first, last),
+        clean[first:last],
+        np.zeros(last - first),
+        (first, last),
+        covariance,
+        (1.0, 1.0),
+        background,
+        rate,
+    )
+    speed = np.sqrt(2 * GRAVITY * HEIGHT)
+    ones = np.full((1, last - first), 1 / rate)
+    spread = float(np.sqrt(contact.covariance_of(ones)[0, 0])) / (MASS * speed)
+    truth = clean.sum() / rate / (MASS * speed) - 1 - GRAVITY * contact_time / speed
+    time = np.arange(first, last) / rate - onset
+    oracle = replace(
+        drop, time=time, force=clean[first:last], gate=(0, last - first), contact=contact
+    )
+    return oracle, Estimate(float(truth), spread)
+
+
+def flank_bound(draw: Draw, oracle: Drop, peak: float, contact_time: float) -> float:
+    """Return the Cramer-Rao bound of the contact time of the half sine, s; NaN for other pulses.
+
+    Slope and curvature of each flank are unknown and hold for FLANK.
+    """
+    if draw.shape != "half sine":
+        return np.nan
+    rate = draw.rate
+    count = max(4, int(contact_module.FLANK * min(rate, 2e4)))
+    edges = np.linspace(0, contact_module.FLANK, count + 1)
+    begin = oracle.contact.touch.value - (
+        oracle.contact.touch.value + contact_time / 2
+    ) + 0 * edges
+    tau = (edges[1:] + edges[:-1]) / 2
+    slope = np.pi * peak / contact_time
+    shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
+    cells = (begin[1:] + edges[:-1], begin[1:] + edges[1:])
+    _, covariance = oracle.contact.background.predict(cells)
+    width = edges[1] - edges[0]
+    covariance += np.diag(np.full(count, oracle.contact.background.variances[0] / 2 / width))
+    scale = np.array([slope, slope, slope / contact_module.FLANK])[:, None]
+    del scale
+    normal = shapes @ np.linalg.solve(covariance, shapes.T)
+    unit = 1 / np.sqrt(np.diagonal(normal))
+    inverse = np.linalg.inv(normal * unit[:, None] * unit) * unit[:, None] * unit
+    return float(np.sqrt(2 * inverse[0, 0]))
+
+
+def main(count: int) -> list[tuple[Draw, Result | str]]:
+    """Print the tables of a number of realisations."""
+    for shape in SHAPES:
+        pulse(shape)
+    with ProcessPoolExecutor(2) as pool:
+        results = list(pool.map(realise, range(count), chunksize=10))
+    refused = [(draw, text) for draw, text in results if isinstance(text, str)]
+    for draw, text in refused:
+        print("refused:", draw, text)
+    report(results)
+    return results
+
+
+def report(results: list[tuple[Draw, Result | str]]) -> None:
+    """Print error over bound (root mean square), and the part of 95 % intervals that cover."""
+    names = [*(f"{b:g} Hz" for b in BANDS.nominal), "t_c", "e"]
+    print("noise colour     n | rms(error/bound) and part within 1.96 stated deviations")
+    print(" " * 20, *(f"{name:>13s}" for name in names))
+    for colour in COLOURS:
+        for noise in NOISES:
+            some = [
+                r for d, r in results
+                if isinstance(r, Result) and d.noise == noise and d.colour == colour
+            ]
+            if not some:
+                continue
+            error, stated, bound = (
+                np.array([getattr(r, f.name) for r in some]) for f in fields(Result)[:3]
+            )
+            rms = np.sqrt(np.nanmean((error / bound) ** 2, axis=0))
+            cover = np.mean(np.abs(error) <= 1.96 * stated, axis=0)
+            row = (f"{a:6.2f} {100 * b:4.0f} %" for a, b in zip(rms, cover, strict=True))
+            print(f"{noise:3d} dB {colour:6s} {len(some):4d} |", *row)
+    for noise in NOISES:
+        some = [(d, r) for d, r in results if isinstance(r, Result) and d.noise == noise]
+        if not some:
+            continue
+        worst = np.max([np.abs(r.decibels) for _, r in some], axis=0)
+        times = np.abs([r.error[5] for _, r in some])
+        bounce = np.abs([r.error[6] for _, r in some])
+        print(
+            f"{noise} dB: largest errors: levels", " ".join(f"{w:.3f}" for w in worst),
+            f"dB, contact time {1e3 * times.max():.3f} ms (rms {1e3 * np.sqrt(np.mean(times**2)):.3f}), "
+            f"restitution {bounce.max():.4f}",
+        )
+
+
+if __name__ == "__main__":
+    found = main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
