@@ -59,30 +59,35 @@ class Window:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    sample_rate : float
-        Samples per second, Hz.
-    start : int
-        First sample of the part in the signal.
-    force : ndarray, shape (n,)
-        Force as read, N.
+    signal : Signal
+        The signal, which is read when the force is asked for.
+    start, stop : int
+        First sample of the part in the signal, and the one behind it.
     contact : tuple of int
         First sample of the contact and the one behind it, within the part; to about 1 ms.
     bounces : tuple of Window
         The parts around the later bounces, in order.
-    full_scale : float or None
-        Largest value that the file can hold, N.
     remarks : tuple of str
         Doubts about the pulse as a whole.
     """
 
     name: str
-    sample_rate: float
+    signal: Signal
     start: int
-    force: NDArray[np.float64]
+    stop: int
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
-    full_scale: float | None = None
     remarks: tuple[str, ...] = ()
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second, Hz."""
+        return self.signal.sample_rate
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force as read, N, shape (stop - start,)."""
+        return self.signal.read(self.start, self.stop)
 
 
 @dataclass
@@ -259,16 +264,8 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
         low = max(low, pulse.start - round(BEFORE * signal.sample_rate))
         high = min(high, pulse.stop + round(AFTER * signal.sample_rate), signal.n_sample)
         low, high = min(low, pulse.start), max(high, min(pulse.stop, signal.n_sample))
-        return Window(
-            name,
-            signal.sample_rate,
-            low,
-            signal.read(low, high),
-            (pulse.start - low, min(pulse.stop, signal.n_sample) - low),
-            (),
-            signal.full_scale,
-            tuple(pulse.remarks),
-        )
+        contact = (pulse.start - low, min(pulse.stop, signal.n_sample) - low)
+        return Window(name, signal, low, high, contact, (), tuple(pulse.remarks))
 
     for k, drop in enumerate(drops, start=1):
         name = signal.name if len(drops) == 1 else f"{signal.name}, drop {k}"

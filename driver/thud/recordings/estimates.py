@@ -6,15 +6,15 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from thud.levels import record_force
-from thud.recordings.contact import Contact, Estimate, find_contact
-from thud.recordings.faults import repair
+from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
+from thud.recordings.faults import LEAST_QUIET, repair
 from thud.recordings.noise import Noise
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Drop", "Estimate", "measure_drop"]
 
 # Bounces that are measured.
-MAX_BOUNCES = 3
+MAX_BOUNCES = 2
 # Edge of the low-pass of the peak force, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
 # Quiet below which it is told, s.
@@ -137,13 +137,13 @@ def measure_drop(
         Where the pulse is clipped, cut, doubled or full of dropouts.
     """
     force, steps, remarks = repair(window)
-    contact = find_contact(replace(window, force=force))
+    contact = find_contact(window, force)
     steps += _told_background(contact)
     for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
         if quiet < SHORT_QUIET:
             remarks += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
     rate = window.sample_rate
-    landings = _landings(window)
+    landings = _landings(window, contact)
     touch, release = contact.touch, contact.release
     contact_time = Estimate(
         release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
@@ -181,18 +181,19 @@ def measure_drop(
     )
 
 
-def _landings(window: Window) -> list[tuple[Estimate, Estimate]]:
+def _landings(window: Window, drop: Contact) -> list[tuple[Estimate, Estimate]]:
     """Return first touch and release of the bounces, s from the first sample of the window."""
     found = []
     for bounce in window.bounces[:MAX_BOUNCES]:
         first, stop = bounce.contact
-        if first < 2 or stop > len(bounce.force) - 2:
+        least = round(LEAST_QUIET * bounce.sample_rate)
+        if first < least or len(bounce.force) - stop < least:
             break
-        contact = find_contact(bounce)
+        touch, release = find_edges(bounce, drop.background)
         late = (bounce.start - window.start) / window.sample_rate
         found.append((
-            Estimate(late + contact.touch.value, contact.touch.uncertainty),
-            Estimate(late + contact.release.value, contact.release.uncertainty),
+            Estimate(late + touch.value, touch.uncertainty),
+            Estimate(late + release.value, release.uncertainty),
         ))
     return found
 

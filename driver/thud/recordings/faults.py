@@ -38,7 +38,7 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
     least = LEAST_QUIET * rate
-    if first < least or len(window.force) - stop < least:
+    if first < least or window.stop - window.start - stop < least:
         side = "starts" if first < least else "ends"
         refuse(
             f"{name}: the signal {side} within the pulse or less than 1 ms "
@@ -48,8 +48,9 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
     for remark in window.remarks:
         if remark.startswith("two impacts"):
             refuse(f"{name}: {remark}", "one impact, with quiet before and after it")
-    _refuse_clipped(window)
-    return _fill(window)
+    force = window.force
+    _refuse_clipped(window, force)
+    return _fill(window, force)
 
 
 def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -58,10 +59,10 @@ def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return starts, np.diff(np.append(starts, len(force)))
 
 
-def _refuse_clipped(window: Window) -> None:
+def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
     """Raise InputError where the top of the pulse is flat."""
     first, stop = window.contact
-    force = window.force[first:stop]
+    force = whole[first:stop]
     starts, lengths = _runs(force)
     top = force.max()
     at_top = force[starts] == top
@@ -72,8 +73,8 @@ def _refuse_clipped(window: Window) -> None:
     half = max(length // 2, 1)
     beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
     clipped = length >= FLAT and top - max(beside) > FALL * digit
-    if window.full_scale is not None:
-        at_scale = np.count_nonzero(force >= FULL * window.full_scale)
+    if window.signal.full_scale is not None:
+        at_scale = np.count_nonzero(force >= FULL * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
     if clipped:
         refuse(
@@ -83,13 +84,14 @@ def _refuse_clipped(window: Window) -> None:
         )
 
 
-def _fill(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
+def _fill(
+    window: Window, force: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
     """Return the force with dropouts filled from both sides, what was done, and doubts."""
     first, stop = window.contact
     rate = window.sample_rate
     guard = int(LEAST_QUIET * rate)
     first, stop = first + guard, stop - guard
-    force = window.force
     level = force - np.median(np.concatenate([force[: window.contact[0]], force[window.contact[1] :]]))
     part = level[first:stop]
     if len(part) < 4:

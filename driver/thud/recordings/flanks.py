@@ -33,9 +33,8 @@ MISSED = (0.005, 0.1)
 SMOOTH = 3
 PRIOR = np.log([0.4, 0.2, 0.1, 0.2, 0.1])
 FILTERED = 2
-# Times of one search, and searches, each within REACH standard deviations of the one before.
-N_TIME = 41
-SEARCHES = 3
+# Times of one search, each within REACH standard deviations of the one before.
+N_TIME = 33
 REACH = 6.0
 # Samples are smoothed by these weights, which take the ringing of an anti-aliasing filter.
 SMOOTHING = np.array([0.25, 0.5, 0.25])
@@ -66,7 +65,9 @@ class Flank:
     interval: float
 
 
-def find_touch(flank: Flank, low: float, high: float) -> tuple[float, float]:
+def find_touch(
+    flank: Flank, low: float, high: float, searches: int
+) -> tuple[float, float]:
     """Return the time of first touch between two times, s, and its standard deviation.
 
     The mean over the posterior of the time, all classes of flanks together.
@@ -80,7 +81,7 @@ def find_touch(flank: Flank, low: float, high: float) -> tuple[float, float]:
         size = float(np.log(np.diagonal(factor)).sum())
         groups.append((factor, value, size, classes))
     mean, deviation, left = (low + high) / 2, (high - low) / 2, 0.0
-    for _ in range(SEARCHES):
+    for _ in range(searches):
         time = np.linspace(low, high, N_TIME)
         shape = _columns(1e3 * (flank.time - time[:, None]), 1e3 * flank.interval)
         logarithm = np.concatenate([_evidence(shape, *group) for group in groups])
