@@ -31,9 +31,10 @@ FINEST = 2e-5
 GROWTH = 0.15
 # Cells of the contact, s.
 CONTACT_CELL = 2e-4
-# The gate of the levels reaches this many samples beyond the contact: what an anti-aliasing
-# filter spreads.
+# The gate of the levels reaches this many samples beyond the contact, and more at low rates,
+# whose anti-aliasing filter comes close to the octave of 500 Hz: up to GATE_RATE/rate more.
 GATE_SAMPLES = 4
+GATE_RATE = 25_000.0
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
 
@@ -164,9 +165,10 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     edges = _search(force, contact, rate, None, passes=2)
     background, (left, right) = edges.background, edges.quiet
     (t0, s0), (t1, s1) = ((t.value, t.uncertainty) for t in (edges.touch, edges.release))
+    margin = GATE_SAMPLES + int(GATE_RATE / rate)
     gate = (
-        max(int((t0 - 3 * s0) * rate) - GATE_SAMPLES, 0),
-        min(int((t1 + 3 * s1) * rate) + GATE_SAMPLES + 1, len(force)),
+        max(int((t0 - 3 * s0) * rate) - margin, 0),
+        min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
     )
     inner = _even_edges(*gate, rate)
     _, covariance = background.predict(_cells(inner, rate, middle))

@@ -30,6 +30,11 @@ MAX_BOUNCES = 2
 RECORDED_BAND = 1250.0
 # Quiet below which it is told, s.
 SHORT_QUIET = 0.005
+# Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the
+# error that is told, dB.
+OCTAVE_500 = (354.8, 707.9)
+TOP = 0.4
+NOTABLE_ERROR = 0.1
 # Standard deviations that make a difference worth telling.
 NOTABLE = 3.0
 
@@ -176,7 +181,7 @@ def measure_drop(
         noise=_noise(contact),
         bounces=tuple(landing.value - touch.value for landing, _ in landings),
         steps=steps,
-        remarks=(*window.remarks, *remarks, *told),
+        remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
         contact=contact,
     )
 
@@ -235,6 +240,29 @@ def _told_background(contact: Contact) -> tuple[str, ...]:
     if amplitude > NOTABLE * deviation:
         steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
     return tuple(steps)
+
+
+def _told_aliased(contact: Contact) -> tuple[str, ...]:
+    """Return a sentence where content at half the rate folds back into the octave of 500 Hz.
+
+    Beyond half the rate the amplitude of a pulse with kinks falls as 1/f2.
+    """
+    rate = contact.sample_rate
+    lower, upper = OCTAVE_500
+    force = np.pad(contact.gated, (0, 3 * len(contact.gated)))
+    frequency = np.fft.rfftfreq(len(force), 1 / rate)
+    power = np.abs(np.fft.rfft(force)) ** 2
+    noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
+    own = power[(frequency > lower) & (frequency < upper)].mean()
+    top = max(power[frequency > TOP * rate].mean() - 3 * noise, 0.0)
+    folded = top * (0.45 * rate / (rate - upper)) ** 4
+    error = 20 * math.log10(1 + math.sqrt(folded / own))
+    if error < NOTABLE_ERROR:
+        return ()
+    return (
+        f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
+        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB",
+    )
 
 
 def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formula

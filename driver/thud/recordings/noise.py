@@ -22,6 +22,8 @@ N_HARMONIC = 5
 # Prior standard deviations of offset, and of drift per second, over the peak force: wide.
 OFFSET = 1.0
 DRIFT = 0.1
+# Squared lag over mean squared length of two cells below which their covariance is exact.
+NEAR = 8.0
 # Iterations of the likelihood, and the change of its logarithm that ends them.
 MAX_ITERATIONS = 25
 TOLERANCE = 0.02
@@ -65,13 +67,16 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     (a, b), (c, d) = one, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
     width = (((b - a) ** 2)[:, None] + (d - c) ** 2) / 2
-    same = lag < 1e-3 * np.sqrt(width)
-    lag[same] = 1.0
+    near = np.nonzero(lag**2 < NEAR * width)
+    lag[near] = 1.0
     pink = width / (12 * lag**2) - np.log(lag)
     brown = -(np.pi**2) * lag
-    # Means over one cell with itself: double integrals of the covariances.
-    pink[same] = 1.5 - 0.5 * np.log(width[same])
-    brown[same] = -(np.pi**2) / 3 * np.sqrt(width[same])
+    # Of cells that touch or are the same: corner differences of the second integrals.
+    a, b, c, d = a[near[0]], b[near[0]], c[near[1]], d[near[1]]
+    size = np.maximum(np.abs([b - c, a - c, b - d, a - d]), 1e-300)
+    sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
+    pink[near] = (sign * (size**2 * (0.75 - 0.5 * np.log(size))).T).sum(1)
+    brown[near] = (sign * (-(np.pi**2) / 6 * size**3).T).sum(1)
     hum = [_waves(one, mains) @ _waves(other, mains).T for mains in MAINS]
     return np.array([pink, brown, *hum])
 
