@@ -24,7 +24,7 @@ SPEED = np.sqrt(2 * 9.81)
 
 @pytest.fixture(scope="module")
 def finite_elements() -> thud.Impact:
-    """A drop of the ball by finite elements: 1.6 kN, 19.3 ms."""
+    """Return a drop of the ball by finite elements: 1.6 kN, 19.3 ms."""
     case = thud.read_case("inputs/rubber_ball_fe.nml")
     return thud.solve_case(case)
 
@@ -139,7 +139,9 @@ def test_filtered_half_sine_has_the_levels_of_the_pulse(rate: float) -> None:
     np.testing.assert_allclose(levels(drop), ORACLE, rtol=0, atol=1e-3)
 
 
-def falling(flights: int, restitution: float = 0.8, scale: float = 1.0) -> list[tuple[float, float]]:
+def falling(
+    flights: int, restitution: float = 0.8, scale: float = 1.0
+) -> list[tuple[float, float]]:
     """Return times since first touch and factors of a drop and its bounces."""
     at, part, series = 0.0, scale, [(0.0, scale)]
     for _ in range(flights):
@@ -167,7 +169,9 @@ def test_bounces_are_told_from_drops() -> None:
 
 
 def test_restitution_and_mass_follow_from_the_impulse() -> None:
-    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60, drops=tuple(falling(2, 0.75)))
+    force, _ = make_recording(
+        HALF_SINE, FINE, rate=48e3, noise_db=60, drops=tuple(falling(2, 0.75))
+    )
     (drop,) = drops(force, 48e3)
     impulse = 1500 * 0.02 * 2 / np.pi
     assert drop.impulse.value == pytest.approx(impulse, abs=4 * drop.impulse.uncertainty + 1e-3)
@@ -246,6 +250,7 @@ class Hour:
     full_scale: float | None = None
 
     def read(self, start: int, stop: int) -> np.ndarray:
+        """Return samples, N."""
         return self.part[np.arange(start, stop) % len(self.part)].astype(np.float64)
 
 

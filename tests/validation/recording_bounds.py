@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import sys
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,8 +26,11 @@ from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.noise import MAINS, Background
 from thud.recordings.signal import Signal
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
-from synthetic import coloured_noise, noise_density
+from synthetic import HARMONICS, coloured_noise, noise_density
 
 NOISES = (60, 50, 40, 30, 20)
 COLOURS = ("white", "pink", "brown")
@@ -35,7 +39,7 @@ SHAPES = ("half sine", "shell", "modal", "finite elements")
 FINE = 192_000.0
 HEIGHT, MASS, GRAVITY = 1.0, 2.5, 9.81
 BANDS = thud.get_bands()
-HARMONICS = (1.0, 0.5, 0.3)
+QUANTITIES = (*(f"{band:g} Hz" for band in BANDS.nominal), "e", "t_c", "t_c smooth")
 
 
 @cache
@@ -137,7 +141,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
     return draw, Result(np.array(error), np.array(stated), np.array(bounds), decibels)
 
 
-def oracle_drop(
+def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     draw: Draw,
     clean: np.ndarray,
     onset: float,
@@ -158,12 +162,12 @@ def oracle_drop(
     saved = contact_module.QUIET_CELLS
     contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
     try:
-        quiet, mean = contact_module._quiet(clean, first, last, rate, middle)
+        quiet, mean = contact_module.quiet_means(clean, first, last, rate, middle)
     finally:
         contact_module.QUIET_CELLS = saved
     background = Background(quiet, mean, variances, peak)
-    edges = contact_module._even_edges(first, last, rate)
-    _, covariance = background.predict(contact_module._cells(edges, rate, middle))
+    edges = contact_module.even_edges(first, last, rate)
+    _, covariance = background.predict(contact_module.cells_between(edges, rate, middle))
     contact = Contact(
         Estimate(onset, 0),
         Estimate(onset + contact_time, 0),
@@ -188,9 +192,7 @@ def oracle_drop(
     return oracle, Estimate(float(truth), spread)
 
 
-def flank_bounds(
-    draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop
-) -> tuple[float, float]:
+def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop) -> tuple[float, float]:
     """Return bounds of the contact time, s: of any flank, and of one that is known to be smooth.
 
     The first is the deviation of the posterior where the noise is known; the second is the
@@ -203,17 +205,22 @@ def flank_bounds(
     saved = contact_module.QUIET_CELLS
     contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
     left, right = int((touch - 2e-4) * rate) - 2, int((release + 2e-4) * rate) + 3
-    quiet, mean = contact_module._quiet(record - offset, left, right, rate, middle)
+    quiet, mean = contact_module.quiet_means(record - offset, left, right, rate, middle)
     contact_module.QUIET_CELLS = saved
     background = Background(quiet, mean, contact.background.variances, contact.peak)
     room = 6 * max(drop.contact_time.uncertainty, 2e-5) + 3 / rate
     spread = 0.0
     for sign, near, at in ((1, left, touch), (-1, right, release)):
-        bounds = (max(at - room, left / rate), at + room) if sign > 0 else (
-            at - room, min(at + room, right / rate))
+        bounds = (
+            (max(at - room, left / rate), at + room)
+            if sign > 0
+            else (at - room, min(at + room, right / rate))
+        )
         ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
-        edges = sign * contact_module._flank_edges(sign * near, ahead, rate, fine=True)
-        _, one = contact_module._touch(record - offset, edges, bounds, background, rate, middle, 3)
+        edges = sign * contact_module.flank_edges(sign * near, ahead, rate, fine=True)
+        _, one = contact_module.find_edge(
+            record - offset, edges, bounds, background, rate, middle, 3
+        )
         spread = float(np.hypot(spread, one))
     if draw.shape != "half sine":
         return spread, np.nan
@@ -231,52 +238,64 @@ def flank_bounds(
     return spread, float(np.sqrt(2 * inverse[0, 0]))
 
 
-def main(count: int) -> list[tuple[Draw, Result | str]]:
-    """Print the tables of a number of realisations."""
+def realise_all(count: int) -> list[tuple[Draw, Result | str]]:
+    """Return a number of realisations."""
     for shape in SHAPES:
         pulse(shape)
     with ProcessPoolExecutor(2) as pool:
-        results = list(pool.map(realise, range(count), chunksize=10))
-    refused = [(draw, text) for draw, text in results if isinstance(text, str)]
-    for draw, text in refused:
-        print("refused:", draw, text)
-    report(results)
-    return results
+        return list(pool.map(realise, range(count), chunksize=10))
 
 
-def report(results: list[tuple[Draw, Result | str]]) -> None:
-    """Print error over bound (root mean square), and the part of 95 % intervals that cover."""
-    names = [*(f"{b:g} Hz" for b in BANDS.nominal), "e", "t_c", "t_c smooth"]
-    print("noise colour     n | rms(error/bound) and part within 1.96 stated deviations")
-    print(" " * 20, *(f"{name:>13s}" for name in names))
-    for colour in COLOURS:
-        for noise in NOISES:
-            some = [
-                r for d, r in results
-                if isinstance(r, Result) and d.noise == noise and d.colour == colour
-            ]
-            if not some:
-                continue
-            error, stated, bound = (
-                np.array([getattr(r, f.name) for r in some]) for f in fields(Result)[:3]
-            )
-            rms = np.sqrt(np.nanmean((error / bound) ** 2, axis=0))
-            cover = np.mean(np.abs(error) <= 1.96 * stated, axis=0)
-            row = (f"{a:6.2f} {100 * b:4.0f} %" for a, b in zip(rms, cover, strict=True))
-            print(f"{noise:3d} dB {colour:6s} {len(some):4d} |", *row)
-    for noise in NOISES:
-        some = [(d, r) for d, r in results if isinstance(r, Result) and d.noise == noise]
+def columns(results: list[Result]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return errors, stated deviations and bounds: [n, n_quantity] each."""
+    error, stated, bound = (
+        np.array([getattr(r, name) for r in results]) for name in ("error", "stated", "bound")
+    )
+    return error, stated, bound
+
+
+def table(results: list[tuple[Draw, Result | str]]) -> Iterator[str]:
+    """Yield the lines of the report."""
+    yield "root mean square of error/bound, and part within 1.96 stated deviations"
+    yield " " * 21 + "".join(f"{name:>14s}" for name in QUANTITIES)
+    groups = [(c, n) for c in (*COLOURS, "all") for n in NOISES] + [("all", 0)]
+    for colour, noise in groups:
+        some = [
+            r
+            for d, r in results
+            if isinstance(r, Result) and noise in {0, d.noise} and colour in {"all", d.colour}
+        ]
         if not some:
             continue
-        worst = np.max([np.abs(r.decibels) for _, r in some], axis=0)
-        times = np.abs([r.error[6] for _, r in some])
-        bounce = np.abs([r.error[5] for _, r in some])
-        print(
-            f"{noise} dB: largest errors: levels", " ".join(f"{w:.3f}" for w in worst),
-            f"dB, contact time {1e3 * times.max():.3f} ms (rms {1e3 * np.sqrt(np.mean(times**2)):.3f}), "
-            f"restitution {bounce.max():.4f}",
+        error, stated, bound = columns(some)
+        rms = np.sqrt(np.nanmean((error / bound) ** 2, axis=0))
+        cover = np.mean(np.abs(error) <= 1.96 * stated, axis=0)
+        row = "".join(f"{a:7.2f} {100 * b:4.0f} %" for a, b in zip(rms, cover, strict=True))
+        yield f"{noise or '':>3} dB {colour:6s} {len(some):4d} |{row}"
+    for noise in NOISES:
+        some = [r for d, r in results if isinstance(r, Result) and d.noise == noise]
+        if not some:
+            continue
+        error, stated, bound = columns(some)
+        worst = np.max([np.abs(r.decibels) for r in some], axis=0)
+        within = np.mean([np.abs(r.decibels) < 0.1 for r in some], axis=0)
+        late, bounce = 1e3 * np.abs(error[:, 6]), np.abs(error[:, 5])
+        yield (
+            f"{noise} dB: largest errors: levels {' '.join(f'{w:.3f}' for w in worst)} dB, within "
+            f"0.1 dB {' '.join(f'{100 * w:.0f}' for w in within)} %"
         )
+        yield (
+            f"       contact time {late.max():.3f} ms, rms {np.sqrt(np.mean(late**2)):.3f}, "
+            f"within 0.1 ms {100 * np.mean(late < 0.1):.0f} %, bound rms "
+            f"{1e3 * np.sqrt(np.mean(bound[:, 6] ** 2)):.3f}; restitution {bounce.max():.4f}, "
+            f"within 0.01 {100 * np.mean(bounce < 0.01):.0f} %; largest error over stated deviation "
+            f"{np.max(np.abs(error / stated)):.1f}"
+        )
+    for draw, text in results:
+        if isinstance(text, str):
+            yield f"refused: {draw}: {text}"
 
 
 if __name__ == "__main__":
-    found = main(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
+    found = realise_all(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
+    sys.stdout.write("\n".join(table(found)) + "\n")

@@ -38,6 +38,7 @@ GATE_RATE = 25_000.0
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
 
+
 @dataclass(frozen=True)
 class Estimate:
     """A value and its standard uncertainty, in the same unit; NaN where not known."""
@@ -116,9 +117,9 @@ class Contact:
         return result + summed @ self.covariance @ summed.T
 
 
-def _cells(edges: NDArray[np.intp], rate: float, middle: float) -> Cells:
+def cells_between(edges: NDArray[np.intp], rate: float, middle: float) -> Cells:
     """Return begins and ends of cells between samples, s from the middle of the contact."""
-    time = (edges - 0.5) / rate - middle
+    time = np.asarray((edges - 0.5) / rate - middle, dtype=np.float64)
     return time[:-1], time[1:]
 
 
@@ -170,12 +171,12 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         max(int((t0 - 3 * s0) * rate) - margin, 0),
         min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
     )
-    inner = _even_edges(*gate, rate)
-    _, covariance = background.predict(_cells(inner, rate, middle))
+    inner = even_edges(*gate, rate)
+    _, covariance = background.predict(cells_between(inner, rate, middle))
     reach = int(QUIET * rate)
     span = (max(0, gate[0] - reach), min(len(force), gate[1] + reach))
-    sides = [_even_edges(*side, rate / 5) for side in ((span[0], gate[0]), (gate[1], span[1]))]
-    cells = _cells(np.unique(np.concatenate([*sides, inner])), rate, middle)
+    sides = [even_edges(*side, rate / 5) for side in ((span[0], gate[0]), (gate[1], span[1]))]
+    cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
     time = np.arange(*span) / rate - middle
     under = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
     under += edges.offset
@@ -213,15 +214,15 @@ def _search(
     force = force - offset
     peak = float(force[first:stop].max())
     for last in range(passes):
-        quiet, mean = _quiet(force, left, right, rate, middle)
+        quiet, mean = quiet_means(force, left, right, rate, middle)
         if known is None:
             known = fit_background(quiet, mean, peak)
         background = Background(quiet, mean, known.variances, peak)
         found = []
         for sign, (near, bounds) in zip((1, -1), ((left, touch), (right, release)), strict=True):
             ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
-            edges = sign * _flank_edges(sign * near, ahead, rate, fine=last > 0)
-            found.append(_touch(force, edges, bounds, background, rate, middle, 2 + last))
+            edges = sign * flank_edges(sign * near, ahead, rate, fine=last > 0)
+            found.append(find_edge(force, edges, bounds, background, rate, middle, 2 + last))
         (t0, s0), (t1, s1) = found
         if last + 1 < passes:
             room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
@@ -231,13 +232,13 @@ def _search(
     return _Edges(Estimate(t0, s0), Estimate(t1, s1), background, offset, (left, right))
 
 
-def _even_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
+def even_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
     """Return edges of cells of about CONTACT_CELL at a rate, in samples."""
     count = max(1, round((stop - start) / rate / CONTACT_CELL))
     return np.unique(np.rint(np.linspace(start, stop, 1 + count)).astype(int))
 
 
-def _quiet(
+def quiet_means(
     force: NDArray[np.float64], left: int, right: int, rate: float, middle: float
 ) -> tuple[Cells, NDArray[np.float64]]:
     """Return the quiet cells on both sides of a contact, and their means, N."""
@@ -245,12 +246,12 @@ def _quiet(
         left - _quiet_edges(left, rate)[::-1],
         right + _quiet_edges(len(force) - right, rate),
     )
-    begins, ends = zip(*(_cells(edges, rate, middle) for edges in both), strict=True)
+    begins, ends = zip(*(cells_between(edges, rate, middle) for edges in both), strict=True)
     mean = [_means(force, edges) for edges in both if len(edges) > 1]
     return (np.concatenate(begins), np.concatenate(ends)), np.concatenate(mean)
 
 
-def _touch(  # noqa: PLR0913, PLR0917 - what a flank is
+def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     force: NDArray[np.float64],
     edges: NDArray[np.intp],
     bounds: tuple[float, float],
@@ -263,7 +264,7 @@ def _touch(  # noqa: PLR0913, PLR0917 - what a flank is
     turned = edges[0] > edges[-1]
     edges = edges[::-1] if turned else edges
     edges = edges[(edges >= 0) & (edges <= len(force))]
-    cells = _cells(edges, rate, middle)
+    cells = cells_between(edges, rate, middle)
     under, covariance = background.predict(cells)
     low, high = max(edges[0] - 1, 0), min(edges[-1] + 1, len(force))
     smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[edges[0] - low :]
@@ -284,7 +285,7 @@ def _touch(  # noqa: PLR0913, PLR0917 - what a flank is
     return find_touch(Flank(time, value, covariance, background.peak, 1 / rate), *bounds, searches)
 
 
-def _flank_edges(
+def flank_edges(
     quiet: int, bounds: tuple[float, float], rate: float, *, fine: bool
 ) -> NDArray[np.intp]:
     """Return edges of flank cells in samples, from the end of the quiet to behind the flank."""

@@ -29,8 +29,11 @@ SEGMENT = 1_000
 # is less; they end where the force has fallen to FOOT deviations or to FOOT_PART of their peak.
 RISE = 6.0
 RISE_PART = 0.4
+NO_PULSE = 4.0
 FOOT = 2.0
 FOOT_PART = 0.03
+# Cells between two parts of one pulse.
+MERGED = 4
 # Lower pulses are no impacts: part of the highest one of a signal.
 LEAST_PART = 0.03
 # Durations of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
@@ -40,8 +43,9 @@ VALLEY = 0.3
 # A pulse whose peak reaches this part of the one before is a drop of its own. The limits of the
 # standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
 NEW_PART = 0.93
-# Longest flight of a bounce, s: 2 e v0/g of a drop from 2 m with e = 1.
+# Flights of a bounce, s: 2 e v0/g of a drop from 2 m with e = 1; from 0.5 mm.
 LONGEST_FLIGHT = 1.3
+SHORTEST_FLIGHT = 0.02
 # Part of the signal around one drop, s.
 BEFORE = 0.25
 AFTER = 0.5
@@ -141,7 +145,11 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
     kept = np.empty(0)
     first = 0
     bar = tqdm(
-        total=signal.n_sample, unit="sample", unit_scale=True, desc=signal.name, disable=not progress
+        total=signal.n_sample,
+        unit="sample",
+        unit_scale=True,
+        desc=signal.name,
+        disable=not progress,
     )
     block = 4_096 * width
     ready = 0
@@ -186,10 +194,10 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> tuple[list[_
     deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
     highest = float(level.max(initial=0.0))
     rise = min(RISE * deviation, RISE_PART * highest)
-    if highest <= max(4 * deviation, 1e-9):
+    if highest <= max(NO_PULSE * deviation, 1e-9):
         return [], highest
     above = np.flatnonzero(level > max(rise, 0.01 * highest))
-    groups = np.split(above, np.flatnonzero(np.diff(above) > 4) + 1)
+    groups = np.split(above, np.flatnonzero(np.diff(above) > MERGED) + 1)
     pulses: list[_Pulse] = []
     for group in groups:
         top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
@@ -205,7 +213,9 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> tuple[list[_
             continue
         doubt = _told_double(level[start:stop])
         pulses.append(
-            _Pulse(first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else [])
+            _Pulse(
+                first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else []
+            )
         )
     return pulses, highest
 
@@ -245,7 +255,7 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
             before is not None
             and gap < 1.02 * flight
             and pulse.peak < NEW_PART * before.peak
-            and gap > 0.02
+            and gap > SHORTEST_FLIGHT
         )
         if bounced:
             drops[-1].bounces.append(pulse)

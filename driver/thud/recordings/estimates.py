@@ -158,7 +158,9 @@ def measure_drop(
     leaving = release
     for landing, again in landings:
         flights.append(
-            Estimate(landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty))
+            Estimate(
+                landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty)
+            )
         )
         leaving = again
     ways, told = _restitutions(impulse, contact_time, flights, height, mass, gravity)
@@ -196,10 +198,12 @@ def _landings(window: Window, drop: Contact) -> list[tuple[Estimate, Estimate]]:
             break
         touch, release = find_edges(bounce, drop.background)
         late = (bounce.start - window.start) / window.sample_rate
-        found.append((
-            Estimate(late + touch.value, touch.uncertainty),
-            Estimate(late + release.value, release.uncertainty),
-        ))
+        found.append(
+            (
+                Estimate(late + touch.value, touch.uncertainty),
+                Estimate(late + release.value, release.uncertainty),
+            )
+        )
     return found
 
 
@@ -259,10 +263,11 @@ def _told_aliased(contact: Contact) -> tuple[str, ...]:
     error = 20 * math.log10(1 + math.sqrt(folded / own))
     if error < NOTABLE_ERROR:
         return ()
-    return (
+    told = (
         f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
-        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB",
+        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
     )
+    return (told,)
 
 
 def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formula
@@ -298,11 +303,12 @@ def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formu
         difference = by.value - other.value
         deviation = math.hypot(by.uncertainty, other.uncertainty)
         if abs(difference) > NOTABLE * deviation:
-            return ways, (
+            told = (
                 f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
                 f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
-                "check mass, height and calibration",
+                "check mass, height and calibration"
             )
+            return ways, (told,)
     return ways, ()
 
 

@@ -24,6 +24,8 @@ FULL = 0.999
 # A jump into or out of samples of one value that makes them a dropout, over the peak force: no
 # flank rises by this much between two samples of 20 kHz.
 JUMP = 0.04
+# Samples of one value that may be held.
+HELD = 3
 # Longest total of dropouts that is repaired, s.
 REPAIRED = 1e-3
 
@@ -92,9 +94,11 @@ def _fill(
     rate = window.sample_rate
     guard = int(LEAST_QUIET * rate)
     first, stop = first + guard, stop - guard
-    level = force - np.median(np.concatenate([force[: window.contact[0]], force[window.contact[1] :]]))
+    level = force - np.median(
+        np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    )
     part = level[first:stop]
-    if len(part) < 4:
+    if not part.size:
         return force, (), ()
     starts, lengths = _runs(part)
     before = np.abs(part[starts] - part[np.maximum(starts - 1, 0)])
@@ -102,7 +106,7 @@ def _fill(
     after = np.abs(part[np.minimum(ends + 1, len(part) - 1)] - part[ends])
     limit = JUMP * part.max()
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    held = (lengths > 2) & ((before > limit) | (after > limit))
+    held = (lengths >= HELD) & ((before > limit) | (after > limit))
     lost = np.flatnonzero(zero | held)
     total = int(lengths[lost].sum())
     if not total:

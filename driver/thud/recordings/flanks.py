@@ -65,9 +65,7 @@ class Flank:
     interval: float
 
 
-def find_touch(
-    flank: Flank, low: float, high: float, searches: int
-) -> tuple[float, float]:
+def find_touch(flank: Flank, low: float, high: float, searches: int) -> tuple[float, float]:
     """Return the time of first touch between two times, s, and its standard deviation.
 
     The mean over the posterior of the time, all classes of flanks together.
@@ -76,7 +74,7 @@ def find_touch(
     groups = []
     for part, classes in zip(MISSED, (range(SMOOTH), range(SMOOTH, len(CLASSES))), strict=True):
         covariance = flank.covariance / flank.peak**2 + np.diag((part * level) ** 2)
-        factor = np.linalg.cholesky(covariance)
+        factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         value = solve_triangular(factor, level, lower=True, check_finite=False)
         size = float(np.log(np.diagonal(factor)).sum())
         groups.append((factor, value, size, classes))
@@ -88,7 +86,9 @@ def find_touch(
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
         mean = float(weight.sum(0) @ time)
-        deviation = float(np.sqrt(weight.sum(0) @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12))
+        deviation = float(
+            np.sqrt(weight.sum(0) @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12)
+        )
         left = float(weight.sum(1) @ LEFT**2)
         reach = REACH * deviation
         if mean - reach <= low and mean + reach >= high:
@@ -139,7 +139,8 @@ def _columns(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
         weight * _shapes(tau + shift * interval, interval)
         for weight, shift in zip(SMOOTHING, (-1, 0, 1), strict=True)
     ]
-    return parts[0] + parts[1] + parts[2]
+    total: NDArray[np.float64] = parts[0] + parts[1] + parts[2]
+    return total
 
 
 def _shapes(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:

@@ -73,7 +73,7 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     brown = -(np.pi**2) * lag
     # Of cells that touch or are the same: corner differences of the second integrals.
     a, b, c, d = a[near[0]], b[near[0]], c[near[1]], d[near[1]]
-    size = np.maximum(np.abs([b - c, a - c, b - d, a - d]), 1e-300)
+    size: NDArray[np.float64] = np.maximum(np.abs([b - c, a - c, b - d, a - d]), 1e-300)
     sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
     pink[near] = (sign * (size**2 * (0.75 - 0.5 * np.log(size))).T).sum(1)
     brown[near] = (sign * (-(np.pi**2) / 6 * size**3).T).sum(1)
@@ -114,8 +114,7 @@ class Background:
         """Return the factor of the covariance of the quiet cells."""
         parts = covariances(self.quiet)
         total = np.tensordot(self.variances, parts, 1) + self._trend(self.quiet, self.quiet)
-        factor: NDArray[np.float64] = np.linalg.cholesky(total)
-        return factor
+        return np.asarray(np.linalg.cholesky(total), dtype=np.float64)
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the background of cells, N, and the covariance of its error, N2.
@@ -146,7 +145,9 @@ class Background:
     @cached_property
     def _weights(self) -> NDArray[np.float64]:
         """Return the inverse covariance of the quiet cells times their means."""
-        weights: NDArray[np.float64] = cho_solve((self._factor, True), self.mean, check_finite=False)
+        weights: NDArray[np.float64] = cho_solve(
+            (self._factor, True), self.mean, check_finite=False
+        )
         return weights
 
     @property
