@@ -137,7 +137,9 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
     late = drop.contact_time.value - contact_time
     error += [drop.restitution.value - restitution.value, late, late]
     stated += [drop.restitution.uncertainty, *[drop.contact_time.uncertainty] * 2]
-    bounds += [restitution.uncertainty, *flank_bounds(draw, oracle, record, drop)]
+    flanks = flank_bounds(draw, oracle, record, drop)
+    gravity = GRAVITY * flanks[0] / np.sqrt(2 * GRAVITY * HEIGHT)
+    bounds += [float(np.hypot(restitution.uncertainty, gravity)), *flanks]
     return draw, Result(np.array(error), np.array(stated), np.array(bounds), decibels)
 
 
@@ -288,8 +290,8 @@ def table(results: list[tuple[Draw, Result | str]]) -> Iterator[str]:
             f"       contact time {late.max():.3f} ms, rms {np.sqrt(np.mean(late**2)):.3f}, "
             f"within 0.1 ms {100 * np.mean(late < 0.1):.0f} %, bound rms "
             f"{1e3 * np.sqrt(np.mean(bound[:, 6] ** 2)):.3f}; restitution {bounce.max():.4f}, "
-            f"within 0.01 {100 * np.mean(bounce < 0.01):.0f} %; largest error over stated deviation "
-            f"{np.max(np.abs(error / stated)):.1f}"
+            f"within 0.01 {100 * np.mean(bounce < 0.01):.0f} %; largest error over stated "
+            f"deviation {np.max(np.abs(error / stated)):.1f}"
         )
     for draw, text in results:
         if isinstance(text, str):

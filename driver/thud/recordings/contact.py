@@ -227,8 +227,8 @@ def _search(
         if last + 1 < passes:
             room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
             touch, release = (t0 - room0, t0 + room0), (t1 - room1, t1 + room1)
-            left = max(int(touch[0] * rate), 0)
-            right = min(int(release[1] * rate) + 1, len(force))
+            left = max(int(touch[0] * rate), first // 2)
+            right = min(int(release[1] * rate) + 1, (stop + len(force) + 1) // 2)
     return _Edges(Estimate(t0, s0), Estimate(t1, s1), background, offset, (left, right))
 
 

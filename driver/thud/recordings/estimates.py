@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
+from thud.checks import refuse
 from thud.levels import record_force
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
-from thud.recordings.faults import LEAST_QUIET, repair
+from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
 
 if TYPE_CHECKING:
@@ -35,6 +36,8 @@ SHORT_QUIET = 0.005
 OCTAVE_500 = (354.8, 707.9)
 TOP = 0.4
 NOTABLE_ERROR = 0.1
+# Least contact time over its uncertainty.
+MOST_DOUBT = 4.0
 # Standard deviations that make a difference worth telling.
 NOTABLE = 3.0
 
@@ -142,7 +145,10 @@ def measure_drop(
         Where the pulse is clipped, cut, doubled or full of dropouts.
     """
     force, steps, remarks = repair(window)
-    contact = find_contact(window, force)
+    try:
+        contact = find_contact(window, force)
+    except np.linalg.LinAlgError as error:
+        refuse(f"{window.name}: the quiet parts are no noise", "noise, drift and hum", error)
     steps += _told_background(contact)
     for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
         if quiet < SHORT_QUIET:
@@ -153,6 +159,13 @@ def measure_drop(
     contact_time = Estimate(
         release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
     )
+    if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
+        refuse(
+            f"{window.name}: the contact cannot be told from the noise: "
+            f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
+            f"{1e3 * contact_time.uncertainty:.2g} ms",
+            f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
+        )
     impulse = _impulse(contact)
     flights = []
     leaving = release
@@ -193,7 +206,7 @@ def _landings(window: Window, drop: Contact) -> list[tuple[Estimate, Estimate]]:
     found = []
     for bounce in window.bounces[:MAX_BOUNCES]:
         first, stop = bounce.contact
-        least = round(LEAST_QUIET * bounce.sample_rate)
+        least = least_quiet(bounce.sample_rate)
         if first < least or len(bounce.force) - stop < least:
             break
         touch, release = find_edges(bounce, drop.background)
@@ -253,7 +266,8 @@ def _told_aliased(contact: Contact) -> tuple[str, ...]:
     """
     rate = contact.sample_rate
     lower, upper = OCTAVE_500
-    force = np.pad(contact.gated, (0, 3 * len(contact.gated)))
+    # Long enough for several frequencies in the octave.
+    force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
     frequency = np.fft.rfftfreq(len(force), 1 / rate)
     power = np.abs(np.fft.rfft(force)) ** 2
     noise = contact.background.variances[0] * rate / 2 * len(contact.gated)

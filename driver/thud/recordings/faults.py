@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,9 @@ if TYPE_CHECKING:
 
     from thud.recordings.drops import Window
 
-# Least quiet on each side, s.
+# Least quiet on each side, s, and samples of it.
 LEAST_QUIET = 1e-3
+LEAST_SAMPLES = 4
 # Samples of one value at the top that are clipped, where the force beside them falls by more than
 # FALL steps of the digits: a smooth top of this length falls by 4.
 FLAT = 4
@@ -39,7 +41,7 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         Where the pulse is cut, clipped, doubled or has long dropouts.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
-    least = LEAST_QUIET * rate
+    least = least_quiet(rate)
     if first < least or window.stop - window.start - stop < least:
         side = "starts" if first < least else "ends"
         refuse(
@@ -53,6 +55,11 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
     force = window.force
     _refuse_clipped(window, force)
     return _fill(window, force)
+
+
+def least_quiet(rate: float) -> int:
+    """Return the samples of quiet that each side of a contact needs."""
+    return max(math.ceil(LEAST_QUIET * rate), LEAST_SAMPLES)
 
 
 def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -24,8 +24,10 @@ OFFSET = 1.0
 DRIFT = 0.1
 # Squared lag over mean squared length of two cells below which their covariance is exact.
 NEAR = 8.0
-# Iterations of the likelihood, and the change of its logarithm that ends them.
+# Iterations of the likelihood, the change of its logarithm that ends them, and the largest
+# logarithm of a mean variance over the most likely one.
 MAX_ITERATIONS = 25
+MOST_DOUBT = 0.4
 TOLERANCE = 0.02
 
 
@@ -218,7 +220,10 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
         theta, (value, score, information) = trial, result
         if gain < TOLERANCE:
             break
-    return Background(quiet, mean, theta, peak)
+    # The mean of a variance that is known to a factor is larger than its most likely value.
+    curvature = information * np.multiply.outer(theta, theta)
+    doubt = np.diagonal(np.linalg.inv(curvature + 0.05 * np.eye(5)))
+    return Background(quiet, mean, theta * np.exp(np.minimum(0.5 * doubt, MOST_DOUBT)), peak)
 
 
 def _likelihood(
