@@ -32,9 +32,9 @@ GROWTH = 0.15
 # Cells of the contact, s.
 CONTACT_CELL = 2e-4
 # The gate of the levels reaches this many samples beyond the contact, and more at low rates,
-# whose anti-aliasing filter comes close to the octave of 500 Hz: up to GATE_RATE/rate more.
+# whose anti-aliasing filter comes close to the octave of 500 Hz: (GATE_RATE/rate)2 more.
 GATE_SAMPLES = 4
-GATE_RATE = 25_000.0
+GATE_RATE = 10_000.0
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
 
@@ -139,6 +139,11 @@ def _quiet_edges(length: int, rate: float) -> NDArray[np.intp]:
     return places[places <= length]
 
 
+def gate_margin(rate: float) -> int:
+    """Return the samples of the gate on each side of the contact."""
+    return GATE_SAMPLES + int((GATE_RATE / rate) ** 2)
+
+
 @dataclass(frozen=True, eq=False)
 class _Edges:
     """First touch and release, and the background between two quiet parts."""
@@ -166,7 +171,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     edges = _search(force, contact, rate, None, passes=2)
     background, (left, right) = edges.background, edges.quiet
     (t0, s0), (t1, s1) = ((t.value, t.uncertainty) for t in (edges.touch, edges.release))
-    margin = GATE_SAMPLES + int(GATE_RATE / rate)
+    margin = gate_margin(rate)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
         min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
@@ -227,8 +232,10 @@ def _search(
         if last + 1 < passes:
             room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
             touch, release = (t0 - room0, t0 + room0), (t1 - room1, t1 + room1)
-            left = max(int(touch[0] * rate), first // 2)
-            right = min(int(release[1] * rate) + 1, (stop + len(force) + 1) // 2)
+            # What a filter spreads is no quiet.
+            beyond = gate_margin(rate) - GATE_SAMPLES
+            left = max(int(touch[0] * rate) - beyond, first // 2)
+            right = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
     return _Edges(Estimate(t0, s0), Estimate(t1, s1), background, offset, (left, right))
 
 

@@ -222,7 +222,7 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         start = _walk(local, low, -1, FOOT * peak) - MARGIN
         stop = _walk(local, high, 1, FOOT * peak) + 1 + MARGIN
         start = max(start, behind)
-        doubt = _told_double(local[max(start, 0) : stop])
+        doubt = _told_double(local[max(group[0], behind) : group[-1] + 1])
         pulses.append(
             _Pulse(
                 first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else []
