@@ -180,7 +180,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     _, covariance = background.predict(cells_between(inner, rate, middle))
     reach = int(QUIET * rate)
     span = (max(0, gate[0] - reach), min(len(force), gate[1] + reach))
-    sides = [even_edges(*side, rate / 5) for side in ((span[0], gate[0]), (gate[1], span[1]))]
+    sides = [even_edges(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
     cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
     time = np.arange(*span) / rate - middle
     under = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
@@ -219,6 +219,8 @@ def _search(
     force = force - offset
     peak = float(force[first:stop].max())
     for last in range(passes):
+        # The first of two passes needs no more than the grid.
+        searches = 1 + 2 * last if passes > 1 else 2
         quiet, mean = quiet_means(force, left, right, rate, middle)
         if known is None:
             known = fit_background(quiet, mean, peak)
@@ -227,7 +229,7 @@ def _search(
         for sign, (near, bounds) in zip((1, -1), ((left, touch), (right, release)), strict=True):
             ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
             edges = sign * flank_edges(sign * near, ahead, rate, fine=last > 0)
-            found.append(find_edge(force, edges, bounds, background, rate, middle, 2 + last))
+            found.append(find_edge(force, edges, bounds, background, rate, middle, searches))
         (t0, s0), (t1, s1) = found
         if last + 1 < passes:
             room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
