@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 # Exponents of the power spectra of noise.
@@ -52,32 +50,26 @@ def band_limited(
     if rate < sample_rate:
         edge = np.clip((frequency / rate - 0.4) / 0.1, 0, 1)
         spectrum *= 0.5 + 0.5 * np.cos(np.pi * edge)
-    # Four times as many samples, between which a line misses by less than 1e-3 of a step.
+    # Eight times as many samples, between which a line misses by less than 1e-3 of a step.
     fine = 8 * np.fft.irfft(spectrum, 8 * length)
-    grid = np.arange(-2 * len(force), 6 * len(force)) / (8 * sample_rate)
-    fine = fine[np.arange(-2 * len(force), 6 * len(force))]
+    places = np.arange(-4 * len(force), 12 * len(force))
+    grid, fine = places / (8 * sample_rate), fine[places]
     return np.interp(time, grid, fine, left=0.0, right=0.0)
 
 
-def half_sine(rate: float, start: float, n: int, peak: float = 1500.0, duration: float = 0.02) -> np.ndarray:
+def half_sine(
+    rate: float, start: float, n: int, peak: float = 1500.0, duration: float = 0.02
+) -> np.ndarray:
     """Return samples of a half-sine pulse that starts `start` s after the first."""
     time = np.arange(n) / rate - start
     return np.where((time > 0) & (time < duration), peak * np.sin(np.pi * time / duration), 0.0)
 
 
-@dataclass
-class Faults:
-    """What is added to a force."""
-
-    noise_db: float = np.inf  # noise below the peak, dB
-    colour: str = "white"
-    offset: float = 0.0  # N
-    drift: float = 0.0  # N/s
-    hum: tuple[float, float] = (50.0, 0.0)  # Hz, N
-    harmonics: tuple[float, ...] = (1.0, 0.5, 0.3)
+# Amplitudes of the harmonics of hum, over the first.
+HARMONICS = (1.0, 0.5, 0.3)
 
 
-def make_recording(
+def make_recording(  # noqa: PLR0913 - each is one fault
     force: np.ndarray,
     sample_rate: float,
     *,
@@ -117,7 +109,7 @@ def make_recording(
     peak = float(np.max(force))
     recording = clean + offset + drift * time
     frequency, amplitude = hum
-    for k, part in enumerate(Faults.harmonics, start=1):
+    for k, part in enumerate(HARMONICS, start=1):
         phase = rng.uniform(0, 2 * np.pi)
         recording += amplitude * part * np.sin(2 * np.pi * k * frequency * time + phase)
     recording += coloured_noise(n, rate, peak * 10 ** (-noise_db / 20), colour, rng)

@@ -26,11 +26,18 @@ OVERLAP = 2_000
 # Cells of one value of the running baseline.
 SEGMENT = 1_000
 # Pulses rise above this many deviations of the cells, or above this part of the maximum if that
-# is less; they end where the force has fallen to FOOT deviations or to FOOT_PART of their peak.
+# is less, and nothing is a pulse below NO_PULSE deviations. Their edges are looked for within two
+# cells of MARGIN cells outside of FOOT of their peak: flanks of the models rise to it in 4 ms.
 RISE = 6.0
 RISE_PART = 0.4
-FOOT = 2.0
-FOOT_PART = 0.03
+NO_PULSE = 4.0
+FOOT = 0.2
+MARGIN = 2
+# Quiet next to a pulse, in cells from half its height.
+SIDE = 6
+BESIDE = 20
+# Cells between two parts of one pulse.
+MERGED = 4
 # Lower pulses are no impacts: part of the highest one of a signal.
 LEAST_PART = 0.03
 # Durations of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
@@ -40,8 +47,9 @@ VALLEY = 0.3
 # A pulse whose peak reaches this part of the one before is a drop of its own. The limits of the
 # standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
 NEW_PART = 0.93
-# Longest flight of a bounce, s: 2 e v0/g of a drop from 2 m with e = 1.
+# Flights of a bounce, s: 2 e v0/g of a drop from 2 m with e = 1; from 0.5 mm.
 LONGEST_FLIGHT = 1.3
+SHORTEST_FLIGHT = 0.02
 # Part of the signal around one drop, s.
 BEFORE = 0.25
 AFTER = 0.5
@@ -59,30 +67,35 @@ class Window:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    sample_rate : float
-        Samples per second, Hz.
-    start : int
-        First sample of the part in the signal.
-    force : ndarray, shape (n,)
-        Force as read, N.
+    signal : Signal
+        The signal, which is read when the force is asked for.
+    start, stop : int
+        First sample of the part in the signal, and the one behind it.
     contact : tuple of int
         First sample of the contact and the one behind it, within the part; to about 1 ms.
     bounces : tuple of Window
         The parts around the later bounces, in order.
-    full_scale : float or None
-        Largest value that the file can hold, N.
     remarks : tuple of str
         Doubts about the pulse as a whole.
     """
 
     name: str
-    sample_rate: float
+    signal: Signal
     start: int
-    force: NDArray[np.float64]
+    stop: int
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
-    full_scale: float | None = None
     remarks: tuple[str, ...] = ()
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second, Hz."""
+        return self.signal.sample_rate
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force as read, N, shape (stop - start,)."""
+        return self.signal.read(self.start, self.stop)
 
 
 @dataclass
@@ -110,13 +123,15 @@ def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
     if not rate >= LEAST_RATE:
         refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {LEAST_RATE:g} Hz")
     pulses: list[_Pulse] = []
-    highest = 0.0
+    width = max(1, round(rate * CELL))
     for first, cells in _pieces(signal, progress=progress):
-        found, seen = _pulses(cells, first, rate)
-        highest = max(highest, seen)
+        # The next piece holds what the end of this one may cut.
+        whole = first + (len(cells) - OVERLAP // 2) * width
+        if first + len(cells) * width >= signal.n_sample:
+            whole = first + (len(cells) + OVERLAP) * width
         behind = pulses[-1].stop if pulses else 0
-        pulses += [pulse for pulse in found if pulse.start >= behind]
-    highest = max((p.peak for p in pulses), default=highest)
+        pulses += [p for p in _pulses(cells, first, rate) if behind <= p.start < p.stop <= whole]
+    highest = max((p.peak for p in pulses), default=0.0)
     pulses = [pulse for pulse in pulses if pulse.peak > LEAST_PART * highest]
     if not pulses:
         refuse(f"{name}: no impact is found", "a pulse of 12 to 40 ms that rises above the noise")
@@ -136,7 +151,11 @@ def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np
     kept = np.empty(0)
     first = 0
     bar = tqdm(
-        total=signal.n_sample, unit="sample", unit_scale=True, desc=signal.name, disable=not progress
+        total=signal.n_sample,
+        unit="sample",
+        unit_scale=True,
+        desc=signal.name,
+        disable=not progress,
     )
     block = 4_096 * width
     ready = 0
@@ -173,36 +192,43 @@ def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.interp(np.arange(n), middle, np.median(whole, axis=1))
 
 
-def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> tuple[list[_Pulse], float]:
-    """Return the pulses in cells, and the highest force above the baseline, N."""
+def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]:
+    """Return the pulses in cells, the first of which begins at a sample."""
     width = max(1, round(rate * CELL))
     level = uniform_filter1d(cells, 3, mode="nearest") - _baseline(cells)
     below = -level[level < 0]
     deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
     highest = float(level.max(initial=0.0))
     rise = min(RISE * deviation, RISE_PART * highest)
-    if highest <= max(4 * deviation, 1e-9):
-        return [], highest
+    if highest <= max(NO_PULSE * deviation, 1e-9):
+        return []
     above = np.flatnonzero(level > max(rise, 0.01 * highest))
-    groups = np.split(above, np.flatnonzero(np.diff(above) > 4) + 1)
+    groups = np.split(above, np.flatnonzero(np.diff(above) > MERGED) + 1)
     pulses: list[_Pulse] = []
     for group in groups:
         top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
-        peak = float(level[top])
-        half = np.flatnonzero(level[group[0] : group[-1] + 1] > peak / 2)
-        duration = (half[-1] - half[0] + 1) * width / rate
-        if not DURATIONS[0] <= duration <= DURATIONS[1]:
+        behind = -(-(pulses[-1].stop - first) // width) if pulses else 0
+        if top < behind:
             continue
-        foot = max(min(FOOT * deviation, 0.25 * peak), FOOT_PART * peak)
-        start = _walk(level, int(group[0]), -1, foot)
-        stop = _walk(level, int(group[-1]), 1, foot) + 1
-        if pulses and first + start * width < pulses[-1].stop:
+        low, high = (_walk(level, top, step, level[top] / 2) for step in (-1, 1))
+        if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
-        doubt = _told_double(level[start:stop])
+        # The quiet next to the pulse, which slow noise moves away from that of a second.
+        ahead, after = level[max(behind, low - BESIDE) : low - SIDE], level[high + SIDE :][:BESIDE]
+        beside = [np.quantile(part, 0.4) if part.size else 0.0 for part in (ahead, after)]
+        place = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
+        local = level - (beside[0] + place * (beside[1] - beside[0]))
+        peak = float(local[top])
+        start = _walk(local, low, -1, FOOT * peak) - MARGIN
+        stop = _walk(local, high, 1, FOOT * peak) + 1 + MARGIN
+        start = max(start, behind)
+        doubt = _told_double(local[max(group[0], behind) : group[-1] + 1])
         pulses.append(
-            _Pulse(first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else [])
+            _Pulse(
+                first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else []
+            )
         )
-    return pulses, highest
+    return pulses
 
 
 def _walk(level: NDArray[np.float64], place: int, step: int, foot: float) -> int:
@@ -240,7 +266,7 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
             before is not None
             and gap < 1.02 * flight
             and pulse.peak < NEW_PART * before.peak
-            and gap > 0.02
+            and gap > SHORTEST_FLIGHT
         )
         if bounced:
             drops[-1].bounces.append(pulse)
@@ -259,16 +285,8 @@ def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
         low = max(low, pulse.start - round(BEFORE * signal.sample_rate))
         high = min(high, pulse.stop + round(AFTER * signal.sample_rate), signal.n_sample)
         low, high = min(low, pulse.start), max(high, min(pulse.stop, signal.n_sample))
-        return Window(
-            name,
-            signal.sample_rate,
-            low,
-            signal.read(low, high),
-            (pulse.start - low, min(pulse.stop, signal.n_sample) - low),
-            (),
-            signal.full_scale,
-            tuple(pulse.remarks),
-        )
+        contact = (pulse.start - low, min(pulse.stop, signal.n_sample) - low)
+        return Window(name, signal, low, high, contact, (), tuple(pulse.remarks))
 
     for k, drop in enumerate(drops, start=1):
         name = signal.name if len(drops) == 1 else f"{signal.name}, drop {k}"

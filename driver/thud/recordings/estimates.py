@@ -6,15 +6,16 @@ Derivations: docs/recordings_theory.md.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.legendre import leggauss
 
+from thud.checks import refuse
 from thud.levels import record_force
-from thud.recordings.contact import Contact, Estimate, find_contact
-from thud.recordings.faults import repair
+from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
+from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
 
 if TYPE_CHECKING:
@@ -25,11 +26,18 @@ if TYPE_CHECKING:
 __all__ = ["Drop", "Estimate", "measure_drop"]
 
 # Bounces that are measured.
-MAX_BOUNCES = 3
+MAX_BOUNCES = 2
 # Edge of the low-pass of the peak force, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
 # Quiet below which it is told, s.
 SHORT_QUIET = 0.005
+# Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the
+# error that is told, dB.
+OCTAVE_500 = (354.8, 707.9)
+TOP = 0.4
+NOTABLE_ERROR = 0.1
+# Least contact time over its uncertainty.
+MOST_DOUBT = 4.0
 # Standard deviations that make a difference worth telling.
 NOTABLE = 3.0
 
@@ -86,11 +94,14 @@ class Drop:
     remarks: tuple[str, ...]
     contact: Contact
 
-    def band_energy(self, lower: float, upper: float) -> tuple[float, float, float]:
+    def band_energy(
+        self, lower: float, upper: float, *, exact: bool = False
+    ) -> tuple[float, float, float]:
         """Return the energy of the force in a band, N2 s, that of the noise, and a deviation.
 
         The energy is that of the gate less the expected energy of the noise in it; the last is
-        its standard deviation (docs/recordings_theory.md, section 4).
+        its standard deviation (docs/recordings_theory.md, section 4). Where the force is exact,
+        without noise, nothing is subtracted.
         """
         first, stop = self.gate
         force, time = self.force[first:stop], self.time[first:stop]
@@ -103,10 +114,12 @@ class Drop:
         value = functionals @ force
         covariance = self.contact.covariance_of(functionals)
         noise = float(np.trace(covariance))
-        variance = 4 * float(value @ covariance @ value)
-        # The mean of the first term is too large by twice the second.
-        variance = max(variance - 4 * float((covariance**2).sum()), 0.0)
-        variance += 2 * float((covariance**2).sum()) + (noise * self.contact.noise_doubt) ** 2
+        second = float((covariance**2).sum())
+        variance = 4 * float(value @ covariance @ value) + 2 * second
+        if exact:
+            return float(value @ value), noise, math.sqrt(variance)
+        # The first term is too large by twice the second, on the mean.
+        variance = max(variance - 4 * second, 2 * second) + (noise * self.contact.noise_doubt) ** 2
         return float(value @ value) - noise, noise, math.sqrt(variance)
 
 
@@ -132,23 +145,35 @@ def measure_drop(
         Where the pulse is clipped, cut, doubled or full of dropouts.
     """
     force, steps, remarks = repair(window)
-    contact = find_contact(replace(window, force=force))
+    try:
+        contact = find_contact(window, force)
+    except np.linalg.LinAlgError as error:
+        refuse(f"{window.name}: the quiet parts are no noise", "noise, drift and hum", error)
     steps += _told_background(contact)
     for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
         if quiet < SHORT_QUIET:
             remarks += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
     rate = window.sample_rate
-    landings = _landings(window)
+    landings = _landings(window, contact)
     touch, release = contact.touch, contact.release
     contact_time = Estimate(
         release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
     )
+    if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
+        refuse(
+            f"{window.name}: the contact cannot be told from the noise: "
+            f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
+            f"{1e3 * contact_time.uncertainty:.2g} ms",
+            f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
+        )
     impulse = _impulse(contact)
     flights = []
     leaving = release
     for landing, again in landings:
         flights.append(
-            Estimate(landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty))
+            Estimate(
+                landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty)
+            )
         )
         leaving = again
     ways, told = _restitutions(impulse, contact_time, flights, height, mass, gravity)
@@ -171,24 +196,27 @@ def measure_drop(
         noise=_noise(contact),
         bounces=tuple(landing.value - touch.value for landing, _ in landings),
         steps=steps,
-        remarks=(*window.remarks, *remarks, *told),
+        remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
         contact=contact,
     )
 
 
-def _landings(window: Window) -> list[tuple[Estimate, Estimate]]:
+def _landings(window: Window, drop: Contact) -> list[tuple[Estimate, Estimate]]:
     """Return first touch and release of the bounces, s from the first sample of the window."""
     found = []
     for bounce in window.bounces[:MAX_BOUNCES]:
         first, stop = bounce.contact
-        if first < 2 or stop > len(bounce.force) - 2:
+        least = least_quiet(bounce.sample_rate)
+        if first < least or len(bounce.force) - stop < least:
             break
-        contact = find_contact(bounce)
+        touch, release = find_edges(bounce, drop.background)
         late = (bounce.start - window.start) / window.sample_rate
-        found.append((
-            Estimate(late + contact.touch.value, contact.touch.uncertainty),
-            Estimate(late + contact.release.value, contact.release.uncertainty),
-        ))
+        found.append(
+            (
+                Estimate(late + touch.value, touch.uncertainty),
+                Estimate(late + release.value, release.uncertainty),
+            )
+        )
     return found
 
 
@@ -231,6 +259,31 @@ def _told_background(contact: Contact) -> tuple[str, ...]:
     return tuple(steps)
 
 
+def _told_aliased(contact: Contact) -> tuple[str, ...]:
+    """Return a sentence where content at half the rate folds back into the octave of 500 Hz.
+
+    Beyond half the rate the amplitude of a pulse with kinks falls as 1/f2.
+    """
+    rate = contact.sample_rate
+    lower, upper = OCTAVE_500
+    # Long enough for several frequencies in the octave.
+    force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
+    frequency = np.fft.rfftfreq(len(force), 1 / rate)
+    power = np.abs(np.fft.rfft(force)) ** 2
+    noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
+    own = power[(frequency > lower) & (frequency < upper)].mean()
+    top = max(power[frequency > TOP * rate].mean() - 3 * noise, 0.0)
+    folded = top * (0.45 * rate / (rate - upper)) ** 4
+    error = 20 * math.log10(1 + math.sqrt(folded / own))
+    if error < NOTABLE_ERROR:
+        return ()
+    told = (
+        f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
+        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
+    )
+    return (told,)
+
+
 def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formula
     impulse: Estimate,
     contact_time: Estimate,
@@ -264,11 +317,12 @@ def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formu
         difference = by.value - other.value
         deviation = math.hypot(by.uncertainty, other.uncertainty)
         if abs(difference) > NOTABLE * deviation:
-            return ways, (
+            told = (
                 f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
                 f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
-                "check mass, height and calibration",
+                "check mass, height and calibration"
             )
+            return ways, (told,)
     return ways, ()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,9 @@ if TYPE_CHECKING:
 
     from thud.recordings.drops import Window
 
-# Least quiet on each side, s.
+# Least quiet on each side, s, and samples of it.
 LEAST_QUIET = 1e-3
+LEAST_SAMPLES = 4
 # Samples of one value at the top that are clipped, where the force beside them falls by more than
 # FALL steps of the digits: a smooth top of this length falls by 4.
 FLAT = 4
@@ -24,6 +26,8 @@ FULL = 0.999
 # A jump into or out of samples of one value that makes them a dropout, over the peak force: no
 # flank rises by this much between two samples of 20 kHz.
 JUMP = 0.04
+# Samples of one value that may be held.
+HELD = 3
 # Longest total of dropouts that is repaired, s.
 REPAIRED = 1e-3
 
@@ -37,8 +41,8 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
         Where the pulse is cut, clipped, doubled or has long dropouts.
     """
     rate, (first, stop), name = window.sample_rate, window.contact, window.name
-    least = LEAST_QUIET * rate
-    if first < least or len(window.force) - stop < least:
+    least = least_quiet(rate)
+    if first < least or window.stop - window.start - stop < least:
         side = "starts" if first < least else "ends"
         refuse(
             f"{name}: the signal {side} within the pulse or less than 1 ms "
@@ -48,8 +52,14 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
     for remark in window.remarks:
         if remark.startswith("two impacts"):
             refuse(f"{name}: {remark}", "one impact, with quiet before and after it")
-    _refuse_clipped(window)
-    return _fill(window)
+    force = window.force
+    _refuse_clipped(window, force)
+    return _fill(window, force)
+
+
+def least_quiet(rate: float) -> int:
+    """Return the samples of quiet that each side of a contact needs."""
+    return max(math.ceil(LEAST_QUIET * rate), LEAST_SAMPLES)
 
 
 def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -58,10 +68,10 @@ def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp
     return starts, np.diff(np.append(starts, len(force)))
 
 
-def _refuse_clipped(window: Window) -> None:
+def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
     """Raise InputError where the top of the pulse is flat."""
     first, stop = window.contact
-    force = window.force[first:stop]
+    force = whole[first:stop]
     starts, lengths = _runs(force)
     top = force.max()
     at_top = force[starts] == top
@@ -72,8 +82,8 @@ def _refuse_clipped(window: Window) -> None:
     half = max(length // 2, 1)
     beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
     clipped = length >= FLAT and top - max(beside) > FALL * digit
-    if window.full_scale is not None:
-        at_scale = np.count_nonzero(force >= FULL * window.full_scale)
+    if window.signal.full_scale is not None:
+        at_scale = np.count_nonzero(force >= FULL * window.signal.full_scale)
         clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
     if clipped:
         refuse(
@@ -83,16 +93,19 @@ def _refuse_clipped(window: Window) -> None:
         )
 
 
-def _fill(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
+def _fill(
+    window: Window, force: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
     """Return the force with dropouts filled from both sides, what was done, and doubts."""
     first, stop = window.contact
     rate = window.sample_rate
     guard = int(LEAST_QUIET * rate)
     first, stop = first + guard, stop - guard
-    force = window.force
-    level = force - np.median(np.concatenate([force[: window.contact[0]], force[window.contact[1] :]]))
+    level = force - np.median(
+        np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    )
     part = level[first:stop]
-    if len(part) < 4:
+    if not part.size:
         return force, (), ()
     starts, lengths = _runs(part)
     before = np.abs(part[starts] - part[np.maximum(starts - 1, 0)])
@@ -100,7 +113,7 @@ def _fill(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[s
     after = np.abs(part[np.minimum(ends + 1, len(part) - 1)] - part[ends])
     limit = JUMP * part.max()
     zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
-    held = (lengths > 2) & ((before > limit) | (after > limit))
+    held = (lengths >= HELD) & ((before > limit) | (after > limit))
     lost = np.flatnonzero(zero | held)
     total = int(lengths[lost].sum())
     if not total:

@@ -22,8 +22,12 @@ N_HARMONIC = 5
 # Prior standard deviations of offset, and of drift per second, over the peak force: wide.
 OFFSET = 1.0
 DRIFT = 0.1
-# Iterations of the likelihood, and the change of its logarithm that ends them.
+# Squared lag over mean squared length of two cells below which their covariance is exact.
+NEAR = 8.0
+# Iterations of the likelihood, the change of its logarithm that ends them, and the largest
+# logarithm of a mean variance over the most likely one.
 MAX_ITERATIONS = 25
+MOST_DOUBT = 0.4
 TOLERANCE = 0.02
 
 
@@ -65,13 +69,16 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     (a, b), (c, d) = one, other
     lag = np.abs(((a + b) / 2)[:, None] - (c + d) / 2)
     width = (((b - a) ** 2)[:, None] + (d - c) ** 2) / 2
-    same = lag < 1e-3 * np.sqrt(width)
-    lag[same] = 1.0
+    near = np.nonzero(lag**2 < NEAR * width)
+    lag[near] = 1.0
     pink = width / (12 * lag**2) - np.log(lag)
     brown = -(np.pi**2) * lag
-    # Means over one cell with itself: double integrals of the covariances.
-    pink[same] = 1.5 - 0.5 * np.log(width[same])
-    brown[same] = -(np.pi**2) / 3 * np.sqrt(width[same])
+    # Of cells that touch or are the same: corner differences of the second integrals.
+    a, b, c, d = a[near[0]], b[near[0]], c[near[1]], d[near[1]]
+    size: NDArray[np.float64] = np.maximum(np.abs([b - c, a - c, b - d, a - d]), 1e-300)
+    sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
+    pink[near] = (sign * (size**2 * (0.75 - 0.5 * np.log(size))).T).sum(1)
+    brown[near] = (sign * (-(np.pi**2) / 6 * size**3).T).sum(1)
     hum = [_waves(one, mains) @ _waves(other, mains).T for mains in MAINS]
     return np.array([pink, brown, *hum])
 
@@ -109,8 +116,7 @@ class Background:
         """Return the factor of the covariance of the quiet cells."""
         parts = covariances(self.quiet)
         total = np.tensordot(self.variances, parts, 1) + self._trend(self.quiet, self.quiet)
-        factor: NDArray[np.float64] = np.linalg.cholesky(total)
-        return factor
+        return np.asarray(np.linalg.cholesky(total), dtype=np.float64)
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the background of cells, N, and the covariance of its error, N2.
@@ -141,7 +147,9 @@ class Background:
     @cached_property
     def _weights(self) -> NDArray[np.float64]:
         """Return the inverse covariance of the quiet cells times their means."""
-        weights: NDArray[np.float64] = cho_solve((self._factor, True), self.mean, check_finite=False)
+        weights: NDArray[np.float64] = cho_solve(
+            (self._factor, True), self.mean, check_finite=False
+        )
         return weights
 
     @property
@@ -212,7 +220,10 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
         theta, (value, score, information) = trial, result
         if gain < TOLERANCE:
             break
-    return Background(quiet, mean, theta, peak)
+    # The mean of a variance that is known to a factor is larger than its most likely value.
+    curvature = information * np.multiply.outer(theta, theta)
+    doubt = np.diagonal(np.linalg.inv(curvature + 0.05 * np.eye(5)))
+    return Background(quiet, mean, theta * np.exp(np.minimum(0.5 * doubt, MOST_DOUBT)), peak)
 
 
 def _likelihood(
