@@ -144,7 +144,7 @@ def test_half_sine_by_all_methods(rate: int) -> None:
 
 
 def test_skirts_of_the_filters_leak_as_computed() -> None:
-    """500 Hz, 39 dB below 31.5 Hz, reads 0.65 dB more: its neighbour leaks, the lowest do not."""
+    """500 Hz, 39 dB below 31.5 Hz, reads 0.65 dB more, by what lies just below its edge."""
     low, high = 1000 * 10 ** np.array([-0.45, -0.15])
     frequency = np.linspace(0.0031, 4000, 800_000)
     pulse = 2 * 1500 * 0.02 / np.pi * np.cos(np.pi * 0.02 * frequency)
@@ -160,8 +160,8 @@ def test_skirts_of_the_filters_leak_as_computed() -> None:
         "above": passed[frequency > high].sum() / exact,
         "edges": passed[inside].sum() / exact - 1,
     }
-    assert leak["below"] == pytest.approx(0.234, abs=0.005)
-    assert leak["below 178 Hz"] < 1e-3
+    assert leak["below"] == pytest.approx(0.256, abs=0.001)
+    assert leak["below 178 Hz"] == pytest.approx(0.0038, abs=1e-4)
     total = 10 * np.log10(1 + leak["below"] + leak["above"] + leak["edges"])
     found = compare_methods(make_drop(rate=96000.0))
     assert found["filter"][4] - found["exact"][4] == pytest.approx(total, abs=0.01)
@@ -189,7 +189,7 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
     passed, _ = low_pass_force(sine, 25600.0)
     # Zero phase, half the energy, at the band edge; 19 dB at 1.6 kHz, the paper's force plate.
     np.testing.assert_allclose(passed[1000:3000], sine[1000:3000] / math.sqrt(2), atol=1e-6)
-    assert attenuation(np.array([BAND_EDGE, 1600.0]), 1e6) == pytest.approx([3.0, 19.2], abs=0.05)
+    assert attenuation(np.array([BAND_EDGE, 1600.0]), 1e6) == pytest.approx([3.01, 19.10], abs=0.01)
     short, sentence = low_pass_force(sine, 2500.0)
     assert short is sine
     assert "2500 Hz" in sentence
