@@ -206,6 +206,31 @@ def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -
     np.testing.assert_allclose(mean, expected, rtol=1e-3)
 
 
+def test_noise_that_rises_towards_0_hz() -> None:
+    """Brown noise, 1/f**2, without the offset of the quiet time, against realisations."""
+    rate, count = 8000.0, 300
+
+    @dataclass(frozen=True)
+    class Brown(Noise):
+        def spectrum(self, frequency: np.ndarray) -> np.ndarray:
+            return self.density / np.asarray(frequency) ** 2
+
+    drop = replace(make_drop(rate=rate, after=0.1), noise=Brown(100.0))
+    gated = np.arange(-24, 184)
+    mean, _, _ = noise_energies(drop, np.ones(len(gated)), "octave")  # type: ignore[arg-type]
+    rng = np.random.default_rng(3)
+    # Increments of the variance 2 pi**2 S f**2 / rate give the density S.
+    deviation = math.sqrt(2 * np.pi**2 * 100.0 / rate)
+    energies = []
+    for _ in range(count):
+        noise = np.cumsum(rng.normal(scale=deviation, size=len(drop.time)))
+        noise -= noise[(drop.time < 0) | (drop.time > 0.02)].mean()
+        start = int(np.argmin(np.abs(drop.time))) + gated[0]
+        energies.append(10 ** (thud.force_exposure_levels(noise[start:][: len(gated)], rate) / 10))
+    # Their mean scatters by 10 %; the drift over the quiet time is only nearly an offset.
+    np.testing.assert_allclose(np.mean(energies, axis=0), mean, rtol=0.5)
+
+
 @pytest.mark.parametrize(
     ("deviation", "rate", "before"), [(5.0, 51200.0, 0.1), (40.0, 8000.0, 0.02), (150.0, 8000.0, 1)]
 )
