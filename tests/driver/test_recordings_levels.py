@@ -228,7 +228,7 @@ def test_noise_that_rises_towards_0_hz() -> None:
         start = int(np.argmin(np.abs(drop.time))) + gated[0]
         energies.append(10 ** (thud.force_exposure_levels(noise[start:][: len(gated)], rate) / 10))
     # Their mean scatters by 10 %; the drift over the quiet time is only nearly an offset.
-    np.testing.assert_allclose(np.mean(energies, axis=0), mean, rtol=0.5)
+    np.testing.assert_allclose(np.mean(energies, axis=0), mean, rtol=0.25)
 
 
 @pytest.mark.parametrize(
