@@ -27,7 +27,7 @@ METHODS = ("exact", "fft", "filter")
 # background is subtracted (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
 # Minimum of the silence that the gate holds before and after the contact, s: what the low-pass
-# spreads beyond it moves no octave by more than 2e-4 dB at 8 kHz and above, 2e-3 dB below.
+# spreads beyond it moves no octave by more than 2e-4 dB at 8 kHz and above, 3e-3 dB below.
 MARGIN = 3e-3
 # Gates are rounded up to this, s, so that drops share the quadrature.
 STEP = 1e-3
