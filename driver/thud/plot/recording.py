@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.levels import BANDWIDTHS, get_bands, record_force
+from thud.levels import BANDWIDTHS, record_force
 from thud.plot.force_history import MARGIN, TIME_LABEL
 from thud.plot.levels import draw_tolerance
 from thud.plot.look import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis
@@ -26,10 +26,12 @@ MAX_LINES = 40
 POINTS = 400
 # Backgrounds further below the lowest level than this, dB, are not drawn: they change nothing.
 DEEPEST = 20.0
-THIN = {"color": "0.55", "linewidth": 0.5}
-DEVIANT = {"color": COLOURS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
-AVERAGE = {"color": COLOURS[0], "linewidth": 1.4}
-BARS = {"color": COLOURS[0], "linestyle": "none", "capsize": 2.5, "elinewidth": 0.9, "capthick": 0.9}
+THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
+DEVIANT: dict[str, Any] = {"color": COLOURS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
+AVERAGE: dict[str, Any] = {"color": COLOURS[0], "linewidth": 1.4}
+BARS: dict[str, Any] = {
+    "color": COLOURS[0], "linestyle": "none", "capsize": 2.5, "elinewidth": 0.9, "capthick": 0.9,
+}  # fmt: skip
 
 
 def recording_forces(recording: Recording) -> Figure:

@@ -177,6 +177,7 @@ def _range(criterion: dict[str, Any]) -> str:
     width = scale * (criterion["expanded_uncertainty"] or 0.0)
     ends = [min(max(end, 1.0), 99.0) for end in (place - width, place + width)]
     bar = "".join(f"M{end:.2f} 2.5V7.5" for end in ends) + f"M{ends[0]:.2f} 5H{ends[1]:.2f}"
+    bar *= ends[0] < ends[1]
     mark = f'<circle cx="{shown:.2f}" cy="5" r="1.8"/>'
     if shown != place:
         tip = math.copysign(3.0, place - shown)
@@ -193,9 +194,9 @@ def _rule(data: dict[str, Any]) -> str:
     limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
     limits += ", those marked * of the laboratory. " if own else ". "
     return limits + (
-        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms where value "
-        "± U lies within its limits, does not conform where it lies outside, and cannot be decided "
-        "otherwise (JCGM 106). Spread: standard deviation of single drops."
+        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms where "
+        "value ± U lies within its limits, does not conform where it lies outside, and cannot be "
+        "decided otherwise (JCGM 106). Spread: standard deviation of single drops."
     )
 
 
@@ -222,7 +223,7 @@ def _results(data: dict[str, Any]) -> list[str]:
     if "corrected" in flags:
         found.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
     if "background" in flags:
-        found.append(f"levels less than {low:g} dB above the background are upper bounds, ≤")
+        found.append(f"levels less than {low:g} dB above the background are upper bounds")
     bands = [f"{one['band']:g}" for one in data["criteria"] if one["band"] is not None]
     for method, differences in data["method_differences"].items():
         if any(differences):
@@ -273,7 +274,7 @@ def _files(files: Sequence[dict[str, Any]]) -> str:
     ]
     if len(shown) < len(files):
         rest = f"and {_count(len(files) - len(shown), 'file')} more, in report.json"
-        rows.append(f'<tr><td>{_text(rest)}</td><td></td></tr>')
+        rows.append(f"<tr><td>{_text(rest)}</td><td></td></tr>")
     return "\n".join(rows)
 
 
@@ -291,7 +292,8 @@ def _svg(figure: Figure, prefix: str) -> str:
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", text)
     box = re.search(r'viewBox="[^"]*"', text)
     assert box  # noqa: S101 - matplotlib writes it
-    return f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax">{text[text.index(">") + 1 :]}'
+    head = f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax">'
+    return head + text[text.index(">") + 1 :]
 
 
 _BODY = Template("""<header>
@@ -344,7 +346,8 @@ header { border-bottom: 0.4mm solid #000; padding-bottom: 1.5mm; margin-bottom: 
   height: 13.5mm; }
 header p { margin: 0; font-size: 9pt; line-height: 4mm; }
 .verdict { float: right; width: 118mm; height: 12.6mm; box-sizing: border-box; padding: 0.8mm 2mm;
-  border: 0.5mm solid #000; text-align: center; font-size: 0.93em; line-height: 2.9mm; overflow: hidden; }
+  border: 0.5mm solid #000; text-align: center; font-size: 0.93em; line-height: 2.9mm;
+  overflow: hidden; }
 .verdict b { font-size: 11pt; line-height: 4.4mm; text-transform: uppercase; }
 table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
 td, th { padding: 0; vertical-align: top; text-align: left; }
@@ -368,7 +371,8 @@ td, th { padding: 0; vertical-align: top; text-align: left; }
 ul { margin: 0; padding: 0 0 0 3mm; list-style: '–  '; }
 .files { table-layout: auto; }
 .files td:last-child { text-align: right; white-space: nowrap; }
-.signature { margin: 11mm -4mm 0; width: 194mm; table-layout: fixed; border-spacing: 4mm 0; border-collapse: separate; }
+.signature { margin: 11mm -4mm 0; width: 194mm; table-layout: fixed; border-spacing: 4mm 0;
+  border-collapse: separate; }
 .signature td { border-top: 0.2mm solid #000; padding-top: 0.5mm; }
 footer { margin-top: 2mm; color: #444; font-size: 6pt; }
 </style>

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     """Return a criterion of a report as texts, in the columns of `HEAD`."""
     style = style_of(criterion)
     value, margin = criterion["value"], criterion["margin"]
-    bound = "≤ " if criterion["upper_bound"] else ""
+    bound = "at most " if criterion["upper_bound"] else ""
     ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
     own = "" if criterion["limits_of_standard"] else " *"
     is_count = criterion["name"] == COUNT
@@ -58,7 +57,7 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
         expanded_text(criterion),
         " to ".join(dict.fromkeys(ends)) + own,
         style.text(None if bound or is_count else margin, "–"),
-        _small(style, criterion["spread"], "–"),
+        _width(style, criterion["spread"], "–"),
         style.text(criterion["background"], "–"),
         criterion["verdict"],
     )
@@ -80,7 +79,7 @@ def expanded_text(criterion: dict[str, Any]) -> str:
         return "–"
     if not criterion["contributions"]:
         return "not given"
-    return _small(style_of(criterion), criterion["expanded_uncertainty"], NOT_KNOWN)
+    return _width(style_of(criterion), criterion["expanded_uncertainty"], NOT_KNOWN)
 
 
 def number(value: float, decimals: int) -> str:
@@ -92,10 +91,6 @@ def number(value: float, decimals: int) -> str:
     return f"{value:z.{decimals}f}".replace("-", "−")
 
 
-def _small(style: Style, value: float | None, unknown: str) -> str:
-    """Return a width with one significant digit at least."""
-    if value is None:
-        return unknown
-    size = abs(value) / style.unit
-    more = -math.floor(math.log10(size)) if 0 < size < 1 else 0
-    return number(size, max(style.decimals, min(more, 9)))
+def _width(style: Style, value: float | None, unknown: str) -> str:
+    """Return the width of an interval, with a decimal more than values have."""
+    return style._replace(decimals=style.decimals + 1).text(value, unknown)

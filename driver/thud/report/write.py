@@ -10,11 +10,6 @@ from typing import TYPE_CHECKING
 
 from thud.errors import ReportWarning
 from thud.files import replace_file
-from thud.plot.recording import recording_forces, recording_levels
-from thud.report.data import report_data
-from thud.report.fonts import missing_characters
-from thud.report.page import page_text, report_page
-from thud.report.pdf import NEEDED, html_to_pdf
 
 if TYPE_CHECKING:
     import os
@@ -44,6 +39,13 @@ def write_report(recording: Recording, directory: str | os.PathLike[str]) -> lis
     ReportWarning
         Where WeasyPrint is missing, so that there is no PDF, or a font for some letters.
     """
+    # Matplotlib, SciPy and fontTools take their time.
+    from thud.plot.recording import recording_forces, recording_levels  # noqa: PLC0415
+    from thud.report.data import report_data  # noqa: PLC0415
+    from thud.report.fonts import missing_characters  # noqa: PLC0415
+    from thud.report.page import page_text, report_page  # noqa: PLC0415
+    from thud.report.pdf import NEEDED, html_to_pdf  # noqa: PLC0415
+
     folder = Path(directory)
     folder.mkdir(parents=True, exist_ok=True)
     data = report_data(recording)
