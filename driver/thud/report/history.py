@@ -147,10 +147,10 @@ class History:
                 continue
             style = style_of(one[0])
             told = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
-            if not math.isnan(trend.reached):
+            day = self._told(trend.reached)
+            if day:
                 ends = [self._told(end) or "later" for end in (trend.earliest, trend.latest)]
-                told += f"; reaches a limit on {self._told(trend.reached) or 'a far day'}"
-                told += f" (95 %: {ends[0]} to {ends[1]})"
+                told += f"; reaches a limit on {day} (95 %: {ends[0]} to {ends[1]})"
             found.append(told)
         return found
 
@@ -189,22 +189,33 @@ def read_history(
     if not files:
         refuse("there are no reports", "one report.json or more")
     dated = sorted(((*_read(file), file) for file in files), key=lambda one: one[0])
-    first = dated[0]
-    for key, words in (("serial", "serial number"), ("ball", "ball"), ("source", "source")):
-        for _, report, file in dated[1:]:
-            if report[key] != first[1][key] and (key == "source" or not different_balls):
-                refuse(
-                    f"{file}: its {words} {report[key]!r} is not that of {first[2]}, "
-                    f"{first[1][key]!r}",
-                    "reports of one source" if key == "source" else
-                    "reports of one ball, or --different-balls",
-                )  # fmt: skip
+    for _, report, file in dated[1:]:
+        _require_same(report, file, dated[0][1], dated[0][2], different_balls=different_balls)
     names = dict.fromkeys(
         " ".join(filter(None, (report["ball"], report["serial"]))) for _, report, _ in dated
     )
     title = next(iter(names)) if len(names) == 1 else f"{len(names)} balls"
     reports = tuple(report for _, report, _ in dated)
     return History(title or "ball", tuple(date for date, _, _ in dated), reports)
+
+
+def _require_same(
+    report: dict[str, Any],
+    file: Path,
+    first: dict[str, Any],
+    origin: Path,
+    *,
+    different_balls: bool,
+) -> None:
+    """Raise InputError where a report is not of the source, or the ball, of the first."""
+    one, other = ([c["name"] for c in r["criteria"]] for r in (report, first))
+    if report["source"] != first["source"] or one != other:
+        what = f"{file}: its source {report['source']!r} or its criteria are not those of {origin}"
+        refuse(what, "reports of one source")
+    for key, words in (("serial", "serial number"), ("ball", "ball")):
+        if report[key] != first[key] and not different_balls:
+            what = f"{file}: its {words} {report[key]!r} is not that of {origin}, {first[key]!r}"
+            refuse(what, "reports of one ball, or --different-balls")
 
 
 def _files(path: Path) -> list[Path]:
