@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MultipleLocator
 
 from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure
 from thud.report.rows import NOT_KNOWN, limits_of, style_of
@@ -85,7 +85,7 @@ def _draw_criterion(
         axes.plot(dates, trend.value / style.unit, color=COLOURS[0], linewidth=1, linestyle="--")
     axes.margins(y=0.15)
     if is_count:
-        axes.yaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.yaxis.set_major_locator(MultipleLocator(1))
     axes.set_ylabel(style.title.replace(", ", ",\n"), fontsize=SIZE)
 
 

@@ -150,7 +150,8 @@ class History:
             day = self._told(trend.reached)
             if day:
                 ends = [self._told(end) or "later" for end in (trend.earliest, trend.latest)]
-                told += f"; reaches a limit on {day} (95 %: {ends[0]} to {ends[1]})"
+                word = "reached" if trend.reached < self.years[-1] else "reaches"
+                told += f"; {word} a limit on {day} (95 %: {ends[0]} to {ends[1]})"
             found.append(told)
         return found
 
