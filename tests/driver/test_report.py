@@ -384,15 +384,30 @@ def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
     assert not re.search(r"\bnan\b|\bNone\b|\binf\b", words)
 
 
+@pytest.mark.parametrize("library", [None, "print('no'); raise OSError('no libpango')"])
 def test_without_weasyprint_there_is_a_page_and_a_sentence(
-    one: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    one: Recording,
+    tmp_path_factory: pytest.TempPathFactory,
+    tmp_path: Path,
+    library: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     (tmp_path / "report.pdf").write_bytes(b"of an earlier report")
-    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    if library is None:
+        monkeypatch.setitem(sys.modules, "weasyprint", None)
+    else:
+        # As WeasyPrint itself where a library of Debian is missing.
+        folder = tmp_path_factory.mktemp("path")
+        (folder / "weasyprint.py").write_text(library)
+        for name in [name for name in sys.modules if name.split(".")[0] == "weasyprint"]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.syspath_prepend(folder)
     with pytest.warns(ReportWarning, match=r"report\.pdf is not written .*; allowed: pip install"):
         paths = write_report(one, tmp_path)
     assert [path.name for path in paths] == ["report.json", "report.html"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "report.json"]
+    assert not capsys.readouterr().out
 
 
 def test_missing_font_is_told(
