@@ -146,6 +146,28 @@ def test_interval_of_the_date_holds_the_truth() -> None:
     assert inside >= binom.ppf(0.001, runs, 0.95)
 
 
+def test_ends_of_the_date_are_those_of_the_interval_of_the_line() -> None:
+    rng = np.random.default_rng(5)
+    time, deviation = np.sort(rng.uniform(0, 9, 12)), rng.uniform(0.05, 0.2, 12)
+    value = 31 + 0.2 * time + deviation * rng.standard_normal(12)
+    trend = _trend(time, value, deviation, LIMITS, 0.05)
+    line, covariance = np.polyfit(time, value, 1, w=1 / deviation, cov="unscaled")
+    factor = trend.expanded / np.sqrt(covariance[0, 0])
+    assert trend.earliest < trend.reached < trend.latest
+    for end in (trend.earliest, trend.latest):
+        width = factor * np.sqrt(np.array([end, 1]) @ covariance @ np.array([end, 1]))
+        assert abs(np.polyval(line, end) - LIMITS[1]) == pytest.approx(width)
+
+
+@pytest.mark.parametrize("stated", [0.0, 0.001])
+def test_few_points_on_a_line_by_chance_are_no_trend(stated: float) -> None:
+    rng = np.random.default_rng(6)
+    time, runs = np.arange(4.0), 600
+    values = 31 + 0.1 * rng.standard_normal((runs, 4))
+    told = sum(_trend(time, v, np.full(4, stated), LIMITS, 0.05).significant for v in values)
+    assert binom.ppf(0.001, runs, 0.05) <= told <= binom.ppf(0.999, runs, 0.05)
+
+
 def test_scatter_beyond_the_stated_uncertainty_counts() -> None:
     time, value = np.arange(6.0), np.array([31.0, 31.5, 30.6, 31.6, 31.0, 31.8])
     trusting, doubting = (

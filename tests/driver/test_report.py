@@ -387,26 +387,26 @@ def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
 @pytest.mark.parametrize("library", [None, "print('no'); raise OSError('no libpango')"])
 def test_without_weasyprint_there_is_a_page_and_a_sentence(
     one: Recording,
-    tmp_path_factory: pytest.TempPathFactory,
     tmp_path: Path,
     library: str | None,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    (tmp_path / "report.pdf").write_bytes(b"of an earlier report")
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "report.pdf").write_bytes(b"of an earlier report")
     if library is None:
         monkeypatch.setitem(sys.modules, "weasyprint", None)
     else:
         # As WeasyPrint itself where a library of Debian is missing.
-        folder = tmp_path_factory.mktemp("path")
-        (folder / "weasyprint.py").write_text(library)
+        (tmp_path / "weasyprint.py").write_text(library)
         for name in [name for name in sys.modules if name.split(".")[0] == "weasyprint"]:
             monkeypatch.delitem(sys.modules, name)
-        monkeypatch.syspath_prepend(folder)
+        monkeypatch.syspath_prepend(tmp_path)
     with pytest.warns(ReportWarning, match=r"report\.pdf is not written .*; allowed: pip install"):
-        paths = write_report(one, tmp_path)
+        paths = write_report(one, folder)
     assert [path.name for path in paths] == ["report.json", "report.html"]
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.html", "report.json"]
+    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "report.json"]
     assert not capsys.readouterr().out
 
 
