@@ -21,6 +21,10 @@ class PlausibilityWarning(UserWarning):
     """What was computed is possible but not plausible."""
 
 
+class ReportWarning(UserWarning):
+    """A report lacks its PDF or some letters."""
+
+
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 
