@@ -328,6 +328,7 @@ def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> Non
 def test_date_is_that_of_the_files(one: Recording) -> None:
     assert report_data(many(one, 3))["date"] == "2024-05-03 to 2024-05-04"
     assert report_data(one)["date"] == ""
+    assert report_data(many(one, 3, date="7.6.2024"))["date"] == "2024-06-07"
 
 
 @pytest.mark.parametrize(

@@ -51,6 +51,8 @@ class Config:
     ----------
     laboratory, ball, serial : str
         Names for the report.
+    date : str
+        Date of the measurement, such as ``"2024-05-03"``; by default that of the files.
     source : str
         Source whose limits apply.
     temperature : float or None
@@ -74,6 +76,7 @@ class Config:
     laboratory: str = ""
     ball: str = ""
     serial: str = ""
+    date: str = ""
     source: str = "rubber_ball"
     temperature: float | None = None
     instruments: tuple[str, ...] = ()

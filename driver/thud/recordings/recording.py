@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.checks import refuse, require_number
-from thud.levels import peak_count, record_force
+from thud.levels import peak_count
 from thud.recordings.config import Config, read_config
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import measure_drop
+from thud.recordings.faults import repair
 from thud.recordings.levels import (
     AverageLevels,
     average_levels,
@@ -38,9 +39,12 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Window
-    from thud.recordings.estimates import Drop, Estimate
+    from thud.recordings.estimates import Drop
     from thud.recordings.signal import Signal
+
+
+# Length of the ringing of a plate that a piece of a signal takes along, periods times quality.
+PERIODS = 2.0
 
 
 @dataclass(frozen=True)
@@ -336,7 +340,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     uncertainty = 0.0
     for path in files:  # type: ignore[union-attr]
         for signal in _signals(path, known):
-            found = [_measure(window, known) for window in find_windows(signal, progress=progress)]
+            found = _drops(signal, known, progress=progress)
             drops += found
             uncertainty = max(uncertainty, signal.calibration_uncertainty)
             origins.append(_origin(signal, len(found)))
@@ -363,16 +367,38 @@ def _plate(config: Config) -> Plate | None:
     return None if given is None else Plate(given.f0, given.Q, added_mass=given.added_mass)
 
 
-def _measure(window: Window, config: Config) -> Drop:
-    """Return the drop in a window, the plate's resonance taken out before."""
-    plate = _plate(config)
-    if plate is None:
-        return measure_drop(window, height=config.height, mass=config.mass)
-    force, step = correct_plate(window.force, window.sample_rate, plate)
-    drop = measure_drop(
-        replace(window, force=force, full_scale=None), height=config.height, mass=config.mass
-    )
-    return replace(drop, steps=(step, *drop.steps))
+@dataclass(frozen=True, eq=False)
+class _Corrected:
+    """Samples of a signal without the resonance of its plate."""
+
+    signal: Signal
+    plate: Plate
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the force that was applied to the plate, N, shape (stop - start,)."""
+        # What comes before rings on: some periods of the resonance.
+        room = math.ceil(PERIODS * self.plate.quality * self.signal.sample_rate / self.plate.frequency)
+        first, last = max(start - room, 0), min(stop + room, self.signal.n_sample)
+        force = self.signal.read(first, last)
+        corrected, _ = correct_plate(force, self.signal.sample_rate, self.plate)
+        return corrected[start - first : stop - first]
+
+
+def _drops(signal: Signal, config: Config, *, progress: bool) -> list[Drop]:
+    """Return the drops of a signal, the plate's resonance taken out before."""
+    plate, applied = _plate(config), signal
+    step: tuple[str, ...] = ()
+    if plate is not None:
+        # The force that clips is the one that was recorded.
+        applied = replace(signal, samples=_Corrected(signal, plate), full_scale=None)
+        step = (correct_plate(np.zeros(8), signal.sample_rate, plate)[1],)
+    found = []
+    for window in find_windows(applied, progress=progress):
+        if plate is not None:
+            repair(replace(window, signal=signal))
+        drop = measure_drop(window, height=config.height, mass=config.mass)
+        found.append(replace(drop, steps=(*step, *drop.steps)))
+    return found
 
 
 def _origin(signal: Signal, count: int) -> Origin:

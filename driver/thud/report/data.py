@@ -38,7 +38,7 @@ def report_data(recording: Recording, source: str | None = None) -> dict[str, An
         "laboratory": config.laboratory,
         "ball": config.ball,
         "serial": config.serial,
-        "date": _dates(one.date for one in recording.origins),
+        "date": _dates([config.date] if config.date else [one.date for one in recording.origins]),
         "temperature": config.temperature,
         "instruments": list(config.instruments),
         "mass": config.mass,
