@@ -15,7 +15,7 @@ import numpy as np
 
 from thud._api import version
 from thud.case import case_text
-from thud.checks import refuse, refuse_value, require_kind, require_number
+from thud.checks import refuse, refuse_value, require_kind, require_number, require_whole
 from thud.files import replace_file
 from thud.impact import Impact
 from thud.recordings.channel import library
@@ -102,7 +102,7 @@ class BlockedForce:
 
     def words(self) -> tuple[str, ...]:
         """Return what another reader has to know, a line each."""
-        return (
+        lines = (
             f"Blocked force of {self.name}: {KINDS[self.kind]}, N, positive into the floor",
             f"{len(self.force)} samples, first sample at {self.start!r} s since first touch",
             f"Sample rate: {self.sample_rate:.10g} Hz",
@@ -111,6 +111,9 @@ class BlockedForce:
             *self.remarks,
             f"Written by thud {version()}",
         )
+        # Names of files may not be UTF-8, and words of a laboratory have several lines.
+        texts = (line.encode("utf-8", "replace").decode() for line in lines)
+        return tuple(" ".join(text.split()) for text in texts)
 
 
 def blocked_force(
@@ -133,7 +136,11 @@ def blocked_force(
         Where the drop or the rate are not possible.
     """
     require_kind("source", source, Impact | Recording)
-    found = _of_impact(source) if isinstance(source, Impact) else _of_recording(source, drop)
+    if isinstance(source, Impact):
+        require_whole("drop", drop, 1, 1)
+        found = _of_impact(source)
+    else:
+        found = _of_recording(source, drop)
     return found if rate is None else _resampled(found, rate)
 
 
@@ -251,7 +258,8 @@ def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
     pyuff = library("pyuff", "universal")
     words = force.words()
     kind = f"{KINDS[force.kind]}, N, positive into the floor"
-    lines = [force.name, kind, force.date, f"{words[1]}; {words[2]}", words[4]]
+    times = f"{force.sample_rate:.10g} Hz, first sample at {force.start:.9g} s since first touch"
+    lines = [force.name, kind, force.date, times, words[4]]
     name = _plain(force.name)[:UFF_NAME]
     data_set = {
         "type": 58,

@@ -7,6 +7,7 @@ import importlib.util
 import math
 import sys
 from argparse import ArgumentParser
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -163,6 +164,16 @@ def test_force_is_that_which_the_case_judges() -> None:
     assert "elastic" in blocked_force(impact).words()[0]
 
 
+def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
+    force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", remarks=("a\r\nb",))
+    for ending, write in EXPORTS.values():
+        if ending == ".uff":
+            pytest.importorskip("pyuff", reason="the extra recordings is not installed")
+        assert write(force, tmp_path / f"force{ending}")
+    (signal,) = open_signals(tmp_path / "force.csv")
+    assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
+
+
 @pytest.fixture
 def recording(tmp_path: Path) -> Path:
     """Return a file with two drops."""
@@ -215,6 +226,14 @@ def test_bad_input_gets_one_sentence(
     with pytest.raises((thud.InputError, OSError), match=sentence) as caught:
         export(str(recording), *words, "-o", str(tmp_path / "out"))
     assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [("--drop", "2"), ("--config", "lab.toml")])
+def test_cases_have_neither_drops_nor_a_laboratory(words: tuple[str, ...], tmp_path: Path) -> None:
+    case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
+    with pytest.raises(thud.InputError, match=words[0].lstrip("-")):
+        export(case, "--csv", *words, "-o", str(tmp_path / "out"))
     assert not (tmp_path / "out").exists()
 
 

@@ -57,6 +57,8 @@ def _read(path: str, config: str | None) -> Impact | Recording:
     endings = {ending for one in FORMATS for ending in one.suffixes}
     if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte
         return read_recording(path, config=config)
+    if config is not None:
+        refuse(f"{path}: --config {config} is of recordings", "none for a case")
     return compute(read_case(path))
 
 
