@@ -258,7 +258,8 @@ def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
     pyuff = library("pyuff", "universal")
     words = force.words()
     kind = f"{KINDS[force.kind]}, N, positive into the floor"
-    times = f"{force.sample_rate:.10g} Hz, first sample at {force.start:.9g} s since first touch"
+    start = f"first sample at {force.start:.6g} s since first touch"
+    times = f"Sample rate: {force.sample_rate:.10g} Hz, {start}"
     lines = [force.name, kind, force.date, times, words[4]]
     name = _plain(force.name)[:UFF_NAME]
     data_set = {
