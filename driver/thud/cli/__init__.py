@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 from thud._api import version
 from thud.checks import suggestion
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
@@ -72,6 +73,7 @@ COMMANDS = {
         "nothing is written",
     ),
     "measure": MEASURE,
+    "export": EXPORT,
     "history": Command(
         "control chart of a ball from its calibration reports",
         (
