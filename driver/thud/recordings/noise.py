@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve, lapack, solve_triangular
+from scipy.stats import qmc
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,12 @@ OFFSET = 1.0
 DRIFT = 0.1
 # Squared lag over mean squared length of two cells below which their covariance is exact.
 NEAR = 8.0
+# Fewer quiet cells than these do not tell the parts of the noise: draws of the variances, over
+# ranges of their size if each part were all of the fast changes of the cells. Slow noise and hum
+# may be much larger than fast changes show.
+FEW_CELLS = 60
+N_DRAW = 256
+RANGES = np.array([[1e-3, 3.0], [1e-3, 30.0], [1e-2, 300.0], [1e-2, 1e3], [1e-2, 1e3]])
 # Iterations of the likelihood, the change of its logarithm that ends them, and the largest
 # logarithm of a mean variance over the most likely one.
 MAX_ITERATIONS = 25
@@ -193,7 +200,9 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
     middle = (quiet[0] + quiet[1]) / 2
     trend = peak**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle))
     # Half of the size of fast changes, spread over all.
-    rough = np.var(np.diff(mean)) / 2 + (1e-5 * peak) ** 2
+    adjoining = quiet[0][1:] - quiet[1][:-1] < 1e-3 * (quiet[1] - quiet[0])[1:]
+    changes = np.diff(mean)[adjoining]
+    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (1e-5 * peak) ** 2
     scale = np.array([np.mean(np.diagonal(parts[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
     least = np.array([0.01, 1e-9, 1e-9, 1e-9, 1e-9]) * rough / scale
     theta = np.array([rough, 0.1 * rough, 0.1 * rough, 0.05 * rough, 0.05 * rough]) / scale
@@ -220,10 +229,51 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
         theta, (value, score, information) = trial, result
         if gain < TOLERANCE:
             break
-    # The mean of a variance that is known to a factor is larger than its most likely value.
     curvature = information * np.multiply.outer(theta, theta)
-    doubt = np.diagonal(np.linalg.inv(curvature + 0.05 * np.eye(5)))
-    return Background(quiet, mean, theta * np.exp(np.minimum(0.5 * doubt, MOST_DOUBT)), peak)
+    doubt = np.linalg.inv(curvature + 0.05 * np.eye(5))
+    # The mean of a variance that is known to a factor is larger than its most likely value.
+    likely = theta * np.exp(np.minimum(0.5 * np.diagonal(doubt), MOST_DOUBT))
+    if len(mean) < FEW_CELLS:
+        likely = _mean_variances(likely, value, doubt, rough / scale, parts, trend, mean)
+    return Background(quiet, mean, likely, peak)
+
+
+def _mean_variances(  # noqa: PLR0913, PLR0917 - what the likelihood is made of
+    likely: NDArray[np.float64],
+    value: float,
+    doubt: NDArray[np.float64],
+    rough: NDArray[np.float64],
+    parts: NDArray[np.float64],
+    trend: NDArray[np.float64],
+    mean: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the mean variances over their posterior: a short quiet cannot tell slow parts.
+
+    Even priors of the logarithms over RANGES; the most likely variances have the volume of their
+    doubt, the others are drawn over the whole of the ranges.
+    """
+    low, high = np.log(RANGES * rough[:, None]).T
+    draws = np.exp(low + (high - low) * qmc.Sobol(5, seed=0).random(N_DRAW))
+    logarithms = [_logarithm(theta, parts, trend, mean) for theta in draws]
+    weight = np.exp(np.minimum(np.array(logarithms) - value, 20.0))
+    width = np.minimum(np.sqrt(2 * np.pi * np.diagonal(doubt)) / (high - low), 1.0)
+    own = N_DRAW * float(width.prod())
+    result: NDArray[np.float64] = (own * likely + weight @ draws) / (own + weight.sum())
+    return result
+
+
+def _logarithm(
+    theta: NDArray[np.float64],
+    parts: NDArray[np.float64],
+    trend: NDArray[np.float64],
+    mean: NDArray[np.float64],
+) -> float:
+    """Return the logarithm of the likelihood of variances."""
+    factor, failed = lapack.dpotrf(np.tensordot(theta, parts, 1) + trend, lower=True)
+    if failed:
+        return -np.inf
+    white = solve_triangular(factor, mean, lower=True, check_finite=False)
+    return float(-np.log(np.diagonal(factor)).sum() - 0.5 * white @ white)
 
 
 def _likelihood(
