@@ -152,7 +152,7 @@ def _of_impact(impact: Impact) -> BlockedForce:
         force=impact.force(),
         sample_rate=impact.sample_rate,
         start=float(impact.time[0] - impact.touch_time),
-        kind=impact.judged_force,
+        kind=impact.judged(),
         origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
         checksum=hashlib.sha256(case_text(case)).hexdigest(),
     )
@@ -171,7 +171,7 @@ def _of_recording(recording: Recording, drop: int) -> BlockedForce:
         force=force,
         sample_rate=one.sample_rate,
         start=float(time[0]),
-        kind=recording.judged_force,
+        kind=recording.judged(),
         origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
         checksum=origin.checksum,
         date=origin.date,

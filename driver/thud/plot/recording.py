@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet
     from thud.recordings.recording import Recording
 
 # Height without the legend, inch: two of them stand side by side on a report.
@@ -66,7 +67,16 @@ def recording_forces(recording: Recording) -> Figure:
     return figure
 
 
-def recording_levels(recording: Recording, bands: str = "octave") -> Figure:
+def recording_overview(recording: Recording) -> Figure:
+    """Draw forces above levels; see `recording_forces` and `recording_levels`."""
+    figure = new_figure(2 * HEIGHT + 1)
+    history, octaves = figure.subplots(2, 1)
+    draw_recording_forces(dress(history), recording)
+    draw_recording_levels(dress(octaves), recording)
+    return figure
+
+
+def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     """Draw the levels of every drop, their average with its expanded uncertainty, the background.
 
     Octaves have the tolerances of the source.
@@ -137,7 +147,7 @@ def _draw_drops(
         axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
 
 
-def _expanded(recording: Recording, bands: str) -> NDArray[np.float64]:
+def _expanded(recording: Recording, bands: BandSet) -> NDArray[np.float64]:
     """Return the expanded uncertainties of the average levels, dB."""
     average = recording.average(bands)
     if bands == BANDWIDTHS[0]:

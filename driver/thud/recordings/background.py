@@ -14,7 +14,8 @@ from thud.levels import get_bands
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Drop
+    from thud._schema import BandSet
+    from thud.recordings.estimates import Drop
 
 # Length of transforms in gates: they resolve noise whose spectrum is smooth over a quarter of 1/T.
 PADDING = 4
@@ -23,7 +24,7 @@ HIGHEST = 8000.0
 
 
 def noise_energies(
-    drop: Drop, force: NDArray[np.float64], bands: str
+    drop: Drop, force: NDArray[np.float64], bands: BandSet
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Return expected noise energy, its standard deviation, and that of the offset, N2 s.
 
@@ -88,7 +89,7 @@ def _quiet_time(drop: Drop) -> float:
 
 @lru_cache(maxsize=4)
 def _quadrature(
-    bands: str, rate: float, count: int
+    bands: BandSet, rate: float, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], list[int]]:
     """Return rows R with E_b = sum over the band's rows of (R f)**2, and their transforms.
 

@@ -15,6 +15,8 @@ from thud.levels import get_bands
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from thud._schema import BandSet
+
 # Order of the Butterworth low-pass of which each filter is the band-pass: six poles. Order 2 misses
 # the mask of class 1 by 18 dB.
 ORDER = 3
@@ -26,7 +28,7 @@ MIN_RATIO = 4.0
 CUT = 1e-7
 
 
-def band_filters(bands: str, sample_rate: float) -> NDArray[np.float64]:
+def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
     """Return the filters of bands as second-order sections, shape (n_band, 3, 6).
 
     They are Butterworth band-passes with six poles, 3.01 dB down at the exact band edges. Bands
@@ -41,7 +43,7 @@ def band_filters(bands: str, sample_rate: float) -> NDArray[np.float64]:
 
 
 def filter_levels(
-    force: ArrayLike, sample_rate: float, bands: str = "octave"
+    force: ArrayLike, sample_rate: float, bands: BandSet = "octave"
 ) -> NDArray[np.float64]:
     """Return the levels of a force record by filters of class 1, dB re 1 N and 1 s.
 
@@ -98,7 +100,7 @@ def _require_rate(sample_rate: float) -> None:
 
 
 @lru_cache(maxsize=8)
-def _filters(bands: str, sample_rate: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _filters(bands: BandSet, sample_rate: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the sections of each filter, and the number of samples in which it rings out."""
     edges = get_bands(bands)
     sections = np.full((len(edges.nominal), ORDER, 6), np.nan)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Mapping
 
+    from thud._schema import LimitsSource
+
 LONGEST = 500
 ABSOLUTE_ZERO = -273.15
 
@@ -77,7 +79,7 @@ class Config:
     ball: str = ""
     serial: str = ""
     date: str = ""
-    source: str = "rubber_ball"
+    source: LimitsSource = "rubber_ball"
     temperature: float | None = None
     instruments: tuple[str, ...] = ()
     channel: int | str | None = None

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.recordings.drops import Drop
+    from thud._schema import BandSet
+    from thud.recordings.estimates import Drop
 
 METHODS = ("exact", "fft", "filter")
 # Level above the background, dB, below which a level is only an upper bound, and up to which the
@@ -62,7 +63,7 @@ class LevelEstimate:
     """
 
     name: str
-    bands: str
+    bands: BandSet
     method: str
     level: NDArray[np.float64]
     uncertainty: NDArray[np.float64]
@@ -100,7 +101,7 @@ class AverageLevels:
         Drops that differ from the others.
     """
 
-    bands: str
+    bands: BandSet
     method: str
     names: tuple[str, ...]
     drops: NDArray[np.float64]
@@ -115,7 +116,7 @@ class AverageLevels:
 
 
 def measure_levels(
-    drop: Drop, bands: str = "octave", method: str = "exact", *, low_pass: bool = False
+    drop: Drop, bands: BandSet = "octave", method: str = "exact", *, low_pass: bool = False
 ) -> LevelEstimate:
     """Return the levels of a drop, corrected for the background, with their uncertainty.
 
@@ -164,7 +165,7 @@ def measure_levels(
 
 
 def compare_methods(
-    drop: Drop, bands: str = "octave", *, low_pass: bool = False
+    drop: Drop, bands: BandSet = "octave", *, low_pass: bool = False
 ) -> dict[str, NDArray[np.float64]]:
     """Return the levels of a drop by each method, dB, shape (n_band,), background included."""
     force, _ = _gated(drop, low_pass=low_pass)
@@ -247,12 +248,12 @@ def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[st
 
 
 def _levels(
-    force: NDArray[np.float64], rate: float, bands: str, method: str
+    force: NDArray[np.float64], rate: float, bands: BandSet, method: str
 ) -> NDArray[np.float64]:
     """Return levels by a method, dB; NaN where the rate is too low for the band."""
     if method == "filter":
         return filter_levels(force, rate, bands)
-    return force_exposure_levels(force, rate, bands, method)
+    return force_exposure_levels(force, rate, bands, "fft" if method == "fft" else "exact")
 
 
 def _corrected(

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet
+
 # What the standard asks of a force plate: flat between these frequencies, Hz, up to this force, N,
 # and linear to this share. It gives no tolerance for "flat"; that of the linearity is taken.
 FLAT = (0.2, 1000.0)
@@ -86,7 +88,7 @@ class Plate:
         quality = self.quality * math.sqrt(self.loading)
         return np.asarray(1 / (1 - ratio**2 + 1j * ratio / quality))
 
-    def level_uncertainty(self, bands: str = "octave") -> NDArray[np.float64]:
+    def level_uncertainty(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return what the uncertainty of the resonance makes of corrected levels, dB.
 
         At the upper edge of each band: 20 lg of 1 + 2 r**2 / (1 - r**2) times the relative one.
@@ -117,7 +119,7 @@ class PlateCheck:
 
 
 def correct_plate(
-    force: NDArray[np.float64], sample_rate: float, plate: Plate, bands: str = "third"
+    force: NDArray[np.float64], sample_rate: float, plate: Plate, bands: BandSet = "third"
 ) -> tuple[NDArray[np.float64], str]:
     """Return the force that was applied to a plate, from the force that it measured.
 

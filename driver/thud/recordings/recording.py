@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thud.checks import refuse, require_number
+from thud.display import MAKERS, Displayed
 from thud.levels import peak_count
 from thud.recordings.config import Config, read_config
 from thud.recordings.drops import find_windows
@@ -34,11 +36,12 @@ from thud.recordings.verdict import (
 )
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterable
 
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet, LevelsForce, LimitsSource
     from thud.recordings.estimates import Drop
     from thud.recordings.signal import Signal
 
@@ -75,7 +78,7 @@ class Origin:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(Displayed):
     """Recorded drops of one source.
 
     Where one force is asked for (`time`, `force`, comparisons, fits) it is that of the first drop;
@@ -109,6 +112,10 @@ class Recording:
             f"contact {1e3 * self.contact_time:.2f} ms, peak {self.peak():.0f} N>"
         )
 
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: the criteria."""
+        return self.conformity().rows()
+
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of the first drop since first touch, s, shape (n_sample,)."""
@@ -134,9 +141,8 @@ class Recording:
         """Time of first touch of the first drop in its file, s."""
         return self.drops[0].onset
 
-    @property
-    def judged_force(self) -> str:
-        """Force that a force plate measures: ``"floor"``."""
+    def judged(self, force: LevelsForce | None = None) -> LevelsForce:  # noqa: ARG002 - there is one
+        """Return the force that a force plate measures: ``"floor"``."""
         return "floor"
 
     @property
@@ -174,15 +180,15 @@ class Recording:
         found += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
         return tuple(dict.fromkeys(found))
 
-    def force(self, kind: str | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
+    def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
         """Return the force of the first drop, N, shape (n_sample,), for any `kind`."""
         return self.record
 
-    def peak(self, force: str | None = None) -> float:  # noqa: ARG002 - there is one
+    def peak(self, force: LevelsForce | None = None) -> float:  # noqa: ARG002 - there is one
         """Return the mean maximum force, N."""
         return self.peak_force
 
-    def average(self, bands: str = "octave", method: str = "exact") -> AverageLevels:
+    def average(self, bands: BandSet = "octave", method: str = "exact") -> AverageLevels:
         """Return the energy average of the levels of the drops, with its uncertainty.
 
         Parameters
@@ -204,14 +210,14 @@ class Recording:
 
     def levels(
         self,
-        bands: str = "octave",
+        bands: BandSet = "octave",
         method: str | None = None,
-        force: str | None = None,  # noqa: ARG002 - there is one
+        force: LevelsForce | None = None,  # noqa: ARG002 - there is one
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
         return self.average(bands, method or self.level_method).level
 
-    def agreement(self, bands: str = "octave") -> dict[str, NDArray[np.float64]]:
+    def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
         """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
         found = [compare_methods(drop, bands) for drop in self.drops]
         return {
@@ -228,7 +234,9 @@ class Recording:
         # Restitution from the impulse: I/(M v0) - 1 - g t/v0.
         share = scale * (1 + float(np.mean(known))) if known else 0.0
         by_impulse = any("impulse" in drop.restitution_by for drop in self.drops)
-        peaks = max(peak_count(drop.force[slice(*drop.gate)], drop.sample_rate) for drop in self.drops)
+        peaks = max(
+            peak_count(drop.force[slice(*drop.gate)], drop.sample_rate) for drop in self.drops
+        )
         config = self.config
         return {
             "contact_time": average_estimates([drop.contact_time for drop in self.drops]),
@@ -241,7 +249,11 @@ class Recording:
             "drop_height": Quantity(math.nan if config.height is None else config.height),
         }
 
-    def conformity(self, source: str | None = None, force: str | None = None) -> Verdict:  # noqa: ARG002
+    def conformity(
+        self,
+        source: LimitsSource | None = None,
+        force: LevelsForce | None = None,  # noqa: ARG002 - there is one
+    ) -> Verdict:
         """Return the verdict of the standards at 95 %.
 
         Parameters
@@ -261,6 +273,27 @@ class Recording:
             source=source or self.config.source,
             **self.quantities,
         )
+
+    def plot(self) -> Figure:
+        """Draw the forces of the drops, their levels over the tolerance band, and the average."""
+        figure: Figure = MAKERS["recording"](self)
+        return figure
+
+    def report(self, directory: str | os.PathLike[str]) -> list[Path]:
+        """Write the calibration report to a directory and return the paths of its files.
+
+        Raises
+        ------
+        OSError
+            Where they cannot be written.
+
+        Warns
+        -----
+        ReportWarning
+            Where there is no PDF, or no font for some letters.
+        """
+        paths: list[Path] = MAKERS["report"](self, directory)
+        return paths
 
     def to_force_history(self, drop: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return time since first touch, s, and force, N, of one contact, shape (n_sample,).
@@ -284,7 +317,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     *,
     height: float | None = None,
     mass: float | None = None,
-    source: str | None = None,
+    source: LimitsSource | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
     calibration: float | str | None = None,
@@ -322,7 +355,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         One sentence: what cannot be read or measured.
     """
     known = config if isinstance(config, Config) else read_config(config) if config else Config()
-    given = {
+    given: dict[str, Any] = {
         "height": height, "mass": mass, "source": source, "channel": channel, "unit": unit,
         "calibration": calibration, "polarity": polarity, "sample_rate": sample_rate,
     }  # fmt: skip
@@ -334,11 +367,11 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         require_number(key, value)
         if value <= 0:
             refuse(f"{key} = {value:g} is not allowed", f"{key} > 0")
-    files = [paths] if isinstance(paths, str | Path) or hasattr(paths, "__fspath__") else paths
+    files = [paths] if isinstance(paths, str | os.PathLike) else paths
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainty = 0.0
-    for path in files:  # type: ignore[union-attr]
+    for path in files:
         for signal in _signals(path, known):
             found = _drops(signal, known, progress=progress)
             drops += found
@@ -377,7 +410,9 @@ class _Corrected:
     def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the force that was applied to the plate, N, shape (stop - start,)."""
         # What comes before rings on: some periods of the resonance.
-        room = math.ceil(PERIODS * self.plate.quality * self.signal.sample_rate / self.plate.frequency)
+        room = math.ceil(
+            PERIODS * self.plate.quality * self.signal.sample_rate / self.plate.frequency
+        )
         first, last = max(start - room, 0), min(stop + room, self.signal.n_sample)
         force = self.signal.read(first, last)
         corrected, _ = correct_plate(force, self.signal.sample_rate, self.plate)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from thud._api import version
 from thud.files import replace_file
-from thud.levels import get_bands
+from thud.levels import BANDWIDTHS, get_bands
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,10 +32,8 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
     """Return rows of text, a drop each: touch, contact, restitution, peak and levels."""
     nominal = get_bands().nominal
     levels = recording.average().drops
-    rows = [
-        ("drop", "at, s", "contact, ms", "restitution", "peak, N")
-        + tuple(f"{f:g} Hz, dB" for f in nominal)
-    ]
+    head = ("drop", "at, s", "contact, ms", "restitution", "peak, N")
+    rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
     rows += [
         (
             drop.name,
@@ -52,7 +50,9 @@ def drop_table(recording: Recording) -> list[tuple[str, ...]]:
 
 def table(recording: Recording) -> list[tuple[str, ...]]:
     """Return rows of text: value, expanded uncertainty, limits, margin, verdict by criterion."""
-    rows = [("criterion", "value", "uncertainty (95 %)", "limits", "margin", "verdict")]
+    rows: list[tuple[str, ...]] = [
+        ("criterion", "value", "uncertainty (95 %)", "limits", "margin", "verdict")
+    ]
     octaves = [(f"level, {f:g} Hz octave, dB", 1.0, 2) for f in get_bands().nominal]
     shown = [*octaves, *_SHOWN.values()]
     for decision, (title, unit, decimals) in zip(
@@ -106,12 +106,9 @@ def levels_csv(recording: Recording) -> str:
     """Return octave and third levels, their uncertainty and background as text."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        "bandwidth,nominal_Hz,level_dB,standard_uncertainty_dB,background_dB,spread_dB,flag".split(
-            ","
-        )
-    )
-    for bands in ("octave", "third"):
+    head = "bandwidth nominal_Hz level_dB standard_uncertainty_dB background_dB spread_dB flag"
+    writer.writerow(head.split())
+    for bands in BANDWIDTHS:
         found = recording.average(bands)
         for i, nominal in enumerate(get_bands(bands).nominal):
             numbers = (found.level, found.uncertainty, found.background, found.spread)
@@ -125,7 +122,7 @@ def criteria_csv(recording: Recording) -> str:
     text = io.StringIO()
     text.write(f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow("criterion,unit,value,uncertainty,lower,upper,verdict".split(","))
+    writer.writerow(["criterion", "unit", "value", "uncertainty", "lower", "upper", "verdict"])
     for one in recording.conformity().decisions:
         numbers = (one.value, one.quantity.expanded, one.lower, one.upper)
         cells = ["" if math.isnan(number) else repr(float(number)) for number in numbers]

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from thud.checks import refuse
+from thud.display import Displayed
 from thud.levels import SOURCES, judge
 from thud.recordings.levels import WITHIN_REPEATABILITY
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud._schema import LimitsSource
     from thud.recordings.estimates import Estimate
     from thud.recordings.levels import AverageLevels
 
@@ -125,6 +127,11 @@ class Decision:
         return self.quantity.value
 
     @property
+    def conforms(self) -> bool:
+        """Whether the criterion is met at 95 %."""
+        return self.verdict == VERDICTS[0]
+
+    @property
     def margin(self) -> float:
         """Distance of the value to the nearer limit; negative outside."""
         return min(self.value - self.lower, self.upper - self.value)
@@ -141,8 +148,8 @@ class Decision:
         return float(student.cdf(high, freedom) - student.cdf(low, freedom))
 
 
-@dataclass(frozen=True)
-class Verdict:
+@dataclass(frozen=True, repr=False)
+class Verdict(Displayed):
     """Verdict on a measured source.
 
     Attributes
@@ -153,8 +160,13 @@ class Verdict:
         One for each criterion, in the order of `thud.levels.judge`.
     """
 
-    source: str
+    source: LimitsSource
     decisions: tuple[Decision, ...]
+
+    @property
+    def criteria(self) -> tuple[Decision, ...]:
+        """The decisions, as `thud.Conformity` names them."""
+        return self.decisions
 
     @property
     def verdict(self) -> str:
@@ -171,6 +183,22 @@ class Verdict:
         """Return whether all criteria are met at 95 %."""
         return self.conforms
 
+    def __repr__(self) -> str:
+        """Return the verdict, and the criteria behind it."""
+        words = [d.name for d in self.decisions if d.verdict == self.verdict]
+        where = "" if self.conforms else f" in {', '.join(words)}"
+        return f"<Verdict, {self.source}: {self.verdict}{where}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text: value, expanded uncertainty, limits, verdict."""
+        rows = [("criterion", "value", "uncertainty (95 %)", "limits", "verdict")]
+        for one in self.decisions:
+            known = not math.isnan(one.value)
+            value = f"{one.value:.4g} {one.unit}".strip() if known else "not known"
+            doubt = f"{one.quantity.expanded:.2g}" if known else ""
+            rows.append((one.name, value, doubt, f"{one.lower:g} to {one.upper:g}", one.verdict))
+        return [*rows, ("all criteria", "", "", "", self.verdict)]
+
 
 def decide(  # noqa: PLR0913 - each is one criterion of the standards
     levels: Sequence[Quantity | Estimate | float],
@@ -180,7 +208,7 @@ def decide(  # noqa: PLR0913 - each is one criterion of the standards
     peaks: Quantity | Estimate | float = math.nan,
     mass: Quantity | Estimate | float = math.nan,
     drop_height: Quantity | Estimate | float = math.nan,
-    source: str = SOURCES[0],
+    source: LimitsSource = SOURCES[0],
 ) -> Verdict:
     """Return the verdict of the standards on a measured source, at 95 %.
 

@@ -15,6 +15,7 @@ from thud.recordings.verdict import CONFIDENCE
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from thud._schema import BandSet, LimitsSource
     from thud.recordings.estimates import Drop, Estimate
     from thud.recordings.recording import Recording
     from thud.recordings.verdict import Decision
@@ -24,7 +25,7 @@ DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d 
 TIME_FORMATS = ("", " %H:%M:%S", " %H:%M")
 
 
-def report_data(recording: Recording, source: str | None = None) -> dict[str, Any]:
+def report_data(recording: Recording, source: LimitsSource | None = None) -> dict[str, Any]:
     """Return what the report of a recording says, as JSON has it; what is not known is None.
 
     Numbers are in SI units, uncertainties are standard ones unless named expanded.
@@ -101,7 +102,7 @@ def _dates(texts: Iterable[str]) -> str:
 
 
 def _criteria(
-    recording: Recording, source: str, decisions: tuple[Decision, ...]
+    recording: Recording, source: LimitsSource, decisions: tuple[Decision, ...]
 ) -> list[dict[str, Any]]:
     """Return the criteria with their budgets."""
     average = recording.average()
@@ -139,7 +140,7 @@ def _criteria(
     return rows
 
 
-def _levels(recording: Recording, bands: str) -> dict[str, Any]:
+def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     """Return the levels of the average and of the drops."""
     average = recording.average(bands)
     columns = ("level", "uncertainty", "background", "spread", "flag", "drops")

@@ -21,10 +21,9 @@ from thud.checks import (
 from thud.columns import read_table
 from thud.errors import FitWarning
 from thud.key import check_keywords
-from thud.recording import Recording
+from thud.record import read_record
 from thud.recordings.formats import FORMATS as RECORDING_FORMATS
-from thud.recordings.recording import Recording as MeasuredRecording
-from thud.recordings.recording import read_recording
+from thud.recordings.recording import Recording, read_recording
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
@@ -60,12 +59,7 @@ TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
 
 @check_keywords
 def fit(  # noqa: PLR0913 - options of a search
-    target: ForceTarget
-    | LevelTarget
-    | Recording
-    | MeasuredRecording
-    | Impact
-    | tuple[ArrayLike, ArrayLike],
+    target: ForceTarget | LevelTarget | Recording | Impact | tuple[ArrayLike, ArrayLike],
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],
     case: Case | None = None,
     *,
@@ -285,7 +279,7 @@ def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarg
 
 def _read_record(
     path: Path, config: Path | None, *, measured: bool
-) -> MeasuredRecording | tuple[ArrayLike, ArrayLike]:
+) -> Recording | tuple[ArrayLike, ArrayLike]:
     """Return the record of a file.
 
     Tables of time and force are taken as they are unless they shall be measured; a model, or
@@ -295,7 +289,7 @@ def _read_record(
     if measured or path.suffix.lower() in others:
         return read_recording(path, config=config)
     samples = read_table(path)
-    Recording.from_arrays(samples, str(path))  # refuses what is not a recording
+    read_record(samples, str(path))  # refuses what is not a record
     return samples[:, 0], samples[:, 1]
 
 

@@ -11,8 +11,8 @@ from scipy.signal import ZoomFFT
 
 from thud.checks import refuse, refuse_value, require_choice, require_whole
 from thud.impact import FORCES, Impact
-from thud.recording import MIN_ROWS, Recording
-from thud.recordings.recording import Recording as MeasuredRecording
+from thud.record import MIN_ROWS, Record, read_record
+from thud.recordings.recording import Recording
 from thud.studies.fitting.misfit import Misfit, require_positive
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class ForceTarget:
         Number of the drop of a recording that has several, from 1.
     """
 
-    record: Recording | MeasuredRecording | Impact | tuple[ArrayLike, ArrayLike]
+    record: Recording | Impact | tuple[ArrayLike, ArrayLike]
     noise: float | None = None
     force: LevelsForce | None = None
     time_shift: bool | None = None
@@ -83,7 +83,7 @@ class ForceTarget:
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
-        count = len(self.record.drops) if isinstance(self.record, MeasuredRecording) else 1
+        count = len(self.record.drops) if isinstance(self.record, Recording) else 1
         require_whole("target: drop", self.drop, 1, count)
         time, force, rate = self._samples()
         if self.window is not None:
@@ -101,19 +101,17 @@ class ForceTarget:
                 "a record of a whole impact",
             )
         noise = self.noise
-        if noise is None and isinstance(self.record, MeasuredRecording):
+        if noise is None and isinstance(self.record, Recording):
             noise = _quiet_noise(self.record.drops[self.drop - 1], self.below)
         return ForceMisfit(time, force, rate, noise, kind, self.below, free_shift=shift)
 
-    def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def _samples(self) -> Record:
         given = self.record
-        if isinstance(given, MeasuredRecording):
-            drop = given.drops[self.drop - 1]
-            return drop.time, drop.force, drop.sample_rate
         if isinstance(given, Recording):
-            return given.time, given.record, given.sample_rate
+            drop = given.drops[self.drop - 1]
+            return Record(drop.time, drop.force, drop.sample_rate)
         if isinstance(given, Impact):
-            return given.time, given.force(self.force), given.sample_rate
+            return Record(given.time, given.force(self.force), given.sample_rate)
         try:
             table = np.column_stack([np.asarray(column, dtype=np.float64) for column in given])
         except (TypeError, ValueError) as error:
@@ -123,8 +121,7 @@ class ForceTarget:
                 "time, s, and force, N",
                 error,
             )
-        recording = Recording.from_arrays(table, "target")
-        return recording.time + recording.origin, recording.record, recording.sample_rate
+        return read_record(table, "target")
 
 
 def _quiet_noise(drop: Drop, below: float) -> float | None:
