@@ -96,10 +96,8 @@ contains
       !> Sentences: [n].
       character(len=remark_length), allocatable, intent(inout) :: remarks(:)
       character(len=*), intent(in) :: sentence
-      character(len=remark_length) :: new
 
-      new = sentence
-      remarks = [remarks, new]
+      remarks = [character(len=remark_length) :: remarks, sentence]
    end subroutine add
 
 end module thud_remarks
