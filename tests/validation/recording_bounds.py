@@ -1,6 +1,6 @@
 """Errors of drops in random recordings against the bounds that noise sets.
 
-    python tests/validation/recording_bounds.py [realisations]
+    python tests/validation/recording_bounds.py [realisations [first seed]]
 
 prints tables by level and colour of the noise; the bounds are derived in
 docs/recordings_theory.md, section 6.
@@ -197,7 +197,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
 def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop) -> tuple[float, float]:
     """Return bounds of the contact time, s: of any flank, and of one that is known to be smooth.
 
-    The first is the deviation of the posterior where the noise is known; the second is the
+    The first is the deviation of this method where the noise is known; the second is the
     Cramer-Rao bound for flanks of unknown slope and curvature, for the half sine.
     """
     rate, contact = draw.rate, oracle.contact
@@ -240,12 +240,12 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop) -> tu
     return spread, float(np.sqrt(2 * inverse[0, 0]))
 
 
-def realise_all(count: int) -> list[tuple[Draw, Result | str]]:
+def realise_all(count: int, first: int = 0) -> list[tuple[Draw, Result | str]]:
     """Return a number of realisations."""
     for shape in SHAPES:
         pulse(shape)
     with ProcessPoolExecutor(2) as pool:
-        return list(pool.map(realise, range(count), chunksize=10))
+        return list(pool.map(realise, range(first, first + count), chunksize=10))
 
 
 def columns(results: list[Result]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -299,5 +299,5 @@ def table(results: list[tuple[Draw, Result | str]]) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    found = realise_all(int(sys.argv[1]) if len(sys.argv) > 1 else 1000)
+    found = realise_all(*map(int, sys.argv[1:] or ["1000"]))
     sys.stdout.write("\n".join(table(found)) + "\n")
