@@ -136,6 +136,6 @@ MAKERS.update(
     figure=_maker("plot.overview", "overview"),
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
-    recording=_maker("plot.recording", "recording_overview"),
+    recording=_maker("plot.recording", "recording_figure"),
     report=_maker("report", "write_report"),
 )

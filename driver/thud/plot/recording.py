@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.checks import require_choice
 from thud.levels import BANDWIDTHS, record_force
 from thud.plot.force_history import MARGIN, TIME_LABEL
 from thud.plot.levels import draw_tolerance
@@ -67,13 +68,10 @@ def recording_forces(recording: Recording) -> Figure:
     return figure
 
 
-def recording_overview(recording: Recording) -> Figure:
-    """Draw forces above levels; see `recording_forces` and `recording_levels`."""
-    figure = new_figure(2 * HEIGHT + 1)
-    history, octaves = figure.subplots(2, 1)
-    draw_recording_forces(dress(history), recording)
-    draw_recording_levels(dress(octaves), recording)
-    return figure
+def recording_figure(recording: Recording, what: str = "levels") -> Figure:
+    """Draw the ``"levels"`` or the ``"force"`` of a recording."""
+    require_choice("what", what, ("levels", "force"))
+    return recording_levels(recording) if what == "levels" else recording_forces(recording)
 
 
 def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -274,9 +274,9 @@ class Recording(Displayed):
             **self.quantities,
         )
 
-    def plot(self) -> Figure:
-        """Draw the forces of the drops, their levels over the tolerance band, and the average."""
-        figure: Figure = MAKERS["recording"](self)
+    def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
+        """Draw the levels of the drops over the tolerance band, or their forces."""
+        figure: Figure = MAKERS["recording"](self, what)
         return figure
 
     def report(self, directory: str | os.PathLike[str]) -> list[Path]:
