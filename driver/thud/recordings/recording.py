@@ -26,6 +26,7 @@ from thud.recordings.levels import (
 )
 from thud.recordings.plate import Plate, correct_plate
 from thud.recordings.reading import open_signals
+from thud.recordings.signal import Signal
 from thud.recordings.verdict import (
     Contribution,
     Quantity,
@@ -39,11 +40,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from thud._schema import BandSet, LevelsForce, LimitsSource
     from thud.recordings.estimates import Drop
-    from thud.recordings.signal import Signal
 
 
 # Length of the ringing of a plate that a piece of a signal takes along, periods times quality.
@@ -115,6 +115,35 @@ class Recording(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the criteria."""
         return self.conformity().rows()
+
+    @classmethod
+    def from_array(
+        cls,
+        force: ArrayLike,
+        sample_rate: float,
+        *,
+        height: float | None = None,
+        mass: float | None = None,
+        name: str = "recording",
+    ) -> Recording:
+        """Measure the drops in a force record.
+
+        Parameters
+        ----------
+        force : array_like, shape (n_sample,)
+            Force, N, positive in compression, with quiet before and after each drop.
+        sample_rate
+            Samples per second, Hz.
+        height, mass, name
+            As `read_recording` takes them.
+
+        Raises
+        ------
+        InputError
+            One sentence: what cannot be measured.
+        """
+        config = _checked(Config(height=height, mass=mass))
+        return _recording([Signal.from_array(force, sample_rate, name)], config)
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -360,27 +389,38 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         "calibration": calibration, "polarity": polarity, "sample_rate": sample_rate,
     }  # fmt: skip
     known = replace(known, **{key: value for key, value in given.items() if value is not None})
+    files = [paths] if isinstance(paths, str | os.PathLike) else paths
+    checked = _checked(known)
+    signals = (signal for path in files for signal in _signals(path, checked))
+    return _recording(signals, checked, progress=progress)
+
+
+def _checked(config: Config) -> Config:
+    """Return a configuration whose height and mass are positive."""
     for key in ("height", "mass"):
-        value = getattr(known, key)
+        value = getattr(config, key)
         if value is None:
             continue
         require_number(key, value)
         if value <= 0:
             refuse(f"{key} = {value:g} is not allowed", f"{key} > 0")
-    files = [paths] if isinstance(paths, str | os.PathLike) else paths
+    return config
+
+
+def _recording(signals: Iterable[Signal], config: Config, *, progress: bool = False) -> Recording:
+    """Return the drops of signals."""
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainty = 0.0
-    for path in files:
-        for signal in _signals(path, known):
-            found = _drops(signal, known, progress=progress)
-            drops += found
-            uncertainty = max(uncertainty, signal.calibration_uncertainty)
-            origins.append(_origin(signal, len(found)))
+    for signal in signals:
+        found = _drops(signal, config, progress=progress)
+        drops += found
+        uncertainty = max(uncertainty, signal.calibration_uncertainty)
+        origins.append(_origin(signal, len(found)))
     if not drops:
         refuse("there are no recordings", "one file or more")
     name = Path(origins[0].path or origins[0].name).stem
-    return Recording(name, tuple(drops), tuple(origins), known, uncertainty)
+    return Recording(name, tuple(drops), tuple(origins), config, uncertainty)
 
 
 def _signals(path: str | os.PathLike[str], config: Config) -> list[Signal]:

@@ -1,0 +1,107 @@
+"""Measured recordings, from files to verdict, figures and report."""
+
+from __future__ import annotations
+
+import csv
+import json
+import tomllib
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY, recorded
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FOLDER = REPOSITORY / "inputs/recordings"
+TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
+DROPS = [drop for drop in TRUTH["drop"] if drop["file"].startswith("drop_")]
+
+
+def test_examples_are_measured_as_they_were_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    files = [str(FOLDER / drop["file"]) for drop in DROPS]
+    config = str(FOLDER / "lab.toml")
+    assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 0
+    shown = capsys.readouterr().out
+    assert "The source conforms to the limits of the rubber ball at 95 %" in shown
+    assert "hum of 50 Hz" in shown
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {
+        "levels.csv",
+        "criteria.csv",
+        "report.html",
+        "report.json",
+        "report.pdf",
+    }
+    recording = thud.read_recording(files, config=config)
+    truth = np.array([drop["levels"] for drop in DROPS])
+    np.testing.assert_allclose(recording.average().drops, truth, atol=0.05)
+    for drop, made in zip(recording.drops, DROPS, strict=True):
+        # The restitution takes the nominal height, of which the drops are up to 0.5 % off.
+        assert drop.restitution.value == pytest.approx(made["restitution"], abs=0.01)
+        assert drop.peak_force.value == pytest.approx(made["peak_force"], rel=2e-3)
+        assert drop.onset == pytest.approx(made["onset"], abs=1e-3)
+        # The foot of the pulse of finite elements is soft: docs/recordings_theory.md.
+        assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=0.6e-3)
+    with (tmp_path / "out/levels.csv").open() as file:
+        rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
+    assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
+    report = json.loads((tmp_path / "out/report.json").read_text())
+    assert report["verdict"] == recording.conformity().verdict == "conforms"
+
+
+def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
+    impact = thud.solve(thud.Ball.standard(), model="finite_element")
+    random = np.random.default_rng(3)
+    for quiet, noise, offset in ((0.01, 5.0, 0.0), (0.1, 5.0, 0.0), (0.1, 0.5, 12.0)):
+        force = np.pad(impact.floor_force, int(quiet * impact.sample_rate)) + offset
+        force += random.normal(scale=noise, size=len(force))
+        found = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)
+        assert found.contact_time == pytest.approx(impact.contact_time, abs=0.6e-3)
+        assert found.restitution == pytest.approx(impact.restitution, abs=0.01)
+        np.testing.assert_allclose(found.levels(), impact.levels(), atol=0.3)
+
+
+def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
+    impact = thud.solve(thud.Ball.standard(), model="finite_element")
+    assert recorded(impact).conformity().verdict == "cannot be decided"
+    verdict = recorded(impact, height=1.0, mass=2.5).conformity()
+    assert verdict.verdict == "conforms"
+    assert verdict
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["missing.wav"], "missing.wav"),
+        (["kilo.csv"], "kilo.csv"),
+        (["drop.wav", "--height", "-1"], "height = -1"),
+        (["drop.wav", "--config", "no.toml"], "no.toml"),
+        (["drop.wav", "--channel", "9"], "drop.wav"),
+    ],
+)
+def test_bad_recordings_get_one_sentence(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drop.wav").write_bytes((FOLDER / "drop_1.wav").read_bytes())
+    impact = thud.solve()
+    force = np.pad(impact.floor_force, 2000) / 1e3
+    np.savetxt("kilo.csv", np.c_[np.arange(len(force)) / impact.sample_rate, force])
+    assert cli.main(["measure", *arguments, "--calibration", "5000 N/FS", "-q"]) == 1
+    errors = capsys.readouterr().err
+    assert errors.startswith("thud-driver: ")
+    assert words in errors
+    assert "; allowed: " in errors
+    assert errors.count("\n") == 1
+    assert not (tmp_path / "outputs").exists()
