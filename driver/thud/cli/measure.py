@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.errors import ReportWarning
 from thud.levels import SOURCES
 from thud.tables import format_rows
 
@@ -46,7 +48,11 @@ def measure(options: argparse.Namespace) -> int:
     for remark in recording.remarks:
         print(f"thud-driver: {remark}", file=sys.stderr)
     folder = Path(options.output or Path("outputs", recording.name))
-    results.save(recording, folder, figures=not options.no_figures)
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", ReportWarning)
+        results.save(recording, folder, figures=not options.no_figures)
+    for warning in found:
+        print(f"thud-driver: {warning.message}", file=sys.stderr)
     if not options.quiet:
         print(f"Results: {folder}")
     return NOT_CONFORMING if options.check and not verdict else 0

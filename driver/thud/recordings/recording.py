@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from thud.checks import refuse, require_number
 from thud.display import MAKERS, Displayed
@@ -413,7 +414,9 @@ def _recording(signals: Iterable[Signal], config: Config, *, progress: bool = Fa
     origins: list[Origin] = []
     uncertainty = 0.0
     for signal in signals:
-        found = _drops(signal, config, progress=progress)
+        # Its many small products are slower by threads.
+        with threadpool_limits(1, "blas"):
+            found = _drops(signal, config, progress=progress)
         drops += found
         uncertainty = max(uncertainty, signal.calibration_uncertainty)
         origins.append(_origin(signal, len(found)))
