@@ -13,6 +13,7 @@ from conftest import REPOSITORY, recorded
 
 import thud
 from thud import cli
+from thud.report.data import report_data
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -105,3 +106,27 @@ def test_bad_recordings_get_one_sentence(
     assert "; allowed: " in errors
     assert errors.count("\n") == 1
     assert not (tmp_path / "outputs").exists()
+
+
+def example(name: str, tmp_path: Path, *changes: tuple[str, str]) -> thud.Recording:
+    """Return an example measured with a configuration in which texts are changed."""
+    text = (FOLDER / "lab.toml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    (tmp_path / "lab.toml").write_text(text)
+    return thud.read_recording(FOLDER / name, config=tmp_path / "lab.toml")
+
+
+def test_limits_of_the_configuration_that_were_ignored(tmp_path: Path) -> None:
+    limits = ("# [limits]", "[limits]\noctave_500 = [20.0, 30.0]\n#")
+    recording = example("drop_1.wav", tmp_path, limits)
+    verdict = recording.conformity()
+    assert verdict.verdict == "does not conform"
+    assert [d.name for d in verdict.decisions if not d.conforms] == ["octave_500"]
+    boxes = {box.get_label() for box in recording.plot().axes[0].get_children()}
+    assert "Tolerance, rubber ball, own limits" in boxes
+    (row,) = [
+        one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"
+    ]
+    assert (row["lower"], row["upper"], row["limits_of_standard"]) == (20.0, 30.0, False)

@@ -77,7 +77,7 @@ def recording_figure(recording: Recording, what: str = "levels") -> Figure:
 def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     """Draw the levels of every drop, their average with its expanded uncertainty, the background.
 
-    Octaves have the tolerances of the source.
+    Octaves have the tolerances of the verdict.
 
     Parameters
     ----------
@@ -89,7 +89,15 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     average = recording.average(bands)
     figure, axes = empty_axes(HEIGHT)
     if bands == BANDWIDTHS[0]:
-        draw_tolerance(axes, recording.conformity().source)
+        verdict = recording.conformity()
+        octaves = verdict.decisions[: len(average.level)]
+        own = any(one.name in recording.config.limits for one in octaves)
+        draw_tolerance(
+            axes,
+            np.array([one.lower for one in octaves]),
+            np.array([one.upper for one in octaves]),
+            verdict.source.replace("_", " ") + ", own limits" * own,
+        )
     place = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, place, average.drops, recording)
     mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"

@@ -284,7 +284,7 @@ class Recording(Displayed):
         source: LimitsSource | None = None,
         force: LevelsForce | None = None,  # noqa: ARG002 - there is one
     ) -> Verdict:
-        """Return the verdict of the standards at 95 %.
+        """Return the verdict of the standards at 95 %, with the limits of the configuration.
 
         Parameters
         ----------
@@ -301,6 +301,7 @@ class Recording(Displayed):
                 plate.level_uncertainty() if plate else None,
             ),
             source=source or self.config.source,
+            limits=self.config.limits,
             **self.quantities,
         )
 

@@ -209,6 +209,7 @@ def decide(  # noqa: PLR0913 - each is one criterion of the standards
     mass: Quantity | Estimate | float = math.nan,
     drop_height: Quantity | Estimate | float = math.nan,
     source: LimitsSource = SOURCES[0],
+    limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Verdict:
     """Return the verdict of the standards on a measured source, at 95 %.
 
@@ -216,6 +217,7 @@ def decide(  # noqa: PLR0913 - each is one criterion of the standards
     not conform where they lie outside, and cannot be decided between (guard band of the expanded
     uncertainty, JCGM 106). What is not known, NaN, cannot be decided; neither can a value whose
     uncertainty is not known. Plain numbers are exact. Levels are in dB, the others in SI units.
+    The `limits`, minimum and maximum by criterion, replace those of the standards.
 
     Raises
     ------
@@ -227,11 +229,12 @@ def decide(  # noqa: PLR0913 - each is one criterion of the standards
     # Names, units and limits of the library; they do not depend on values.
     zeros = np.zeros(len(levels))
     criteria = judge(zeros, 0.0, 0.0, 0, 0.0, 0.0, source).criteria
+    spans = [(limits or {}).get(c.name, (c.lower, c.upper)) for c in criteria]
     return Verdict(
         source,
         tuple(
-            Decision(c.name, c.unit, value, c.lower, c.upper, _verdict(value, c.lower, c.upper))
-            for c, value in zip(criteria, values, strict=True)
+            Decision(c.name, c.unit, value, *span, _verdict(value, *span))
+            for c, value, span in zip(criteria, values, spans, strict=True)
         ),
     )
 
