@@ -113,7 +113,7 @@ def free_modes(
     )
     modes = new_modes(case.ball, call(api.free_modes, case_text(case)))
     for remark in modes.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
     return modes
 
 
