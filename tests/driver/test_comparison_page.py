@@ -44,7 +44,7 @@ def test_page_has_the_curves_of_the_picture() -> None:
         curves = [curve for curve in drawn["data"] if "type" not in curve]
         assert len(lines) == len(curves) == len(IMPACTS)
         for line, curve in zip(lines, curves, strict=True):
-            np.testing.assert_allclose(curve["y"], line.get_ydata(), atol=1e-5)
+            np.testing.assert_allclose(curve["y"], line.get_ydata(), rtol=1e-5)
     assert page[0]["layout"]["yaxis"]["title"]["text"] == (
         "Force on the floor<br>below 1.25 kHz, kN"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -86,7 +86,12 @@ class SetStudy(Study):
     @property
     def block_size(self) -> int:
         """Number of sets that are computed together, the same for all backends."""
-        keys = self.key_columns(self.parameter_columns(0, 1))
+        if self.design in {"grid", "list"}:
+            # A grid may be larger than the memory; its ends do.
+            first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}
+        else:
+            first = self.parameter_columns(0, 1)
+        keys = self.key_columns(first)
         return max(1, round(_BLOCK_TIME / get_cost(self.case, keys)))
 
     def parameter_columns(self, start: int, stop: int) -> Columns:
