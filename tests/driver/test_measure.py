@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+import soundfile
 from conftest import REPOSITORY, recorded
 
 import thud
@@ -108,7 +109,7 @@ def test_bad_recordings_get_one_sentence(
     assert not (tmp_path / "outputs").exists()
 
 
-def example(name: str, tmp_path: Path, *changes: tuple[str, str]) -> thud.Recording:
+def example(name: Path | str, tmp_path: Path, *changes: tuple[str, str]) -> thud.Recording:
     """Return an example measured with a configuration in which texts are changed."""
     text = (FOLDER / "lab.toml").read_text()
     for old, new in changes:
@@ -130,3 +131,15 @@ def test_limits_of_the_configuration_that_were_ignored(tmp_path: Path) -> None:
         one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"
     ]
     assert (row["lower"], row["upper"], row["limits_of_standard"]) == (20.0, 30.0, False)
+
+
+def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
+    values, rate = soundfile.read(FOLDER / "drop_1.wav")
+    place = int((DROPS[0]["onset"] + 0.006) * rate)
+    values[place : place + 6] = 0.0
+    soundfile.write(tmp_path / "lost.wav", values, rate, "PCM_24")
+    whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "lost.wav", tmp_path)
+    np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
+    assert any("1 dropouts of 0.125 ms" in step for step in filled.steps)
+    assert any("the contact has 1 dropouts" in remark for remark in filled.remarks)
+    assert not any("dropouts" in remark for remark in whole.remarks)

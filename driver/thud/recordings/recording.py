@@ -463,20 +463,45 @@ class _Corrected:
         return corrected[start - first : stop - first]
 
 
+@dataclass(frozen=True, eq=False)
+class _Repaired:
+    """Samples of a signal of which those from `start` on were repaired."""
+
+    signal: Signal
+    start: int
+    force: NDArray[np.float64]
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the force, N, shape (stop - start,)."""
+        force = self.signal.read(start, stop)
+        first, last = max(start, self.start), min(stop, self.start + len(self.force))
+        if first < last:
+            force[first - start : last - start] = self.force[first - self.start : last - self.start]
+        return force
+
+
 def _drops(signal: Signal, config: Config, *, progress: bool) -> list[Drop]:
     """Return the drops of a signal, the plate's resonance taken out before."""
-    plate, applied = _plate(config), signal
-    step: tuple[str, ...] = ()
-    if plate is not None:
-        # The force that clips is the one that was recorded.
-        applied = replace(signal, samples=_Corrected(signal, plate), full_scale=None)
-        step = (correct_plate(np.zeros(8), signal.sample_rate, plate)[1],)
+    plate = _plate(config)
+    known = {"height": config.height, "mass": config.mass}
+    if plate is None:
+        return [measure_drop(one, **known) for one in find_windows(signal, progress=progress)]
+    correction = correct_plate(np.zeros(8), signal.sample_rate, plate)[1]
     found = []
-    for window in find_windows(applied, progress=progress):
-        if plate is not None:
-            repair(replace(window, signal=signal))
-        drop = measure_drop(window, height=config.height, mass=config.mass)
-        found.append(replace(drop, steps=(*step, *drop.steps)))
+    for window in find_windows(signal, progress=progress):
+        # What clips or drops out is what was recorded; corrected, a dropout would ring.
+        force, steps, remarks = repair(window)
+        repaired = replace(signal, samples=_Repaired(signal, window.start, force))
+        applied = replace(signal, samples=_Corrected(repaired, plate), full_scale=None)
+        bounces = tuple(replace(bounce, signal=applied) for bounce in window.bounces)
+        drop = measure_drop(replace(window, signal=applied, bounces=bounces), **known)
+        found.append(
+            replace(
+                drop,
+                steps=(*steps, correction, *drop.steps),
+                remarks=(*remarks, *drop.remarks),
+            )
+        )
     return found
 
 
