@@ -17,7 +17,7 @@ from thud.display import MAKERS, Displayed
 from thud.levels import peak_count
 from thud.recordings.config import Config, read_config
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import measure_drop
+from thud.recordings.estimates import Estimate, measure_drop
 from thud.recordings.faults import repair
 from thud.recordings.levels import (
     AverageLevels,
@@ -25,7 +25,7 @@ from thud.recordings.levels import (
     compare_methods,
     measure_levels,
 )
-from thud.recordings.plate import Plate, correct_plate
+from thud.recordings.plate import REACH, Plate, correct_plate
 from thud.recordings.reading import open_signals
 from thud.recordings.signal import Signal
 from thud.recordings.verdict import (
@@ -268,8 +268,12 @@ class Recording(Displayed):
             peak_count(drop.force[slice(*drop.gate)], drop.sample_rate) for drop in self.drops
         )
         config = self.config
+        times = [drop.contact_time for drop in self.drops]
+        # The flanks of all drops have one shape: what is wrong with it does not average.
+        shared = min(time.uncertainty for time in times)
+        edges = [Contribution("edges of the pulse", shared)] if len(times) > 1 else []
         return {
-            "contact_time": average_estimates([drop.contact_time for drop in self.drops]),
+            "contact_time": average_estimates(times, *edges),
             "restitution": average_estimates(
                 [drop.restitution for drop in self.drops],
                 *([Contribution("calibration", share)] if by_impulse and share else []),
@@ -495,9 +499,13 @@ def _drops(signal: Signal, config: Config, *, progress: bool) -> list[Drop]:
         applied = replace(signal, samples=_Corrected(repaired, plate), full_scale=None)
         bounces = tuple(replace(bounce, signal=applied) for bounce in window.bounces)
         drop = measure_drop(replace(window, signal=applied, bounces=bounces), **known)
+        time = drop.contact_time
+        # The correction ends at its reach: an edge is spread over half a period of that.
+        spread = 1 / (2 * REACH * plate.resonance)
         found.append(
             replace(
                 drop,
+                contact_time=Estimate(time.value, math.hypot(time.uncertainty, spread)),
                 steps=(*steps, correction, *drop.steps),
                 remarks=(*remarks, *drop.remarks),
             )
