@@ -26,10 +26,10 @@ import thud.recordings.recording as module
 from thud.errors import ReportWarning
 from thud.levels import record_force
 from thud.plot.recording import recording_forces, recording_levels
-from thud.recordings.config import Config
+from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Drop, Estimate
 from thud.recordings.recording import Recording, read_recording
-from thud.report.data import read_date, report_data
+from thud.report.data import level_budgets, read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
 from thud.report.write import write_report
@@ -206,7 +206,7 @@ def numbers(recording: Recording) -> list[list[str]]:
         if decision.quantity.contributions and not np.isnan(value):
             cells.append(f"{decision.quantity.expanded / unit:.{places + 1}f}")
         cells.append(" to ".join(dict.fromkeys(limits)))
-        if decision.name != "peak_count" and not np.isnan(value):
+        if not (decision.quantity.upper_bound or np.isnan(value)):
             cells.append(f"{decision.margin / unit:.{places}f}")
         rows.append([*cells, decision.verdict])
     return rows
@@ -316,7 +316,8 @@ def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> Non
     for row, decision in zip(data["criteria"], verdict.decisions, strict=True):
         known = not np.isnan(decision.value)
         assert row["value"] == (decision.value if known else None)
-        assert row["expanded_uncertainty"] == decision.quantity.expanded
+        stated = bool(decision.quantity.contributions)
+        assert row["expanded_uncertainty"] == (decision.quantity.expanded if stated else None)
         assert (row["lower"], row["upper"]) == (decision.lower, decision.upper)
         assert row["verdict"] == decision.verdict
         assert row["limits_of_standard"]
@@ -452,12 +453,28 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
     assert labels[0] == "allowed release, 18 to 22 ms"
     assert ("average" in labels) == (count > 1)
     assert ("outlier" in labels) == ("range of 60 drops" in labels) == (count == 60)
-    axes = recording_levels(recording).axes[0]
-    bars = axes.containers[0]
-    np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels())
-    half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]
-    expanded = [d.quantity.expanded for d in recording.conformity().decisions[:5]]
-    np.testing.assert_allclose(half, expanded)
+    for bands in ("octave", "third"):
+        axes = recording_levels(recording, bands).axes[0]
+        bars = axes.containers[0]
+        np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels(bands))
+        half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]
+        np.testing.assert_allclose(half, [one.expanded for one in level_budgets(recording, bands)])
+
+
+def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
+    plate = PlateConfig(f0=1600.0, Q=20.0)
+    for recording in (one, many(one, 5), many(one, 5, plate=plate)):
+        data = report_data(recording)
+        found = data["levels"]["octave"]
+        for i, decision in enumerate(recording.conformity().decisions[:5]):
+            assert found["uncertainty"][i] == decision.quantity.uncertainty
+            assert found["expanded_uncertainty"][i] == decision.quantity.expanded
+    octaves, thirds = (level_budgets(recording, bands) for bands in ("octave", "third"))
+    for budgets in (octaves, thirds):
+        names = [part.name for part in budgets[-1].contributions]
+        assert names[-2:] == ["calibration", "plate"]
+    # Of the 500 Hz octave and the 630 Hz third, which have one upper edge.
+    assert thirds[-1].contributions[-1] == octaves[-1].contributions[-1]
 
 
 def test_sentences_that_differ_in_numbers_are_one() -> None:

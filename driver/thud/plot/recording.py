@@ -11,6 +11,7 @@ from thud.levels import BANDWIDTHS, record_force
 from thud.plot.force_history import MARGIN, TIME_LABEL
 from thud.plot.levels import draw_tolerance
 from thud.plot.look import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis
+from thud.report.data import level_budgets
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,10 +101,10 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
         )
     place = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, place, average.drops, recording)
+    expanded = np.array([one.expanded for one in level_budgets(recording, bands)])
     mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
-        place, average.level, yerr=_bar(_expanded(recording, bands)), label=mark,
-        marker="o", markersize=3, **BARS,
+        place, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
     )  # fmt: skip
     bounds = average.flag == "background"
     if bounds.any():
@@ -151,18 +152,6 @@ def _draw_drops(
         number = int(marked.sum())
         name = "outlier" if number == 1 else f"{number} outliers"
         axes.plot(x, curve, label=name if i == 0 else None, **DEVIANT)
-
-
-def _expanded(recording: Recording, bands: BandSet) -> NDArray[np.float64]:
-    """Return the expanded uncertainties of the average levels, dB."""
-    average = recording.average(bands)
-    if bands == BANDWIDTHS[0]:
-        found = [d.quantity for d in recording.conformity().decisions[: len(average.level)]]
-    else:
-        from thud.recordings.verdict import level_quantities  # noqa: PLC0415 - SciPy takes its time
-
-        found = list(level_quantities(average, recording.calibration_uncertainty))
-    return np.array([quantity.expanded for quantity in found])
 
 
 def _bar(expanded: NDArray[np.float64] | float, unit: float = 1.0) -> NDArray[np.float64]:

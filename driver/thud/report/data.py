@@ -10,7 +10,8 @@ import numpy as np
 
 from thud._api import version
 from thud.levels import BANDWIDTHS, get_bands, judge
-from thud.recordings.verdict import CONFIDENCE
+from thud.recordings.recording import _plate
+from thud.recordings.verdict import CONFIDENCE, level_quantities
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from thud._schema import BandSet, LimitsSource
     from thud.recordings.estimates import Drop, Estimate
     from thud.recordings.recording import Recording
-    from thud.recordings.verdict import Decision
+    from thud.recordings.verdict import Decision, Quantity
 
 FORMAT = "thud calibration report 1"
 DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
@@ -47,7 +48,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "calibration_uncertainty": recording.calibration_uncertainty,
         "verdict": verdict.verdict,
         "confidence": CONFIDENCE,
-        "criteria": _criteria(recording, verdict.source, verdict.decisions),
+        "criteria": criteria_data(recording, source),
         "levels": {bands: _levels(recording, bands) for bands in BANDWIDTHS},
         "method_differences": {
             method: found.tolist() for method, found in recording.agreement().items()
@@ -70,6 +71,26 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
     }
     known: dict[str, Any] = _known(found)
     return known
+
+
+def criteria_data(recording: Recording, source: LimitsSource | None = None) -> list[dict[str, Any]]:
+    """Return the criteria of a recording with their budgets, as JSON has them.
+
+    An uncertainty that nobody states is None, and so is the margin of an upper bound.
+    """
+    verdict = recording.conformity(source)
+    found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.decisions))
+    return found
+
+
+def level_budgets(recording: Recording, bands: BandSet) -> tuple[Quantity, ...]:
+    """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
+    plate = _plate(recording.config)
+    return level_quantities(
+        recording.average(bands),
+        recording.calibration_uncertainty,
+        plate.level_uncertainty(bands) if plate else None,
+    )
 
 
 def read_date(text: str) -> datetime | None:
@@ -113,28 +134,29 @@ def _criteria(
         spreads[name] = _spread(getattr(drop, name).value for drop in recording.drops)
     rows = []
     for i, (one, usual) in enumerate(zip(decisions, standard, strict=True)):
-        is_level = i < count
+        is_level, quantity = i < count, one.quantity
+        stated = bool(quantity.contributions)
         rows.append(
             {
                 "name": one.name,
                 "unit": one.unit,
                 "band": float(get_bands().nominal[i]) if is_level else None,
                 "value": one.value,
-                "uncertainty": one.quantity.uncertainty,
-                "freedom": one.quantity.freedom,
-                "coverage_factor": one.quantity.coverage_factor,
-                "expanded_uncertainty": one.quantity.expanded,
-                "upper_bound": one.quantity.upper_bound,
+                "uncertainty": quantity.uncertainty if stated else None,
+                "freedom": quantity.freedom,
+                "coverage_factor": quantity.coverage_factor,
+                "expanded_uncertainty": quantity.expanded if stated else None,
+                "upper_bound": quantity.upper_bound,
                 "lower": one.lower,
                 "upper": one.upper,
                 "limits_of_standard": (one.lower, one.upper) == (usual.lower, usual.upper),
-                "margin": one.margin,
+                "margin": None if quantity.upper_bound else one.margin,
                 "probability": one.probability,
                 "verdict": one.verdict,
                 "spread": spreads.get(f"{i}" if is_level else one.name),
                 "background": float(average.background[i]) if is_level else None,
                 "flag": str(average.flag[i]) if is_level else "",
-                "contributions": [vars(part) for part in one.quantity.contributions],
+                "contributions": [vars(part) for part in quantity.contributions],
             }
         )
     return rows
@@ -142,11 +164,14 @@ def _criteria(
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     """Return the levels of the average and of the drops."""
-    average = recording.average(bands)
-    columns = ("level", "uncertainty", "background", "spread", "flag", "drops")
+    average, budgets = recording.average(bands), level_budgets(recording, bands)
+    columns = ("background", "spread", "flag", "drops")
     return {
         "band": get_bands(bands).nominal.tolist(),
         "method": average.method,
+        "level": [one.value for one in budgets],
+        "uncertainty": [one.uncertainty for one in budgets],
+        "expanded_uncertainty": [one.expanded for one in budgets],
         **{name: getattr(average, name).tolist() for name in columns},
     }
 

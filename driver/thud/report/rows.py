@@ -50,13 +50,12 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     bound = "at most " if criterion["upper_bound"] else ""
     ends = [f"{end / style.unit:g}".replace("-", "−") for end in limits_of(criterion)]
     own = "" if criterion["limits_of_standard"] else " *"
-    is_count = criterion["name"] == COUNT
     return (
         style.title,
         bound * (value is not None) + style.text(value),
         expanded_text(criterion),
         " to ".join(dict.fromkeys(ends)) + own,
-        style.text(None if bound or is_count else margin, "–"),
+        style.text(margin, "–"),
         _width(style, criterion["spread"], "–"),
         style.text(criterion["background"], "–"),
         criterion["verdict"],
