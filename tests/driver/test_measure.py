@@ -131,9 +131,7 @@ def test_limits_of_the_configuration_that_were_ignored(tmp_path: Path) -> None:
     assert [d.name for d in verdict.decisions if not d.conforms] == ["octave_500"]
     boxes = {box.get_label() for box in recording.plot().axes[0].get_children()}
     assert "Tolerance, rubber ball, own limits" in boxes
-    (row,) = [
-        one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"
-    ]
+    (row,) = [one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"]
     assert (row["lower"], row["upper"], row["limits_of_standard"]) == (20.0, 30.0, False)
 
 

@@ -31,6 +31,7 @@ def measure(options: argparse.Namespace) -> int:
         channel=int(options.channel) if (options.channel or "").isdigit() else options.channel,
         unit=options.unit,
         calibration=options.calibration,
+        calibration_uncertainty=options.calibration_uncertainty,
         polarity=options.polarity,
         sample_rate=options.sample_rate,
         config=options.config,
@@ -72,6 +73,12 @@ MEASURE = Command(
         argument("--unit", help="unit of the recorded values, where the file does not say it"),
         argument(
             "--calibration", metavar="N/UNIT", help='such as "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+        ),
+        argument(
+            "--calibration-uncertainty",
+            type=float,
+            metavar="PART",
+            help="relative standard uncertainty of the calibration, such as 0.005",
         ),
         argument(
             "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"

@@ -14,13 +14,14 @@ from thud.levels import SOURCES, get_bands, judge
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
 from thud.recordings.reading import regular_file
-from thud.recordings.units import Calibration, require_unit
+from thud.recordings.units import read_chain, require_unit
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Mapping
 
     from thud._schema import LimitsSource
+    from thud.recordings.units import Calibration
 
 LONGEST = 500
 ABSOLUTE_ZERO = -273.15
@@ -36,13 +37,13 @@ class PlateConfig:
         Frequency, Hz.
     Q : float
         Quality factor.
-    added_mass : float
-        Mass between ball and sensors, kg.
+    f0_uncertainty : float or None
+        Relative standard uncertainty of the frequency; None where it is not known.
     """
 
     f0: float
     Q: float
-    added_mass: float = 0.0
+    f0_uncertainty: float | None = None
 
 
 @dataclass(frozen=True)
@@ -63,10 +64,11 @@ class Config:
         Instruments, one each.
     channel, unit, polarity, sample_rate
         As `open_signals` takes them.
-    calibration : Calibration, float or None
-        As `open_signals` takes it; with its uncertainty where that is given.
-    calibration_uncertainty : float
-        Relative standard uncertainty of the calibration.
+    calibration : Calibration, str, float or None
+        As `open_signals` takes it.
+    calibration_uncertainty : float or None
+        Relative standard uncertainty of the force, wherever its calibration comes from; by default
+        that of the `Calibration`.
     mass, height : float or None
         Mass of the ball, kg, and drop height, m.
     plate : PlateConfig or None
@@ -84,8 +86,8 @@ class Config:
     instruments: tuple[str, ...] = ()
     channel: int | str | None = None
     unit: str | None = None
-    calibration: Calibration | float | None = None
-    calibration_uncertainty: float = 0.0
+    calibration: Calibration | str | float | None = None
+    calibration_uncertainty: float | None = None
     polarity: str | None = None
     sample_rate: float | None = None
     mass: float | None = None
@@ -111,16 +113,7 @@ def read_config(path: str | os.PathLike[str]) -> Config:
     except (OSError, ValueError, RecursionError) as error:
         refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
     _require_known(given, [one.name for one in fields(Config)], name)
-    values = {key: _checked(key, value, f"{name}: {key}") for key, value in given.items()}
-    chain, uncertainty = values.get("calibration"), values.get("calibration_uncertainty", 0.0)
-    if isinstance(chain, float) and "unit" in values:
-        chain = f"{chain!r} N/{values['unit']}"
-    if isinstance(chain, str):
-        values["calibration"] = Calibration(chain, uncertainty)
-    elif uncertainty:
-        what = f"{name}: calibration_uncertainty stands without calibration and unit"
-        refuse(what, 'calibration = 250 with unit = "V", or "250 N/V"')
-    return Config(**values)
+    return Config(**{key: check_key(key, value, f"{name}: {key}") for key, value in given.items()})
 
 
 def _require_known(given: Mapping[str, object], known: list[str], place: str) -> None:
@@ -132,7 +125,7 @@ def _require_known(given: Mapping[str, object], known: list[str], place: str) ->
             refuse(f"{place}: {shown_text(key)!r} is not known{hint}", ", ".join(known))
 
 
-def _checked(key: str, value: object, place: str) -> Any:  # noqa: ANN401 - of any key
+def check_key(key: str, value: object, place: str) -> Any:  # noqa: ANN401 - of any key
     """Return the value of a key; raise InputError where it is not allowed."""
     if key in NUMBERS:
         return _number(value, place, *NUMBERS[key])
@@ -148,7 +141,7 @@ NUMBERS = {
     "height": (0.001, 100.0),
     "f0": (1.0, 1e6),
     "Q": (0.5, 1e6),
-    "added_mass": (0.0, 1000.0),
+    "f0_uncertainty": (0.0, 0.5),
 }
 
 
@@ -175,7 +168,10 @@ def _instruments(value: object, place: str) -> tuple[str, ...]:
 
 def _calibration(value: object, place: str) -> str | float:
     """Return a chain of factors or N per unit."""
-    return _text(value, place) if isinstance(value, str) else _number(value, place, -1e30, 1e30)
+    if not isinstance(value, str):
+        return _number(value, place, -1e30, 1e30)
+    read_chain(_text(value, place))
+    return value
 
 
 def _channel(value: object, place: str) -> int | str:
@@ -214,9 +210,9 @@ def _plate(value: object, place: str) -> PlateConfig:
     table = _table(value, place, [one.name for one in fields(PlateConfig)])
     for key in ("f0", "Q"):
         if key not in table:
-            refuse(f"{place}: {key} is missing", "f0, Q and added_mass")
+            refuse(f"{place}: {key} is missing", "f0 and Q")
     return PlateConfig(
-        **{key: _checked(key, value, f"{place}: {key}") for key, value in table.items()}
+        **{key: check_key(key, value, f"{place}: {key}") for key, value in table.items()}
     )
 
 

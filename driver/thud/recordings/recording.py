@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from thud.checks import refuse, require_number
 from thud.display import MAKERS, Displayed
 from thud.levels import peak_count
-from thud.recordings.config import Config, read_config
+from thud.recordings.config import Config, check_key, read_config
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Estimate, measure_drop
 from thud.recordings.faults import repair
@@ -95,15 +95,15 @@ class Recording(Displayed):
         The files.
     config : Config
         What the laboratory says; mass, kg, and height, m, may be None.
-    calibration_uncertainty : float
-        Relative standard uncertainty of the force.
+    calibration_uncertainty : float or None
+        Relative standard uncertainty of the force; None where it is not known.
     """
 
     name: str
     drops: tuple[Drop, ...]
     origins: tuple[Origin, ...]
     config: Config = field(default_factory=Config)
-    calibration_uncertainty: float = 0.0
+    calibration_uncertainty: float | None = None
 
     def __repr__(self) -> str:
         """Return the main numbers of the recording, without its samples."""
@@ -118,13 +118,14 @@ class Recording(Displayed):
         return self.conformity().rows()
 
     @classmethod
-    def from_array(
+    def from_array(  # noqa: PLR0913 - what a laboratory knows
         cls,
         force: ArrayLike,
         sample_rate: float,
         *,
         height: float | None = None,
         mass: float | None = None,
+        calibration_uncertainty: float | None = None,
         name: str = "recording",
     ) -> Recording:
         """Measure the drops in a force record.
@@ -135,7 +136,7 @@ class Recording(Displayed):
             Force, N, positive in compression, with quiet before and after each drop.
         sample_rate
             Samples per second, Hz.
-        height, mass, name
+        height, mass, calibration_uncertainty, name
             As `read_recording` takes them.
 
         Raises
@@ -143,7 +144,9 @@ class Recording(Displayed):
         InputError
             One sentence: what cannot be measured.
         """
-        config = _checked(Config(height=height, mass=mass))
+        config = _checked(
+            Config(height=height, mass=mass, calibration_uncertainty=calibration_uncertainty)
+        )
         return _recording([Signal.from_array(force, sample_rate, name)], config)
 
     @property
@@ -201,6 +204,16 @@ class Recording(Displayed):
         found = [remark for one in self.origins for remark in one.remarks]
         found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
         found += [str(outlier) for outlier in self.average().outliers]
+        plate = self.config.plate
+        missing = {
+            "calibration": self.calibration_uncertainty is None,
+            "resonance of the plate": plate is not None and plate.f0_uncertainty is None,
+        }
+        found += [
+            f"the uncertainty of the {what} is not given; it is not part of the uncertainties"
+            for what in missing
+            if missing[what]
+        ]
         return tuple(dict.fromkeys(found))
 
     @property
@@ -258,7 +271,7 @@ class Recording(Displayed):
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
         """Contact time, restitution, peaks, mass and drop height with their budgets."""
-        scale = self.calibration_uncertainty
+        scale = self.calibration_uncertainty or 0.0
         known = [drop.restitution.value for drop in self.drops]
         known = [value for value in known if math.isfinite(value)]
         # Restitution from the impulse: I/(M v0) - 1 - g t/v0.
@@ -356,6 +369,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     channel: int | str | None = None,
     unit: str | None = None,
     calibration: float | str | None = None,
+    calibration_uncertainty: float | None = None,
     polarity: str | None = None,
     sample_rate: float | None = None,
     config: Config | str | os.PathLike[str] | None = None,
@@ -375,6 +389,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         Source whose limits apply, ``"rubber_ball"`` or ``"tyre"``.
     channel, unit, calibration, polarity, sample_rate
         As `open_signals` takes them.
+    calibration_uncertainty
+        Relative standard uncertainty of the force, wherever its calibration comes from.
     config
         Configuration of the laboratory, or its file; the other arguments come first.
     progress
@@ -392,7 +408,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     known = config if isinstance(config, Config) else read_config(config) if config else Config()
     given: dict[str, Any] = {
         "height": height, "mass": mass, "source": source, "channel": channel, "unit": unit,
-        "calibration": calibration, "polarity": polarity, "sample_rate": sample_rate,
+        "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
+        "polarity": polarity, "sample_rate": sample_rate,
     }  # fmt: skip
     known = replace(known, **{key: value for key, value in given.items() if value is not None})
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
@@ -402,7 +419,11 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
 
 
 def _checked(config: Config) -> Config:
-    """Return a configuration whose height and mass are positive."""
+    """Return a configuration whose numbers are allowed."""
+    if config.calibration_uncertainty is not None:
+        check_key(
+            "calibration_uncertainty", config.calibration_uncertainty, "calibration_uncertainty"
+        )
     for key in ("height", "mass"):
         value = getattr(config, key)
         if value is None:
@@ -417,17 +438,23 @@ def _recording(signals: Iterable[Signal], config: Config, *, progress: bool = Fa
     """Return the drops of signals."""
     drops: list[Drop] = []
     origins: list[Origin] = []
-    uncertainty = 0.0
+    uncertainties: list[float | None] = []
     for signal in signals:
         # Its many small products are slower by threads.
         with threadpool_limits(1, "blas"):
             found = _drops(signal, config, progress=progress)
         drops += found
-        uncertainty = max(uncertainty, signal.calibration_uncertainty)
+        uncertainties.append(
+            signal.calibration_uncertainty
+            if config.calibration_uncertainty is None
+            else config.calibration_uncertainty
+        )
         origins.append(_origin(signal, len(found)))
     if not drops:
         refuse("there are no recordings", "one file or more")
     name = Path(origins[0].path or origins[0].name).stem
+    known = [one for one in uncertainties if one is not None]
+    uncertainty = max(known) if len(known) == len(uncertainties) else None
     return Recording(name, tuple(drops), tuple(origins), config, uncertainty)
 
 
@@ -445,7 +472,9 @@ def _signals(path: str | os.PathLike[str], config: Config) -> list[Signal]:
 def _plate(config: Config) -> Plate | None:
     """Return the resonance of the plate that is corrected."""
     given = config.plate
-    return None if given is None else Plate(given.f0, given.Q, added_mass=given.added_mass)
+    if given is None:
+        return None
+    return Plate(given.f0, given.Q, frequency_uncertainty=given.f0_uncertainty or 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -487,9 +516,9 @@ class _Repaired:
 def _drops(signal: Signal, config: Config, *, progress: bool) -> list[Drop]:
     """Return the drops of a signal, the plate's resonance taken out before."""
     plate = _plate(config)
-    known = {"height": config.height, "mass": config.mass}
+    measure = partial(measure_drop, height=config.height, mass=config.mass)
     if plate is None:
-        return [measure_drop(one, **known) for one in find_windows(signal, progress=progress)]
+        return [measure(one) for one in find_windows(signal, progress=progress)]
     correction = correct_plate(np.zeros(8), signal.sample_rate, plate)[1]
     found = []
     for window in find_windows(signal, progress=progress):
@@ -498,7 +527,7 @@ def _drops(signal: Signal, config: Config, *, progress: bool) -> list[Drop]:
         repaired = replace(signal, samples=_Repaired(signal, window.start, force))
         applied = replace(signal, samples=_Corrected(repaired, plate), full_scale=None)
         bounces = tuple(replace(bounce, signal=applied) for bounce in window.bounces)
-        drop = measure_drop(replace(window, signal=applied, bounces=bounces), **known)
+        drop = measure(replace(window, signal=applied, bounces=bounces))
         time = drop.contact_time
         # The correction ends at its reach: an edge is spread over half a period of that.
         spread = 1 / (2 * REACH * plate.resonance)

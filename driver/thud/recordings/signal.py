@@ -41,8 +41,8 @@ class Signal:
         Date of the measurement where the file says so, or empty.
     calibration : str
         How the values of the file became newtons, in words.
-    calibration_uncertainty : float
-        Relative standard uncertainty of the calibration.
+    calibration_uncertainty : float or None
+        Relative standard uncertainty of the calibration; None where it is not known.
     steps : tuple of str
         What reading has done, a sentence each.
     remarks : tuple of str
@@ -59,7 +59,7 @@ class Signal:
     full_scale: float | None = None
     date: str = ""
     calibration: str = ""
-    calibration_uncertainty: float = 0.0
+    calibration_uncertainty: float | None = None
     steps: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 

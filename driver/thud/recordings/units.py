@@ -56,19 +56,21 @@ class Calibration:
     chain : str
         Factors from the recorded unit to newtons, in any order: ``"250 N/V"``, or with a charge
         amplifier ``"4.1 pC/N, 10 mV/pC"``.
-    uncertainty : float
-        Relative standard uncertainty.
+    uncertainty : float or None
+        Relative standard uncertainty; None where it is not known.
     origin : str
         How it was found, in words.
     """
 
     chain: str
-    uncertainty: float = 0.0
+    uncertainty: float | None = None
     origin: str = ""
 
     def __post_init__(self) -> None:
         """Raise InputError where the chain or the uncertainty are not allowed."""
         read_chain(self.chain)
+        if self.uncertainty is None:
+            return
         number = isinstance(self.uncertainty, int | float)
         if not number or not 0 <= self.uncertainty < 1:
             refuse(f"calibration: uncertainty = {self.uncertainty!r}", "0 <= uncertainty < 1")
@@ -119,8 +121,10 @@ def read_chain(text: object) -> list[Factor]:
 
 def newtons_per_unit(
     unit: str, calibration: float | str | Calibration | None, counts: float | None, place: str
-) -> tuple[float, str, float]:
+) -> tuple[float, str, float | None]:
     """Return N per unit of the values, how that was found in words, and its relative uncertainty.
+
+    The uncertainty is None where it is not known.
 
     Parameters
     ----------
@@ -134,16 +138,16 @@ def newtons_per_unit(
         File and channel, for messages.
     """
     if unit == ASSUMED:
-        return 1.0, "values taken to be in N", 0.0
+        return 1.0, "values taken to be in N", None
     base, multiple = UNITS.get(unit, ("", 1.0))
     if calibration is None:
         if base != "N":
             refuse(f"{place}: the values are in {unit} and no calibration is given", EXAMPLES)
-        return multiple, f"values in {unit}", 0.0
+        return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
             refuse(f"{place}: calibration = {calibration!r} is not allowed", EXAMPLES)
-        return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", 0.0
+        return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
     known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
     factors = read_chain(known.chain)
     scale = Factor(counts, "counts", "FS") if counts else None

@@ -270,7 +270,7 @@ def average_estimates(
 
 def level_quantities(
     levels: AverageLevels,
-    calibration: float = 0.0,
+    calibration: float | None = None,
     plate: NDArray[np.float64] | None = None,
 ) -> tuple[Quantity, ...]:
     """Return average levels with their budgets, dB, shape (n_band,).
@@ -280,14 +280,14 @@ def level_quantities(
     levels
         Average over drops.
     calibration
-        Relative standard uncertainty of the force.
+        Relative standard uncertainty of the force; None where it is not known.
     plate : ndarray, shape (n_band,), optional
         Standard uncertainty from the correction of the force plate, dB.
     """
     count = len(levels.names)
-    shared: dict[str, NDArray[np.float64]] = {
-        "calibration": np.full(len(levels.level), DECIBEL * calibration)
-    }
+    shared: dict[str, NDArray[np.float64]] = {}
+    if calibration is not None:
+        shared["calibration"] = np.full(len(levels.level), DECIBEL * calibration)
     if plate is not None:
         shared["plate"] = plate
     return tuple(

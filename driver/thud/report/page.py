@@ -128,7 +128,7 @@ def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
     amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {listed} kHz"
     ways = list(dict.fromkeys(one["calibration"] for one in files if one["calibration"]))
     share = data["calibration_uncertainty"]
-    given = f"u = {100 * share:.2g} %" if share else "uncertainty not given"
+    given = f"u = {100 * share:.2g} %" if share is not None else "uncertainty not given"
     way = f"{ways[0]}{f' and {len(ways) - 1} more' if len(ways) > 1 else ''}" if ways else NOT_KNOWN
     instruments = [clip(_plain(one), SIZE, COLUMN - LABEL) for one in data["instruments"]]
     fitted = fit_lines(instruments, INSTRUMENT_LINES, lambda _: 1)
