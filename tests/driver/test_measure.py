@@ -16,7 +16,7 @@ from synthetic import make_recording
 
 import thud
 from thud import cli
-from thud.recordings.config import read_config
+from thud.recordings.config import Config, read_config
 from thud.recordings.verdict import average_estimates
 from thud.report.data import report_data
 
@@ -181,3 +181,42 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             )
             found = thud.Recording.from_array(force, rate).quantities["contact_time"]
             assert abs(found.value - truth) <= found.expanded
+
+
+NOT_GIVEN = "the uncertainty of the calibration is not given; it is not part of the uncertainties"
+
+
+def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:
+    """Return the budget of a criterion."""
+    found = recording.conformity().decisions[criterion].quantity.contributions
+    return {part.name: part.uncertainty for part in found}
+
+
+def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() -> None:
+    file, table = FOLDER / "drop_1.wav", FOLDER / "drop_1.csv"
+    unknown = thud.read_recording(file, calibration="5000 N/FS")
+    assert unknown.calibration_uncertainty is None
+    assert NOT_GIVEN in unknown.remarks
+    assert "calibration" not in parts(unknown, 0)
+    config = replace(read_config(FOLDER / "lab.toml"), polarity=None)
+    number = Config(calibration=1.0, calibration_uncertainty=0.005)
+    for known in (
+        thud.read_recording(file, config=config, calibration="5000 N/FS"),
+        thud.read_recording(table, config=replace(config, calibration=None)),
+        thud.read_recording(table, calibration_uncertainty=0.005),
+        thud.read_recording(table, unit="V", config=number),
+    ):
+        assert known.calibration_uncertainty == 0.005
+        assert NOT_GIVEN not in known.remarks
+        assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
+    with pytest.raises(thud.InputError, match="calibration_uncertainty = -1 is not allowed"):
+        thud.read_recording(table, calibration_uncertainty=-1)
+
+
+def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> None:
+    known = example("drop_1.wav", tmp_path)
+    unknown = example("drop_1.wav", tmp_path, ("f0_uncertainty = 0.005", "# "))
+    told = "the uncertainty of the resonance of the plate is not given"
+    assert not any(told in remark for remark in known.remarks)
+    assert any(told in remark for remark in unknown.remarks)
+    assert parts(known, 4)["plate"] == pytest.approx(0.061, abs=2e-3)

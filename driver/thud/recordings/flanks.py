@@ -26,8 +26,8 @@ CLASSES = np.array([
     [0.0, 0.12, 0.06, 0.12],
     [0.0, 0.12, 0.06, 0.5],
 ])  # fmt: skip
-# What these shapes leave of the time, s: errors of the method over the models, by class. Soft feet of
-# finite elements are off by up to 0.36 ms in both edges together, whatever the noise.
+# What these shapes leave of the time, s: errors of the method over the models, by class. Soft feet
+# of finite elements are off by up to 0.36 ms in both edges together, whatever the noise.
 LEFT = 1e-6 * np.array([5.0, 5.0, 5.0, 150.0, 180.0])
 # What these shapes miss of a flank, as part of the force itself: of smooth classes and of rough.
 MISSED = (0.005, 0.1)
