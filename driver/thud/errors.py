@@ -22,7 +22,7 @@ class PlausibilityWarning(UserWarning):
 
 
 class ReportWarning(UserWarning):
-    """A report lacks its PDF or some letters."""
+    """A report lacks a file or some letters, or replaces that of another recording."""
 
 
 class InputError(ThudError, ValueError):

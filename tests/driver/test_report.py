@@ -201,12 +201,13 @@ def numbers(recording: Recording) -> list[list[str]]:
         recording.conformity().decisions, [(1.0, 2)] * 5 + list(STYLES), strict=True
     ):
         value = decision.value / unit
+        is_bound, is_count = decision.quantity.upper_bound, decision.name == "peak_count"
         limits = [f"{end / unit:g}" for end in (decision.lower, decision.upper)]
         cells = ["not known" if np.isnan(value) else f"{value:.{places}f}"]
         if decision.quantity.contributions and not np.isnan(value):
             cells.append(f"{decision.quantity.expanded / unit:.{places + 1}f}")
         cells.append(" to ".join(dict.fromkeys(limits)))
-        if not (decision.quantity.upper_bound or np.isnan(value)):
+        if not (is_bound or is_count or np.isnan(value)):
             cells.append(f"{decision.margin / unit:.{places}f}")
         rows.append([*cells, decision.verdict])
     return rows

@@ -76,7 +76,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
 def criteria_data(recording: Recording, source: LimitsSource | None = None) -> list[dict[str, Any]]:
     """Return the criteria of a recording with their budgets, as JSON has them.
 
-    An uncertainty that nobody states is None, and so is the margin of an upper bound.
+    An uncertainty that nobody states is None; so is the margin of an upper bound or a count.
     """
     verdict = recording.conformity(source)
     found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.decisions))
@@ -150,7 +150,7 @@ def _criteria(
                 "lower": one.lower,
                 "upper": one.upper,
                 "limits_of_standard": (one.lower, one.upper) == (usual.lower, usual.upper),
-                "margin": None if quantity.upper_bound else one.margin,
+                "margin": None if quantity.upper_bound or one.lower == one.upper else one.margin,
                 "probability": one.probability,
                 "verdict": one.verdict,
                 "spread": spreads.get(f"{i}" if is_level else one.name),
