@@ -220,3 +220,52 @@ def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> N
     assert not any(told in remark for remark in known.remarks)
     assert any(told in remark for remark in unknown.remarks)
     assert parts(known, 4)["plate"] == pytest.approx(0.061, abs=2e-3)
+
+
+def test_peaks_of_noise_that_were_counted_as_exact() -> None:
+    time = np.arange(0, 0.02, 1 / 48_000)
+    pulse = 1500 * np.sin(np.pi * time / 0.02)
+    # Two peaks, the valley between them 25 % lower.
+    double = pulse * (1 - 0.35 * np.exp(-(((time - 0.01) / 0.002) ** 2)))
+    for force, noise_db, expected in ((pulse, 60, 1), (double, 60, 2), (double, 20, np.nan)):
+        record, _ = make_recording(force, 48_000, noise_db=noise_db, seed=1)
+        found = thud.Recording.from_array(record, 48_000)
+        np.testing.assert_equal(found.quantities["peaks"].value, expected)
+        peaks = next(d for d in found.conformity().decisions if d.name == "peak_count")
+        known = "conforms" if expected == 1 else "does not conform"
+        assert peaks.verdict == (known if np.isfinite(expected) else "cannot be decided")
+        assert any("noise" in remark for remark in found.remarks) == np.isnan(expected)
+
+
+def test_weights_of_the_restitution_hold_the_calibration() -> None:
+    file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
+    for share in (0.0, 0.005, 0.5):
+        recording = thud.read_recording(file, config=config, calibration_uncertainty=share)
+        for drop in recording.drops:
+            by, other = drop.restitutions["impulse"], drop.restitutions["bounces"]
+            speed = np.sqrt(2 * 9.81 * 1.0)
+            scale = share * drop.impulse.value / (2.5 * speed)
+            weight = other.uncertainty**2 / (by.uncertainty**2 + scale**2 + other.uncertainty**2)
+            expected = weight * by.value + (1 - weight) * other.value
+            assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
+            assert drop.restitution_calibration == pytest.approx(weight * scale, rel=1e-9)
+        budget = recording.quantities["restitution"].contributions
+        shares = {part.name: part.uncertainty for part in budget}
+        mean = np.mean([drop.restitution_calibration for drop in recording.drops])
+        assert shares.get("calibration", 0.0) == pytest.approx(mean)
+
+
+def test_restitution_of_a_slower_bounce_that_was_judged() -> None:
+    config = replace(read_config(FOLDER / "lab.toml"), height=None)
+    recording = thud.read_recording(FOLDER / "three_drops.flac", config=config)
+    assert np.isnan(recording.restitution)
+    (decision,) = [d for d in recording.conformity().decisions if d.name == "restitution"]
+    assert decision.verdict == "cannot be decided"
+    assert sum("of the first bounce is 0.8" in remark for remark in recording.remarks) == 3
+
+
+def test_drops_without_a_restitution_are_told() -> None:
+    config = replace(read_config(FOLDER / "lab.toml"), mass=None)
+    files = [FOLDER / "drop_1.wav", FOLDER / "three_drops.flac"]
+    recording = thud.read_recording(files, config=config)
+    assert "the restitution is known of 3 of 4 drops" in recording.remarks

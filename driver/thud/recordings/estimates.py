@@ -63,6 +63,8 @@ class Drop:
         over ``force[gate[0]:gate[1]]`` and the expected energy of the noise is subtracted.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+    restitution_calibration : float
+        Standard uncertainty that the calibration makes of the restitution, beside that stated.
     restitution_by : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
@@ -83,6 +85,7 @@ class Drop:
     gate: tuple[int, int]
     contact_time: Estimate
     restitution: Estimate
+    restitution_calibration: float
     restitution_by: str
     restitutions: dict[str, Estimate]
     peak_force: Estimate
@@ -124,7 +127,12 @@ class Drop:
 
 
 def measure_drop(
-    window: Window, *, height: float | None = None, mass: float | None = None, gravity: float = 9.81
+    window: Window,
+    *,
+    height: float | None = None,
+    mass: float | None = None,
+    calibration_uncertainty: float = 0.0,
+    gravity: float = 9.81,
 ) -> Drop:
     """Return what one drop tells.
 
@@ -136,6 +144,8 @@ def measure_drop(
         Drop height of the lowest point, m.
     mass
         Mass of the source, kg.
+    calibration_uncertainty
+        Relative standard uncertainty of the force; it weights the restitution from the impulse.
     gravity
         Acceleration of free fall, m/s2.
 
@@ -177,6 +187,12 @@ def measure_drop(
         )
         leaving = again
     ways, told = _restitutions(impulse, contact_time, flights, height, mass, gravity)
+    scale = 0.0
+    if height and mass:
+        # Of 1 + e + g t/v0.
+        scale = calibration_uncertainty * impulse.value / (mass * math.sqrt(2 * gravity * height))
+    told += _told_difference(ways, scale)
+    restitution, calibration = _mean(ways, scale)
     time = (np.arange(*contact.span)) / rate - touch.value
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
@@ -187,7 +203,8 @@ def measure_drop(
         onset=window.start / rate + touch.value,
         gate=(first, stop),
         contact_time=contact_time,
-        restitution=_mean(list(ways.values())),
+        restitution=restitution,
+        restitution_calibration=calibration,
         restitution_by=" and ".join(ways),
         restitutions=ways,
         peak_force=_peak(contact),
@@ -308,34 +325,49 @@ def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formu
         ways["bounces"] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
     elif len(flights) > 1:
         one, two = flights[:2]
-        value = two.value / one.value
-        spread = math.hypot(two.uncertainty / two.value, one.uncertainty / one.value)
-        ways["bounces"] = Estimate(value, value * spread)
-        return ways, ("the restitution is that of the first bounce: the drop height is not known",)
-    if len(ways) > 1:
-        by, other = ways["impulse"], ways["bounces"]
-        difference = by.value - other.value
-        deviation = math.hypot(by.uncertainty, other.uncertainty)
-        if abs(difference) > NOTABLE * deviation:
-            told = (
-                f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
-                f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
-                "check mass, height and calibration"
-            )
-            return ways, (told,)
+        told = (
+            f"the restitution of the first bounce is {two.value / one.value:.3f}; that of the drop "
+            "itself is not known without the drop height"
+        )
+        return ways, (told,)
     return ways, ()
 
 
-def _mean(values: list[Estimate]) -> Estimate:
-    """Return the mean, weighted by 1/uncertainty2; its uncertainty grows with disagreement."""
-    if not values:
-        return Estimate(math.nan, math.nan)
-    weight = np.array([1 / max(v.uncertainty, 1e-12) ** 2 for v in values])
-    value = np.array([v.value for v in values])
+def _told_difference(ways: dict[str, Estimate], scale: float) -> tuple[str, ...]:
+    """Return a sentence where impulse and bounces differ; `scale` is what the calibration makes."""
+    if len(ways) < 2:  # noqa: PLR2004 - two ways
+        return ()
+    by, other = ways["impulse"], ways["bounces"]
+    difference = by.value - other.value
+    deviation = math.hypot(by.uncertainty, scale, other.uncertainty)
+    if abs(difference) <= NOTABLE * deviation:
+        return ()
+    told = (
+        f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
+        f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
+        "check mass, height and calibration"
+    )
+    return (told,)
+
+
+def _mean(ways: dict[str, Estimate], scale: float) -> tuple[Estimate, float]:
+    """Return the mean, weighted by 1/uncertainty2, and what the calibration makes of it.
+
+    The uncertainty of the impulse holds that of the calibration, `scale`; that of the mean is
+    without it, and grows with disagreement.
+    """
+    if not ways:
+        return Estimate.unknown(), 0.0
+    shared = np.array([scale if way == "impulse" else 0.0 for way in ways])
+    own = np.array([max(one.uncertainty, 1e-12) for one in ways.values()])
+    weight = 1 / (own**2 + shared**2)
+    value = np.array([one.value for one in ways.values()])
     mean = float(weight @ value / weight.sum())
     # Birge's ratio.
-    spread = float(weight @ (value - mean) ** 2) / max(len(values) - 1, 1)
-    return Estimate(mean, math.sqrt(max(1.0, spread) / weight.sum()))
+    spread = float(weight @ (value - mean) ** 2) / max(len(ways) - 1, 1)
+    calibration = float(weight @ shared / weight.sum())
+    variance = max(1.0, spread) / float(weight.sum()) - calibration**2
+    return Estimate(mean, math.sqrt(max(variance, 0.0))), calibration
 
 
 def _effective_mass(

@@ -65,6 +65,15 @@ class Noise:
         density: NDArray[np.float64] = self.white + self.pink / f + self.brown / f**2
         return density
 
+    def deviation_between(self, lower: float, upper: float) -> float:
+        """Return the standard deviation of the noise between two frequencies, N."""
+        parts = (
+            self.white * (upper - lower),
+            self.pink * np.log(upper / lower),
+            self.brown * (1 / lower - 1 / upper),
+        )
+        return float(np.sqrt(sum(parts)))
+
 
 def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     """Return covariances of means over cells that are equal or apart: [4, n_one, n_other].

@@ -17,7 +17,7 @@ from thud.display import MAKERS, Displayed
 from thud.levels import peak_count
 from thud.recordings.config import Config, check_key, read_config
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import Estimate, measure_drop
+from thud.recordings.estimates import RECORDED_BAND, Estimate, measure_drop
 from thud.recordings.faults import repair
 from thud.recordings.levels import (
     AverageLevels,
@@ -49,6 +49,10 @@ if TYPE_CHECKING:
 
 # Length of the ringing of a plate that a piece of a signal takes along, periods times quality.
 PERIODS = 2.0
+# Prominence of a peak that counts, as part of the peak force, and the least of it in standard
+# deviations of the noise.
+PROMINENCE = 0.1
+CLEAR_PEAK = 6.0
 
 
 @dataclass(frozen=True)
@@ -209,6 +213,11 @@ class Recording(Displayed):
             "calibration": self.calibration_uncertainty is None,
             "resonance of the plate": plate is not None and plate.f0_uncertainty is None,
         }
+        if math.isnan(self.quantities["peaks"].value):
+            found.append("the number of peaks is not known: noise may have made some")
+        known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
+        if 0 < known < len(self.drops):
+            found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
         found += [
             f"the uncertainty of the {what} is not given; it is not part of the uncertainties"
             for what in missing
@@ -271,15 +280,13 @@ class Recording(Displayed):
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
         """Contact time, restitution, peaks, mass and drop height with their budgets."""
-        scale = self.calibration_uncertainty or 0.0
-        known = [drop.restitution.value for drop in self.drops]
-        known = [value for value in known if math.isfinite(value)]
-        # Restitution from the impulse: I/(M v0) - 1 - g t/v0.
-        share = scale * (1 + float(np.mean(known))) if known else 0.0
-        by_impulse = any("impulse" in drop.restitution_by for drop in self.drops)
-        peaks = max(
-            peak_count(drop.force[slice(*drop.gate)], drop.sample_rate) for drop in self.drops
-        )
+        shares = [
+            drop.restitution_calibration
+            for drop in self.drops
+            if math.isfinite(drop.restitution.value)
+        ]
+        share = float(np.mean(shares)) if shares else 0.0
+        peaks = float(np.max([_peaks(drop) for drop in self.drops]))
         config = self.config
         times = [drop.contact_time for drop in self.drops]
         # The flanks of all drops have one shape: what is wrong with it does not average.
@@ -289,9 +296,9 @@ class Recording(Displayed):
             "contact_time": average_estimates(times, *edges),
             "restitution": average_estimates(
                 [drop.restitution for drop in self.drops],
-                *([Contribution("calibration", share)] if by_impulse and share else []),
+                *([Contribution("calibration", share)] if share else []),
             ),
-            "peaks": Quantity(float(peaks)),
+            "peaks": Quantity(peaks),
             "mass": Quantity(math.nan if config.mass is None else config.mass),
             "drop_height": Quantity(math.nan if config.height is None else config.height),
         }
@@ -439,16 +446,15 @@ def _recording(signals: Iterable[Signal], config: Config, *, progress: bool = Fa
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
-    for signal in signals:
+    for given in signals:
+        signal = given
+        if config.calibration_uncertainty is not None:
+            signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
         # Its many small products are slower by threads.
         with threadpool_limits(1, "blas"):
             found = _drops(signal, config, progress=progress)
         drops += found
-        uncertainties.append(
-            signal.calibration_uncertainty
-            if config.calibration_uncertainty is None
-            else config.calibration_uncertainty
-        )
+        uncertainties.append(signal.calibration_uncertainty)
         origins.append(_origin(signal, len(found)))
     if not drops:
         refuse("there are no recordings", "one file or more")
@@ -456,6 +462,16 @@ def _recording(signals: Iterable[Signal], config: Config, *, progress: bool = Fa
     known = [one for one in uncertainties if one is not None]
     uncertainty = max(known) if len(known) == len(uncertainties) else None
     return Recording(name, tuple(drops), tuple(origins), config, uncertainty)
+
+
+def _peaks(drop: Drop) -> float:
+    """Return the number of peaks of the force of a drop; NaN where noise may have made some."""
+    force = drop.force[slice(*drop.gate)]
+    count = peak_count(force, drop.sample_rate)
+    # Slower noise than the contact tilts the pulse, and makes no peak.
+    noise = drop.noise.deviation_between(1 / drop.contact_time.value, RECORDED_BAND)
+    clear = PROMINENCE * drop.peak_force.value >= CLEAR_PEAK * noise
+    return float(count) if clear or count == 1 else math.nan
 
 
 def _signals(path: str | os.PathLike[str], config: Config) -> list[Signal]:
@@ -516,7 +532,12 @@ class _Repaired:
 def _drops(signal: Signal, config: Config, *, progress: bool) -> list[Drop]:
     """Return the drops of a signal, the plate's resonance taken out before."""
     plate = _plate(config)
-    measure = partial(measure_drop, height=config.height, mass=config.mass)
+    measure = partial(
+        measure_drop,
+        height=config.height,
+        mass=config.mass,
+        calibration_uncertainty=signal.calibration_uncertainty or 0.0,
+    )
     if plate is None:
         return [measure(one) for one in find_windows(signal, progress=progress)]
     correction = correct_plate(np.zeros(8), signal.sample_rate, plate)[1]
