@@ -93,10 +93,19 @@ def test_two_impacts_that_meet_are_refused() -> None:
 
 def test_kilonewtons_for_newtons_are_told() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=50)
-    with pytest.raises(thud.InputError, match=r"peak force is 1\.\d+ N; is the unit kN\?"):
-        drops(force / 1e3, 48e3)
-    with pytest.raises(thud.InputError, match=r"peak force is 1\.\d+e\+06 N; is the unit mN\?"):
-        drops(force * 1e3, 48e3)
+    with pytest.raises(thud.InputError, match="peak is 1.5.* N; the unit is .* wrong, kN for N"):
+        thud.Recording.from_array(force / 1e3, 48e3)
+    with pytest.raises(thud.InputError, match=r"peak is 1\.5.*e\+06 N; .* wrong, mN for N"):
+        thud.Recording.from_array(force * 1e3, 48e3)
+
+
+def test_small_peaks_that_one_check_remarked_and_another_refused() -> None:
+    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
+    found = thud.Recording.from_array(force / 10, 48e3)
+    assert found.peak_force == pytest.approx(150, rel=0.01)
+    assert any("The peak is 150" in remark for remark in found.remarks)
+    with pytest.raises(thud.InputError, match="unit or calibration are wrong"):
+        thud.Recording.from_array(force / 1e4, 48e3)
 
 
 def aliased_levels(rate: float, start: float) -> np.ndarray:

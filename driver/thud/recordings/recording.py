@@ -18,6 +18,7 @@ from thud.levels import peak_count
 from thud.recordings.config import Config, check_key, read_config
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import RECORDED_BAND, Estimate, measure_drop
+from thud.recordings.excursion import doubt, scan
 from thud.recordings.faults import repair
 from thud.recordings.levels import (
     AverageLevels,
@@ -151,7 +152,9 @@ class Recording(Displayed):
         config = _checked(
             Config(height=height, mass=mass, calibration_uncertainty=calibration_uncertainty)
         )
-        return _recording([Signal.from_array(force, sample_rate, name)], config)
+        signal = Signal.from_array(force, sample_rate, name)
+        doubts = doubt(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
+        return _recording([replace(signal, remarks=doubts)], config)
 
     @property
     def time(self) -> NDArray[np.float64]:
