@@ -93,7 +93,7 @@ def test_two_impacts_that_meet_are_refused() -> None:
 
 def test_kilonewtons_for_newtons_are_told() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=50)
-    with pytest.raises(thud.InputError, match="peak is 1.5.* N; the unit is .* wrong, kN for N"):
+    with pytest.raises(thud.InputError, match=r"peak is 1\.5.* N; the unit is .* wrong, kN for N"):
         thud.Recording.from_array(force / 1e3, 48e3)
     with pytest.raises(thud.InputError, match=r"peak is 1\.5.*e\+06 N; .* wrong, mN for N"):
         thud.Recording.from_array(force * 1e3, 48e3)
