@@ -26,7 +26,6 @@ from thud.impact import Impact, solve_case
 from thud.levels import Bands, force_exposure_levels, get_bands, judge
 from thud.motion import Motion
 from thud.outcomes import Ensemble
-from thud.recording import Recording
 from thud.results import read_results
 from thud.studies import kinds
 
@@ -40,6 +39,8 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.recordings.recording import Recording as Recording
+    from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
     from thud.studies.design_map import DesignMap as DesignMap
     from thud.studies.design_map import design_map as design_map
@@ -68,7 +69,9 @@ _LATE = {
     "Comparison": "comparison",
     "compare": "comparison",
     "read_all": "comparison",
+    "Recording": "recordings.recording",
     "quantity": "units",
+    "read_recording": "recordings.recording",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
@@ -86,7 +89,6 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "Motion",
     "NumericalError",
     "PlausibilityWarning",
-    "Recording",
     "ThudError",
     "force_exposure_levels",
     "free_modes",
@@ -134,4 +136,6 @@ MAKERS.update(
     figure=_maker("plot.overview", "overview"),
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
+    recording=_maker("plot.recording", "recording_figure"),
+    report=_maker("report", "write_report"),
 )

@@ -25,13 +25,17 @@ from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 from thud.plot.levels import common_source
 from thud.plot.look import save_all
-from thud.recording import Recording
+from thud.recordings.recording import Recording, read_recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud._schema import LevelsForce, LimitsSource
     from thud.criteria import Criterion
+    from thud.recordings.verdict import Decision
+
+# Endings of namelist files; all others are recordings.
+NAMELISTS = (".nml", ".namelist", "")
 
 # Criteria after the octaves: name and unit, size of the unit, decimals.
 _ROWS = (
@@ -136,11 +140,13 @@ def _digits(force: float) -> str:
     return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
 
 
-def _cell(criterion: Criterion, unit: float, decimals: int) -> str:
+def _cell(criterion: Criterion | Decision, unit: float, decimals: int) -> str:
     """Return the value of a criterion, and how it misses its limits."""
     if np.isnan(criterion.value):
         return "not known"
     word = "" if criterion.conforms else "low" if criterion.value < criterion.lower else "high"
+    if not criterion.conforms and criterion.lower <= criterion.value <= criterion.upper:
+        word = "open"
     return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
 
 
@@ -258,7 +264,7 @@ def _name(given: object) -> str:
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:
-    """Read namelist files and recordings (``.csv``); their names are those of the cases or files.
+    """Read namelist files (``.nml``) and recordings; their names are those of cases and files.
 
     Raises
     ------
@@ -268,11 +274,8 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Record
     found: dict[str, Case | Recording] = {}
     for path in map(Path, paths):
         given: Case | Recording
-        if path.suffix.lower() == ".csv":
-            name, given = path.stem, Recording.from_csv(path)
-        else:
-            given = read_case(path)
-            name = given.name
+        given = read_case(path) if path.suffix.lower() in NAMELISTS else read_recording(path)
+        name = given.name
         if name in found:
             message = f"{path}: {name!r} also names another input; allowed: different names"
             raise InputError(message)

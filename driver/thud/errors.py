@@ -21,6 +21,10 @@ class PlausibilityWarning(UserWarning):
     """What was computed is possible but not plausible."""
 
 
+class ReportWarning(UserWarning):
+    """A report lacks a file or some letters, or replaces that of another recording."""
+
+
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 

@@ -9,7 +9,10 @@ import sysconfig
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
+
+import thud
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -21,6 +24,14 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
 MINIMAL = "&ball /\n&drop /\n&model /\n"
+
+
+def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
+    """Return what a force plate with little noise records of an impact."""
+    quiet = int(0.1 * impact.sample_rate)
+    force = np.pad(impact.floor_force, quiet)
+    force += np.random.default_rng(1).normal(scale=0.5, size=len(force))
+    return thud.Recording.from_array(force, impact.sample_rate, **known)
 
 
 @pytest.fixture(scope="session")

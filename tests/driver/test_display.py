@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 import xarray as xr
+from conftest import recorded
 
 import thud
 from thud.display import html_table
@@ -29,7 +30,7 @@ def impact() -> thud.Impact:
 def results() -> list[Displayed]:
     many = thud.solve_many({"mass": [2.5, -1.0]})
     judged = impact().conformity()
-    record = thud.Recording(impact().time, impact().floor_force, impact().sample_rate)
+    record = recorded(impact())
     modes = thud.free_modes(count=2, radial_elements=2, polar_elements=16)
     grid = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
     studies = [
@@ -74,9 +75,9 @@ def test_texts_name_verdicts_and_numbers() -> None:
 
 
 def test_unknown_criteria_are_not_met() -> None:
-    record = thud.Recording(impact().time, impact().floor_force, impact().sample_rate)
-    verdicts = {name: verdict for name, _, _, verdict in record.conformity().rows()}
-    assert verdicts["restitution"] == "is not known"
+    record = recorded(impact())
+    verdicts = {row[0]: row[-1] for row in record.conformity().rows()}
+    assert verdicts["restitution"] == "cannot be decided"
     assert verdicts["all criteria"] == "cannot be decided"
 
 
@@ -99,10 +100,12 @@ def test_figure_shows_force_and_levels() -> None:
     assert history.get_xlabel() == "Time since first touch, ms"
     (line,) = [line for line in octaves.lines if len(line.get_xdata()) == 5]
     np.testing.assert_array_equal(line.get_ydata(), impact().levels())
-    record = thud.Recording(impact().time, impact().floor_force, impact().sample_rate)
-    _, octaves = record.plot("tyre").axes
+    record = recorded(impact())
+    (octaves,) = record.plot().axes
     labels = octaves.get_legend_handles_labels()[1]
-    assert labels == ["Tolerance, tyre", "Nominal", "recording"]
+    assert labels[:2] == ["Tolerance, rubber ball", "Nominal"]
+    (forces,) = record.plot("force").axes
+    assert forces.get_xlabel() == "Time since first touch, ms"
 
 
 def test_dataset_of_an_impact_has_units_and_provenance(tmp_path: Path) -> None:

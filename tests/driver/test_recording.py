@@ -9,6 +9,7 @@ import pytest
 
 import thud
 from thud.columns import read_table
+from thud.record import read_record
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -25,16 +26,15 @@ def test_rounded_times_are_even(form: str, begin: float) -> None:
     written = np.array([float(format(value, form)) for value in time])
     if form == ".6e" and begin > 1:
         with pytest.raises(thud.InputError, match="not evenly spaced"):  # 0.1 ms are four steps
-            thud.Recording.from_arrays(np.column_stack([written, FORCE]))
+            read_record(np.column_stack([written, FORCE]))
         return
-    record = thud.Recording.from_arrays(np.column_stack([written, FORCE]))
+    record = read_record(np.column_stack([written, FORCE]))
     # The slope of a line through n points of standard deviation s has that of s sqrt(12 / n^3).
     digit = float(np.abs(written - time).max())
     assert record.sample_rate == pytest.approx(
         RATE, rel=4 * digit / np.sqrt(3) * RATE * np.sqrt(12 / 500**3) + 1e-9
     )
-    first = int(np.flatnonzero(FORCE > 0.01)[0])
-    assert record.origin == pytest.approx(begin + first / RATE, abs=digit + 1e-12)
+    assert record.time[0] == pytest.approx(begin, abs=digit + 1e-12)
 
 
 @pytest.mark.parametrize(
@@ -48,13 +48,13 @@ def test_rounded_times_are_even(form: str, begin: float) -> None:
 )
 def test_uneven_times_are_told(fault: np.ndarray, words: str) -> None:
     with pytest.raises(thud.InputError, match=f"not evenly spaced: .*{words}"):
-        thud.Recording.from_arrays(np.column_stack([(TIME + fault).round(9), FORCE]))
+        read_record(np.column_stack([(TIME + fault).round(9), FORCE]))
 
 
 def test_gap_is_told_however_the_times_are_rounded() -> None:
     time = np.delete(TIME, 100).round(5)
     with pytest.raises(thud.InputError, match=r"not evenly spaced: row \d+, .* to 0\.25 steps"):
-        thud.Recording.from_arrays(np.column_stack([time, FORCE[:-1]]))
+        read_record(np.column_stack([time, FORCE[:-1]]))
 
 
 @pytest.mark.parametrize(
@@ -96,16 +96,16 @@ def test_columns_are_read_whatever_is_between(line: str, head: str, tmp_path: Pa
         ("".join(f"{i},0\n" for i in range(9)), "nowhere positive"),
     ],
 )
-def test_useless_recordings_are_told(tmp_path: Path, text: str, words: str) -> None:
+def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "plate.csv").write_text(text)
     with pytest.raises(thud.InputError, match=rf"plate\.csv: .*({words}).*; allowed: ") as caught:
-        thud.Recording.from_csv(tmp_path / "plate.csv")
+        read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
     assert "\n" not in str(caught.value)
 
 
-def test_missing_recording_is_told(tmp_path: Path) -> None:
+def test_missing_record_is_told(tmp_path: Path) -> None:
     with pytest.raises(thud.InputError, match=r"no\.csv: cannot be read .*; allowed: columns"):
-        thud.Recording.from_csv(tmp_path / "no.csv")
+        read_table(tmp_path / "no.csv")
 
 
 def test_force_of_the_wrong_sign_is_told() -> None:

@@ -6,6 +6,8 @@ import warnings
 from pathlib import Path
 from tempfile import mkdtemp
 
+import numpy as np
+
 import thud
 
 folder = Path(mkdtemp())
@@ -32,10 +34,13 @@ modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_e
 bands: thud.Bands = thud.get_bands("third")
 thirds = thud.force_exposure_levels(flagship.floor_force, flagship.sample_rate, "third", "fft")
 many: thud.Ensemble = thud.solve_many({"height": [0.5, 1.0]}, case, source=thud.Limits().source)
-record = thud.Recording(flagship.time, flagship.floor_force, flagship.sample_rate)
+noise = np.random.default_rng(1).normal(scale=0.5, size=8000 + len(flagship.time))
+plate = np.pad(flagship.floor_force, 4000) + noise
+np.savetxt(folder / "record.csv", np.c_[np.arange(len(plate)) / flagship.sample_rate, plate])
+record: thud.Recording = thud.read_recording(folder / "record.csv", height=1.0, mass=2.5)
 page: thud.Comparison = thud.compare({**impacts, "record": record}, force="floor")
 cases = thud.read_all([folder / "mine.nml"])
-for figure in (flagship.plot(), record.plot("tyre"), thud.plot.levels(impacts), page.figure()):
+for figure in (flagship.plot(), record.plot("force"), thud.plot.levels(impacts), page.figure()):
     thud.plot.save(figure, folder / "figure.png")
 tables = flagship.to_dataframe().describe(), flagship.to_xarray().sizes, many.to_xarray().sizes
 height = {"height": thud.Parameter(values=[0.5, 1.0])}

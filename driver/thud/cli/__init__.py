@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING, NoReturn
 from thud._api import version
 from thud.checks import suggestion
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
+from thud.cli.history import run_history
+from thud.cli.measure import MEASURE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
 from thud.errors import InputError, ThudError
@@ -68,6 +71,25 @@ COMMANDS = {
         ),
         compare_cases,
         "nothing is written",
+    ),
+    "measure": MEASURE,
+    "export": EXPORT,
+    "history": Command(
+        "control chart of a ball from its calibration reports",
+        (
+            argument(
+                "reports",
+                nargs="+",
+                metavar="REPORT",
+                help="report.json files, or directories that hold them",
+            ),
+            output("the chart (default: outputs/history)", default="outputs/history"),
+            argument(
+                "--different-balls", action="store_true", help="allow reports of different balls"
+            ),
+            QUIET,
+        ),
+        run_history,
     ),
     **study_commands(),
     "figures": Command(

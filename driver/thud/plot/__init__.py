@@ -18,6 +18,7 @@ from thud.plot.comparison import comparison_page as comparison_page
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
 from thud.plot.force_history import force_history as force_history
+from thud.plot.history import draw_history as draw_history
 from thud.plot.level_changes import level_changes as level_changes
 from thud.plot.levels import levels as levels
 from thud.plot.look import COLOURS as COLOURS
@@ -37,6 +38,8 @@ from thud.plot.loss_factor import loss_factor as loss_factor
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion
+from thud.plot.recording import recording_forces as recording_forces
+from thud.plot.recording import recording_levels as recording_levels
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
 from thud.plot.sweep import draw_sweep as draw_sweep
 from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty

@@ -11,7 +11,7 @@ from thud.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
 from thud.plot.look import SIZE, WIDTH, dress, legend_above, level_label, literal, new_figure
-from thud.recording import Recording
+from thud.recordings.recording import Recording
 
 # Size of a letter and of a line of the table, inch; letters of a name on one line.
 _LETTER, _LINE = 0.062, 0.17

@@ -14,7 +14,7 @@ from thud.impact import Impact
 from thud.levels import get_bands, octave_limits
 from thud.plot.force_history import TIME_LABEL, contact_force, force_label
 from thud.plot.look import BAND_WORDS, COLOURS, iterate_curves, level_label, styled
-from thud.recording import Recording
+from thud.recordings.recording import Recording
 
 # Line styles and markers of `thud.plot.look` by the names of plotly.
 _DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")

@@ -22,8 +22,9 @@ from thud.plot.look import (
     literal,
     named,
 )
-from thud.recording import NOISE
 
+# Fraction of the maximum force that a contact exceeds.
+NOISE = 0.01
 # Time that is drawn before and after the contact, as fraction of it.
 MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"

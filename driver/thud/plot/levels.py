@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from thud._schema import BandSet, Levels, LevelsForce, LevelsMethod, LimitsSource
 from thud.checks import refuse
@@ -75,7 +76,7 @@ def draw_levels(
     method: LevelsMethod | None = None,
 ) -> None:
     """Draw levels in the axes of their bands; those of the octaves have the tolerance band."""
-    draw_tolerance(panels["octave"], source)
+    draw_tolerance(panels["octave"], *octave_limits(source), source.replace("_", " "))
     # Side by side, equal levels can be told apart.
     step = min(0.1, 0.6 / len(impacts))
     for bands, axes in panels.items():
@@ -104,10 +105,11 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
     return found.pop() if found else "rubber_ball"
 
 
-def draw_tolerance(axes: Axes, source: LimitsSource) -> None:
+def draw_tolerance(
+    axes: Axes, lower: NDArray[np.float64], upper: NDArray[np.float64], name: str
+) -> None:
     """Draw the range of each octave as a grey box with its nominal value."""
-    lower, upper = octave_limits(source)
-    octave_boxes(axes, lower, upper, f"Tolerance, {source.replace('_', ' ')}")
+    octave_boxes(axes, lower, upper, f"Tolerance, {name}")
     for place, nominal in enumerate((lower + upper) / 2):
         line = [place - 0.4, place + 0.4]
         label = "Nominal" if place == 0 else None

@@ -21,7 +21,7 @@ from thud.errors import InputError
 from thud.files import replace_file
 from thud.impact import Impact
 from thud.levels import get_bands
-from thud.recording import Recording
+from thud.recordings.recording import Recording
 
 Curve = TypeVar("Curve", bound=Impact | Recording)
 

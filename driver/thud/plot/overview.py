@@ -7,7 +7,7 @@ from thud.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
 from thud.plot.look import SIZE, dress, legend_above, level_label, new_figure
-from thud.recording import Recording
+from thud.recordings.recording import Recording
 
 
 def overview(impact: Impact | Recording, source: LimitsSource = "rubber_ball") -> Figure:

@@ -21,7 +21,9 @@ from thud.checks import (
 from thud.columns import read_table
 from thud.errors import FitWarning
 from thud.key import check_keywords
-from thud.recording import Recording
+from thud.record import read_record
+from thud.recordings.formats import FORMATS as RECORDING_FORMATS
+from thud.recordings.recording import Recording, read_recording
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
@@ -50,7 +52,7 @@ OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
 # Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
 # What [target] may hold, and the units of its numbers.
-FORCE_KEYS = ("file", *(f.name for f in fields(ForceTarget) if f.name != "record"))
+FORCE_KEYS = ("file", "config", *(f.name for f in fields(ForceTarget) if f.name != "record"))
 LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
 TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
 
@@ -261,12 +263,34 @@ def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarg
     if not isinstance(options.get("time_shift", True), bool):
         given = options["time_shift"]
         refuse_value("[target] time_shift", given, "true, false")
-    name = options.pop("file")
-    if not isinstance(name, str) or not name.strip():
-        refuse_value("[target] file", name, "text in quotes")
-    samples = read_table(folder / name)
-    Recording.from_arrays(samples, str(folder / name))  # refuses what is not a recording
-    return ForceTarget((samples[:, 0], samples[:, 1]), **options)
+    paths = {word: options.pop(word) for word in ("file", "config") if word in options}
+    for word, name in paths.items():
+        if not isinstance(name, str) or not name.strip():
+            refuse_value(f"[target] {word}", name, "text in quotes")
+    return ForceTarget(
+        _read_record(
+            folder / paths["file"],
+            folder / paths["config"] if "config" in paths else None,
+            measured=bool({"config", "drop"} & set(table)),
+        ),
+        **options,
+    )
+
+
+def _read_record(
+    path: Path, config: Path | None, *, measured: bool
+) -> Recording | tuple[ArrayLike, ArrayLike]:
+    """Return the record of a file.
+
+    Tables of time and force are taken as they are unless they shall be measured; a model, or
+    another program, may have written them.
+    """
+    others = {end for one in RECORDING_FORMATS if one.module != "text" for end in one.suffixes}
+    if measured or path.suffix.lower() in others:
+        return read_recording(path, config=config)
+    samples = read_table(path)
+    read_record(samples, str(path))  # refuses what is not a record
+    return samples[:, 0], samples[:, 1]
 
 
 def _measured(place: str, given: object, unit: str) -> tuple[float, float]:

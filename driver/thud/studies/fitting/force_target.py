@@ -9,15 +9,17 @@ import numpy as np
 from scipy import stats
 from scipy.signal import ZoomFFT
 
-from thud.checks import refuse, refuse_value, require_choice
+from thud.checks import refuse, refuse_value, require_choice, require_whole
 from thud.impact import FORCES, Impact
-from thud.recording import MIN_ROWS, Recording
+from thud.record import MIN_ROWS, Record, read_record
+from thud.recordings.recording import Recording
 from thud.studies.fitting.misfit import Misfit, require_positive
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud._schema import LevelsForce
+    from thud.recordings.estimates import Drop
 
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 BELOW = 1250.0
@@ -31,6 +33,8 @@ END = 1e-3
 MIN_FREEDOM = 5
 SURE = 0.999
 NUMERICAL = 1e-4
+# Quiet with fewer independent values in the band does not tell the noise.
+MIN_QUIET = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +51,8 @@ class ForceTarget:
     record : Recording, Impact or pair of array_like
         The force; of arrays: time, s, and force, N, both of shape (n_sample,).
     noise : float or None
-        Standard deviation of the noise of one sample, N; None: it is estimated from the residual.
+        Standard deviation of the noise of one sample, N; None: that of the quiet around a measured
+        drop, in the compared band, and otherwise it is estimated from the residual.
     force : str or None
         ``"floor"`` (what a force plate measures) or ``"elastic"``: the force of the model, and
         of an impact as target.
@@ -56,7 +61,10 @@ class ForceTarget:
     below : float
         Highest frequency that is compared, Hz.
     window : tuple of float or None
-        Begin and end, s, of the part of the record that counts; None: all of it.
+        Begin and end, s, of the part of the record that counts; None: all of it. The time of a
+        measured drop is 0 at first touch.
+    drop : int
+        Number of the drop of a recording that has several, from 1.
     """
 
     record: Recording | Impact | tuple[ArrayLike, ArrayLike]
@@ -65,6 +73,7 @@ class ForceTarget:
     time_shift: bool | None = None
     below: float = BELOW
     window: tuple[float, float] | None = None
+    drop: int = 1
 
     def misfit(self) -> ForceMisfit:
         """Return what the fit needs of the target."""
@@ -74,6 +83,8 @@ class ForceTarget:
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
+        count = len(self.record.drops) if isinstance(self.record, Recording) else 1
+        require_whole("target: drop", self.drop, 1, count)
         time, force, rate = self._samples()
         if self.window is not None:
             time, force = _cut(time, force, self.window)
@@ -89,14 +100,18 @@ class ForceTarget:
                 f"target: the force ends with {last / force.max():.0%} of its peak",
                 "a record of a whole impact",
             )
-        return ForceMisfit(time, force, rate, self.noise, kind, self.below, free_shift=shift)
+        noise = self.noise
+        if noise is None and isinstance(self.record, Recording):
+            noise = _quiet_noise(self.record.drops[self.drop - 1], self.below)
+        return ForceMisfit(time, force, rate, noise, kind, self.below, free_shift=shift)
 
-    def _samples(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def _samples(self) -> Record:
         given = self.record
         if isinstance(given, Recording):
-            return given.time, given.record, given.sample_rate
+            drop = given.drops[self.drop - 1]
+            return Record(drop.time, drop.force, drop.sample_rate)
         if isinstance(given, Impact):
-            return given.time, given.force(self.force), given.sample_rate
+            return Record(given.time, given.force(self.force), given.sample_rate)
         try:
             table = np.column_stack([np.asarray(column, dtype=np.float64) for column in given])
         except (TypeError, ValueError) as error:
@@ -106,8 +121,24 @@ class ForceTarget:
                 "time, s, and force, N",
                 error,
             )
-        recording = Recording.from_arrays(table, "target")
-        return recording.time + recording.origin, recording.record, recording.sample_rate
+        return read_record(table, "target")
+
+
+def _quiet_noise(drop: Drop, below: float) -> float | None:
+    """Return the deviation of white noise that has the density of the quiet below a frequency, N.
+
+    The deviation of the samples would count what is above that frequency. None where there is too
+    little quiet.
+    """
+    first, stop = drop.gate
+    power, count = 0.0, 0
+    for quiet in (drop.force[:first], drop.force[stop:]):
+        number = 1 + int(below * len(quiet) / drop.sample_rate)
+        if len(quiet) > 1:
+            spectrum = np.fft.rfft(quiet, norm="ortho")[:number]
+            power += float((_parts(spectrum) ** 2).sum())
+            count += 2 * len(spectrum) - 1
+    return float(np.sqrt(power / count)) if count >= MIN_QUIET and power > 0 else None
 
 
 def _cut(

@@ -1,0 +1,77 @@
+"""The command that writes the force of a case or a recording for other programs."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thud.case import read_case
+from thud.checks import refuse
+from thud.cli.command import QUIET, Command, argument, output
+from thud.impact import compute
+
+if TYPE_CHECKING:
+    import argparse
+
+    from thud.impact import Impact
+    from thud.recordings.recording import Recording
+
+# By option: what it writes.
+KINDS = {
+    "wav": "32-bit floats, with their scale in a text file beside it",
+    "csv": "table of time and force",
+    "uff": "universal file, data set 58",
+    "mat": "MATLAB file of time, force and spectrum",
+    "spectrum": "table of the complex spectrum",
+}
+
+
+def run_export(options: argparse.Namespace) -> int:
+    """Write the blocked force in the formats that are asked for; return the exit code."""
+    from thud import export_force  # noqa: PLC0415 - SciPy takes its time
+
+    chosen = [kind for kind in KINDS if getattr(options, kind)]
+    if not chosen:
+        refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
+    source = _read(options.source, options.config)
+    for remark in source.remarks:
+        print(f"thud-driver: {remark}", file=sys.stderr)
+    force = export_force.blocked_force(source, drop=options.drop, rate=options.rate)
+    folder = Path(options.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    for kind in chosen:
+        ending, export = export_force.EXPORTS[kind]
+        paths = export(force, folder / f"{force.name}{ending}")
+        if not options.quiet:
+            print(*paths, sep="\n")
+    return 0
+
+
+def _read(path: str, config: str | None) -> Impact | Recording:
+    """Return the impact of a case, or the recording, of a file."""
+    from thud.recordings.formats import FORMATS  # noqa: PLC0415 - SciPy takes its time
+    from thud.recordings.recording import read_recording  # noqa: PLC0415 - likewise
+
+    endings = {ending for one in FORMATS for ending in one.suffixes}
+    if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte
+        return read_recording(path, config=config)
+    if config is not None:
+        refuse(f"{path}: --config {config} is of recordings", "none for a case")
+    return compute(read_case(path))
+
+
+EXPORT = Command(
+    "write the blocked force of a case or a recording for other programs",
+    (
+        argument("source", metavar="CASE.nml|RECORDING", help="namelist file, or recording"),
+        *(argument(f"--{kind}", action="store_true", help=what) for kind, what in KINDS.items()),
+        output("the files (default: outputs/export)", default="outputs/export"),
+        argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
+        argument("--drop", type=int, default=1, help="drop of a recording (default: 1)"),
+        argument("--config", metavar="LAB.toml", help="configuration of a recording"),
+        QUIET,
+    ),
+    run_export,
+)

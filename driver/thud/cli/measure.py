@@ -1,0 +1,93 @@
+"""The command that measures recordings: levels, verdict, figures, report."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.errors import ReportWarning
+from thud.levels import SOURCES
+from thud.tables import format_rows
+
+if TYPE_CHECKING:
+    import argparse
+
+NOT_CONFORMING = 3
+
+
+def measure(options: argparse.Namespace) -> int:
+    """Measure recordings, print the verdict and save results; return the exit code."""
+    from thud.recordings import results  # noqa: PLC0415 - SciPy takes its time
+    from thud.recordings.recording import read_recording  # noqa: PLC0415
+
+    recording = read_recording(
+        options.drops,
+        height=options.height,
+        mass=options.mass,
+        source=options.source,
+        channel=int(options.channel) if (options.channel or "").isdigit() else options.channel,
+        unit=options.unit,
+        calibration=options.calibration,
+        calibration_uncertainty=options.calibration_uncertainty,
+        polarity=options.polarity,
+        sample_rate=options.sample_rate,
+        config=options.config,
+        progress=not options.quiet and sys.stderr.isatty(),
+    )
+    verdict = recording.conformity()
+    if not options.quiet:
+        print(format_rows(results.drop_table(recording)))
+        print()
+        print(format_rows(results.table(recording)))
+        print()
+        for step in recording.steps:
+            print(f"  {step}")
+        print(f"  {results.verdict_sentence(recording)}")
+    for remark in recording.remarks:
+        print(f"thud-driver: {remark}", file=sys.stderr)
+    folder = Path(options.output or Path("outputs", recording.name))
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", ReportWarning)
+        results.save(recording, folder, figures=not options.no_figures)
+    for warning in found:
+        print(f"thud-driver: {warning.message}", file=sys.stderr)
+    if not options.quiet:
+        print(f"Results: {folder}")
+    return NOT_CONFORMING if options.check and not verdict else 0
+
+
+MEASURE = Command(
+    "levels, verdict and calibration report of recorded drops",
+    (
+        argument(
+            "drops", nargs="+", metavar="FILE", help="recordings, with one or many drops each"
+        ),
+        argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
+        argument("--mass", type=float, metavar="KG", help="mass of the source"),
+        argument("--height", type=float, metavar="M", help="drop height"),
+        argument("--config", metavar="LAB.toml", help="laboratory, instruments, calibration"),
+        argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
+        argument("--unit", help="unit of the recorded values, where the file does not say it"),
+        argument(
+            "--calibration", metavar="N/UNIT", help='such as "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+        ),
+        argument(
+            "--calibration-uncertainty",
+            type=float,
+            metavar="PART",
+            help="relative standard uncertainty of the calibration, such as 0.005",
+        ),
+        argument(
+            "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
+        ),
+        argument("--sample-rate", type=float, metavar="HZ", help="where the file does not say it"),
+        output("the results (default: outputs/<name of the first file>)"),
+        argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
+        NO_FIGURES,
+        QUIET,
+    ),
+    measure,
+)

@@ -1,0 +1,173 @@
+"""N per unit from a record of a known force."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.checks import refuse, require_number
+from thud.recordings.channel import shown_path
+from thud.recordings.formats import read_channels
+from thud.recordings.reading import choose_channels, regular_file
+from thud.recordings.signal import Signal
+from thud.recordings.units import ALLOWED, Calibration, find_unit, require_unit
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+GRAVITY = 9.81
+# Number of means that stand for a record, and of those that a plateau needs.
+MEANS = 4096
+PLATEAU = 8
+# Shares of the step at which it counts as gone up and down, and of a plateau left out at its ends.
+UP, DOWN = 0.6, 0.4
+SETTLING = 0.1
+# Maximum relative uncertainty of the step.
+UNSURE = 0.1
+
+
+def calibrate(  # noqa: PLR0913 - the keys of the configuration
+    record: Signal | str | os.PathLike[str],
+    *,
+    force: float | None = None,
+    mass: float | None = None,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    gravity: float = GRAVITY,
+    uncertainty: float = 0.0,
+) -> Calibration:
+    """Return N per unit from a record in which a known force is put on or taken off the plate.
+
+    Lines are fitted to the levels on both sides of each step, which takes out offset and drift.
+
+    Parameters
+    ----------
+    record
+        File, or a signal in the unit that is to be calibrated.
+    force, mass
+        Either the known force, N, or the known mass, kg.
+    channel
+        Number or name of the channel of a file.
+    unit
+        Unit of the values, where the file does not say it.
+    gravity
+        Acceleration of gravity at the place, m/s2.
+    uncertainty
+        Relative standard uncertainty of the known force.
+
+    Returns
+    -------
+    Calibration
+        Its uncertainty holds that of the step: from the residuals of the lines or, where that is
+        larger, from the scatter of several steps.
+
+    Raises
+    ------
+    InputError
+        Where not one of force and mass is given, or the record has no clear step.
+    """
+    if (force is None) == (mass is None):
+        refuse("calibrate(): give one of force and mass", "force in N or mass in kg")
+    newtons = force if force is not None else (mass or 0.0) * gravity
+    require_number("calibrate(): force", newtons)
+    if not newtons > 0 or not 0 <= uncertainty < 1:
+        refuse(
+            f"calibrate(): {newtons:g} N with a relative uncertainty of {uncertainty:g}",
+            "a positive force, 0 <= uncertainty < 1",
+        )
+    name, word, samples, count = _source(record, channel, unit)
+    steps = _steps(_means(samples, count), name)
+    size, deviation = _mean(steps)
+    if deviation > UNSURE * size:
+        refuse(
+            f"{name}: the step is {size:.4g} {word} with an uncertainty of {deviation:.2g} {word}",
+            f"a step that is known to {UNSURE:.0%}",
+        )
+    known = f"{newtons:.6g} N" if mass is None else f"{mass:g} kg"
+    return Calibration(
+        f"{newtons / size!r} N/{word}",
+        math.hypot(deviation / size, uncertainty),
+        f"{len(steps)} step{'s' * (len(steps) > 1)} of {known} in {name}",
+    )
+
+
+def _source(
+    record: Signal | str | os.PathLike[str], channel: int | str | None, unit: str | None
+) -> tuple[str, str, Callable[[int, int], NDArray[np.float64]], int]:
+    """Return name, unit, samples and number of samples of a record."""
+    if isinstance(record, Signal):
+        if unit is None:
+            refuse(f"{record.name}: the unit is not given", f"unit = one of {ALLOWED}")
+        return record.name, require_unit(unit, record.name), record.read, record.n_sample
+    path = regular_file(record)
+    channels = choose_channels(read_channels(path), channel, shown_path(path))
+    if len(channels) != 1:
+        refuse(f"{shown_path(path)}: {len(channels)} channels fit", "channel = one of them")
+    one = channels[0]
+    word = find_unit(one.unit) if unit is None else require_unit(unit, path.name)
+    if not word:
+        refuse(f"{shown_path(path)}: the values are without a unit", f"unit = one of {ALLOWED}")
+    return shown_path(path), word, one.samples, one.n_sample
+
+
+def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
+    """Return the means of equal parts of a record."""
+    width = max(1, count // MEANS)
+    values = (samples(start, start + width).mean() for start in range(0, count - width + 1, width))
+    return np.fromiter(values, float)
+
+
+def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:
+    """Return size and standard uncertainty of the steps of a level."""
+    if not np.isfinite(level).all():
+        refuse(f"{name}: a value is not finite", "real numbers")
+    # Extremes of a running median: a knock is no level.
+    calm = (
+        np.median(np.lib.stride_tricks.sliding_window_view(level, 5), axis=1)
+        if len(level) > PLATEAU
+        else np.zeros(1)
+    )
+    share = (level - calm.min()) / (np.ptp(calm) or 1.0)
+    edges, loaded = [0], bool(share[0] > UP)
+    for place, value in enumerate(share):
+        if (not loaded and value > UP) or (loaded and value < DOWN):
+            loaded = not loaded
+            edges.append(place)
+    edges.append(len(level))
+    if len(edges) < 3 or min(np.diff(edges)) < PLATEAU:  # noqa: PLR2004 - two plateaus
+        refuse(
+            f"{name}: has no clear step", "a record in which a known force is put on or taken off"
+        )
+    steps = []
+    for before, edge, after in zip(edges, edges[1:], edges[2:], strict=False):
+        (left, u_left), (right, u_right) = (
+            _level_at(level, *span, edge) for span in ((before, edge), (edge, after))
+        )
+        steps.append((abs(right - left), math.hypot(u_left, u_right)))
+    return steps
+
+
+def _level_at(level: NDArray[np.float64], begin: int, end: int, edge: int) -> tuple[float, float]:
+    """Return the level at an edge of a plateau and its standard uncertainty, by a line."""
+    out = max(1, int(SETTLING * (end - begin)))
+    place = np.arange(begin + out, end - out) - edge
+    line = np.column_stack([np.ones(len(place)), place])
+    (value, slope), *_ = np.linalg.lstsq(line, level[begin + out : end - out], rcond=None)
+    rest = level[begin + out : end - out] - line @ [value, slope]
+    variance = rest @ rest / (len(place) - 2)
+    covariance = variance * np.linalg.inv(line.T @ line)
+    return float(value), math.sqrt(covariance[0, 0])
+
+
+def _mean(steps: list[tuple[float, float]]) -> tuple[float, float]:
+    """Return the mean of steps and its standard uncertainty."""
+    sizes, deviations = np.array(steps).T
+    count = len(sizes)
+    own = math.sqrt(float(deviations @ deviations)) / count
+    scatter = float(sizes.std(ddof=1)) / math.sqrt(count) if count > 1 else 0.0
+    return float(sizes.mean()), max(own, scatter)

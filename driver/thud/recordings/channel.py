@@ -1,0 +1,163 @@
+"""One channel as a file holds it, before it becomes a force."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import warnings
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from thud.checks import refuse
+from thud.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+    import numpy as np
+    from numpy.typing import NDArray
+    from typing_extensions import Buffer
+
+# Maximum size of files that are read as a whole, bytes.
+WHOLE = 2**27
+# Maximum number of bytes that a library may ask for at once.
+AT_ONCE = 2**26
+# Maximum number of characters of a library's message that are shown.
+SHOWN = 100
+MIB = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One channel of a file.
+
+    Attributes
+    ----------
+    name : str
+        Name in the file; empty where it has none.
+    number : int
+        Number of the channel, or of the column, from 1.
+    n_sample : int
+        Number of samples.
+    samples : callable
+        Returns the values of the file, shape (stop - start,), from start to before stop.
+    unit : str
+        Unit of the values; empty where the file does not say it, ``"FS"`` for fractions of full
+        scale.
+    sample_rate : float or None
+        Samples per second, Hz; None where the file does not say it.
+    counts : float or None
+        Counts of full scale where the values are integers, else None.
+    date : str
+        Date of the measurement, or empty.
+    steps : tuple of str
+        What reading has done, a sentence each.
+    """
+
+    name: str
+    number: int
+    n_sample: int
+    samples: Callable[[int, int], NDArray[np.float64]]
+    unit: str = ""
+    sample_rate: float | None = None
+    counts: float | None = None
+    date: str = ""
+    steps: tuple[str, ...] = ()
+
+
+def shown_text(text: object) -> str:
+    """Return a text of a file or a library as a message shows it: short, printable, one line."""
+    line = " ".join(str(text).encode("utf-8", "replace").decode("utf-8").split())
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line[:SHOWN])
+
+
+def shown_path(path: Path) -> str:
+    """Return a path as a message shows it, also where its name is not UTF-8."""
+    return os.fsencode(path).decode("utf-8", "replace")
+
+
+@contextmanager
+def guarded(path: Path, kind: str) -> Iterator[None]:
+    """Turn whatever a library raises on a damaged file into InputError, and hide its warnings."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    except InputError:
+        raise
+    except MemoryError as error:
+        refuse(f"{shown_path(path)}: asks for too much memory", f"an undamaged {kind} file", error)
+    except Exception as error:  # noqa: BLE001 - libraries raise anything on damaged files
+        # soundfile repeats the path.
+        reason = shown_text(str(error).rpartition("': ")[2]) or type(error).__name__
+        refuse(
+            f"{shown_path(path)}: cannot be read as {kind} ({reason})",
+            f"a complete, undamaged {kind} file",
+            error,
+        )
+
+
+def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
+    """Import a library that only one kind of file needs; raise InputError where it is missing."""
+    try:
+        return importlib.import_module(name)
+    except (ImportError, OSError) as error:  # soundfile raises OSError without its library
+        refuse(
+            f"{kind} files need the package {name}, which is not installed",
+            "pip install thud[recordings]",
+            error,
+        )
+
+
+def require_small(path: Path, kind: str, most: int = WHOLE) -> None:
+    """Raise InputError where a file that is read as a whole is too large."""
+    size = path.stat().st_size
+    if size > most:
+        refuse(
+            f"{shown_path(path)}: {size / MIB:.0f} MiB of {kind}, which is read as a whole",
+            f"up to {most // MIB} MiB; longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
+        )
+
+
+class BoundedFile:
+    """A file that refuses to read more at once than it holds or than memory should.
+
+    Libraries ask for as many bytes as a header says.
+    """
+
+    def __init__(self, file: BinaryIO, name: str) -> None:
+        self.file = file
+        self.name = name
+        self.size = os.fstat(file.fileno()).st_size
+
+    def read(self, count: int = -1) -> bytes:
+        """Return the next bytes."""
+        left = max(0, self.size - self.file.tell())
+        wanted = left if count is None or count < 0 else int(count)
+        if wanted > AT_ONCE or (wanted > left and wanted > MIB):
+            refuse(
+                f"{self.name}: a piece of {wanted / MIB:.0f} MiB, {left / MIB:.0f} MiB are left",
+                f"pieces of up to {AT_ONCE // MIB} MiB inside the file",
+            )
+        return self.file.read(wanted)
+
+    def readinto(self, buffer: Buffer) -> int:
+        """Fill a buffer with the next bytes."""
+        view = memoryview(buffer).cast("B")
+        data = self.read(len(view))
+        view[: len(data)] = data
+        return len(data)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Move to another place."""
+        return self.file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Return the place of the next byte."""
+        return self.file.tell()
+
+    def close(self) -> None:
+        """Close the file."""
+        self.file.close()

@@ -1,0 +1,243 @@
+"""A laboratory's configuration: a small TOML file beside its recordings."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud.checks import refuse, require_choice, require_number, shown
+from thud.levels import SOURCES, get_bands, judge
+from thud.recordings.channel import MIB, shown_path, shown_text
+from thud.recordings.excursion import POLARITIES
+from thud.recordings.reading import regular_file
+from thud.recordings.units import read_chain, require_unit
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Mapping
+
+    from thud._schema import LimitsSource
+    from thud.recordings.units import Calibration
+
+LONGEST = 500
+ABSOLUTE_ZERO = -273.15
+
+
+@dataclass(frozen=True)
+class PlateConfig:
+    """First resonance of a force plate.
+
+    Attributes
+    ----------
+    f0 : float
+        Frequency, Hz.
+    Q : float
+        Quality factor.
+    f0_uncertainty : float or None
+        Relative standard uncertainty of the frequency; None where it is not known.
+    """
+
+    f0: float
+    Q: float
+    f0_uncertainty: float | None = None
+
+
+@dataclass(frozen=True)
+class Config:
+    """What a laboratory says about its ball, its instruments and its files; see `read_config`.
+
+    Attributes
+    ----------
+    laboratory, ball, serial : str
+        Names for the report.
+    date : str
+        Date of the measurement, such as ``"2024-05-03"``; by default that of the files.
+    source : str
+        Source whose limits apply.
+    temperature : float or None
+        Temperature of ball and air, degC.
+    instruments : tuple of str
+        Instruments, one each.
+    channel, unit, polarity, sample_rate
+        As `open_signals` takes them.
+    calibration : Calibration, str, float or None
+        As `open_signals` takes it.
+    calibration_uncertainty : float or None
+        Relative standard uncertainty of the force, wherever its calibration comes from; by default
+        that of the `Calibration`.
+    mass, height : float or None
+        Mass of the ball, kg, and drop height, m.
+    plate : PlateConfig or None
+        Resonance that is corrected.
+    limits : mapping
+        Minimum and maximum by criterion where they differ from the standards'.
+    """
+
+    laboratory: str = ""
+    ball: str = ""
+    serial: str = ""
+    date: str = ""
+    source: LimitsSource = "rubber_ball"
+    temperature: float | None = None
+    instruments: tuple[str, ...] = ()
+    channel: int | str | None = None
+    unit: str | None = None
+    calibration: Calibration | str | float | None = None
+    calibration_uncertainty: float | None = None
+    polarity: str | None = None
+    sample_rate: float | None = None
+    mass: float | None = None
+    height: float | None = None
+    plate: PlateConfig | None = None
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+
+def read_config(path: str | os.PathLike[str]) -> Config:
+    """Read a configuration.
+
+    Raises
+    ------
+    InputError
+        Names the file and the key that is not known, of another kind or out of range.
+    """
+    file = regular_file(path)
+    name = shown_path(file)
+    if file.stat().st_size > MIB:
+        refuse(f"{name}: is larger than 1 MiB", "a TOML file of some lines")
+    try:
+        given = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
+    _require_known(given, [one.name for one in fields(Config)], name)
+    return Config(**{key: check_key(key, value, f"{name}: {key}") for key, value in given.items()})
+
+
+def _require_known(given: Mapping[str, object], known: list[str], place: str) -> None:
+    """Raise InputError where a key is not known, with the one that is probably meant."""
+    for key in given:
+        if key not in known:
+            close = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+            hint = f", did you mean {close[0]}?" if close else ""
+            refuse(f"{place}: {shown_text(key)!r} is not known{hint}", ", ".join(known))
+
+
+def check_key(key: str, value: object, place: str) -> Any:  # noqa: ANN401 - of any key
+    """Return the value of a key; raise InputError where it is not allowed."""
+    if key in NUMBERS:
+        return _number(value, place, *NUMBERS[key])
+    return CHECKS.get(key, _text)(value, place)
+
+
+# Minimum and maximum of the keys that are numbers.
+NUMBERS = {
+    "temperature": (ABSOLUTE_ZERO, 200.0),
+    "calibration_uncertainty": (0.0, 0.5),
+    "sample_rate": (1.0, 1e9),
+    "mass": (0.01, 1000.0),
+    "height": (0.001, 100.0),
+    "f0": (1.0, 1e6),
+    "Q": (0.5, 1e6),
+    "f0_uncertainty": (0.0, 0.5),
+}
+
+
+def _number(value: object, place: str, low: float, high: float) -> float:
+    """Return a number within a range."""
+    require_number(place, value)
+    if not isinstance(value, int | float) or not low <= value <= high:
+        refuse(f"{place} = {shown(value)} is not allowed", f"{low:g} to {high:g}")
+    return float(value)
+
+
+def _text(value: object, place: str) -> str:
+    """Return a text of one line."""
+    if not isinstance(value, str) or len(value) > LONGEST or not value.isprintable():
+        refuse(f"{place} = {shown(value)} is not allowed", f"a line of up to {LONGEST} characters")
+    return value
+
+
+def _instruments(value: object, place: str) -> tuple[str, ...]:
+    """Return texts."""
+    names = value if isinstance(value, list) else [value]
+    return tuple(_text(one, place) for one in names)
+
+
+def _calibration(value: object, place: str) -> str | float:
+    """Return a chain of factors or N per unit."""
+    if not isinstance(value, str):
+        return _number(value, place, -1e30, 1e30)
+    read_chain(_text(value, place))
+    return value
+
+
+def _channel(value: object, place: str) -> int | str:
+    """Return the number or the name of a channel."""
+    is_number = isinstance(value, int) and not isinstance(value, bool)
+    return int(_number(value, place, 1, 1e6)) if is_number else _text(value, place)
+
+
+def _unit(value: object, place: str) -> str:
+    """Return a unit of recorded values."""
+    return require_unit(value, place)
+
+
+def _polarity(value: object, place: str) -> str:
+    """Return the sign of a compression."""
+    require_choice(place, value, POLARITIES)
+    return str(value)
+
+
+def _source(value: object, place: str) -> str:
+    """Return the name of a source."""
+    require_choice(place, value, SOURCES)
+    return str(value)
+
+
+def _table(value: object, place: str, known: list[str]) -> dict[str, object]:
+    """Return a table of which all keys are known."""
+    if not isinstance(value, dict):
+        refuse(f"{place} = {shown(value)} is not allowed", "a table")
+    _require_known(value, known, place)
+    return value
+
+
+def _plate(value: object, place: str) -> PlateConfig:
+    """Return the resonance of a plate."""
+    table = _table(value, place, [one.name for one in fields(PlateConfig)])
+    for key in ("f0", "Q"):
+        if key not in table:
+            refuse(f"{place}: {key} is missing", "f0 and Q")
+    return PlateConfig(
+        **{key: check_key(key, value, f"{place}: {key}") for key, value in table.items()}
+    )
+
+
+def _limits(value: object, place: str) -> dict[str, tuple[float, float]]:
+    """Return limits by criterion."""
+    octaves = np.zeros(len(get_bands().nominal))
+    criteria = judge(octaves, 0.0, 0.0, 0, 0.0, 0.0).criteria
+    found = {}
+    for key, span in _table(value, place, [one.name for one in criteria]).items():
+        if not isinstance(span, list) or len(span) != 2:  # noqa: PLR2004 - minimum, maximum
+            refuse(f"{place}: {key} = {shown(span)} is not allowed", "[minimum, maximum]")
+        low, high = (_number(one, f"{place}: {key}", -1e6, 1e6) for one in span)
+        if not low < high:
+            refuse(f"{place}: {key} = {shown(span)} is not allowed", "minimum < maximum")
+        found[key] = (low, high)
+    return found
+
+
+CHECKS: dict[str, Callable[[object, str], object]] = {
+    "instruments": _instruments,
+    "calibration": _calibration,
+    "channel": _channel,
+    "unit": _unit,
+    "polarity": _polarity,
+    "source": _source,
+    "plate": _plate,
+    "limits": _limits,
+}

@@ -1,0 +1,307 @@
+"""Contact of one pulse: background, first touch and release (docs/recordings_theory.md)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.recordings.flanks import SMOOTHING, Flank, find_touch
+from thud.recordings.noise import Background, fit_background
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+    from thud.recordings.noise import Cells
+
+# Quiet used on either side of the contact, s, and its cells: length up to a distance from the
+# contact, s. Farther quiet lowers the noise of the offset by less than 5 %.
+QUIET = 0.1
+QUIET_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, QUIET))
+# Least quiet on a side that counts, s.
+LEAST_QUIET = 1e-3
+# Length of a flank in the search for the touch, s, and room before it.
+FLANK = 3e-3
+ROOM = 2e-3
+# Cells of the flank, s: the finest, and the part of the distance to the touch elsewhere.
+FINEST = 2e-5
+GROWTH = 0.15
+# Cells of the contact, s.
+CONTACT_CELL = 2e-4
+# The gate of the levels reaches this many samples beyond the contact, and more at low rates,
+# whose anti-aliasing filter comes close to the octave of 500 Hz: (GATE_RATE/rate)2 more.
+GATE_SAMPLES = 4
+GATE_RATE = 10_000.0
+# Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
+FLOOR = 2e-4
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value and its standard uncertainty, in the same unit; NaN where not known."""
+
+    value: float
+    uncertainty: float
+
+    def __float__(self) -> float:
+        """Return the value."""
+        return float(self.value)
+
+    @classmethod
+    def unknown(cls) -> Estimate:
+        """Return the estimate of what is not known."""
+        return cls(math.nan, math.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Contact of one pulse: its times, in s from the first sample of the window.
+
+    Attributes
+    ----------
+    touch, release : Estimate
+        First touch and release.
+    peak : float
+        Maximum sample less the offset, N: a scale.
+    span : tuple of int
+        First sample of the part with its background removed, and the one behind it.
+    force : ndarray, shape (span[1] - span[0],)
+        Force of the part, N.
+    under : ndarray, shape (span[1] - span[0],)
+        Background that was removed, N.
+    gate : tuple of int
+        First sample of the contact with its margins, and the one behind it.
+    covariance : ndarray, shape (n_cell, n_cell)
+        Covariance of the background's error in even cells of the gate, N2.
+    quiet : tuple of float
+        Quiet before and after, s.
+    background : Background
+        The noise, fitted.
+    sample_rate : float
+        Samples per second, Hz.
+    """
+
+    touch: Estimate
+    release: Estimate
+    peak: float
+    span: tuple[int, int]
+    force: NDArray[np.float64]
+    under: NDArray[np.float64]
+    gate: tuple[int, int]
+    covariance: NDArray[np.float64]
+    quiet: tuple[float, float]
+    background: Background
+    sample_rate: float
+
+    @property
+    def gated(self) -> NDArray[np.float64]:
+        """Force of the gate, N."""
+        first = self.span[0]
+        return self.force[self.gate[0] - first : self.gate[1] - first]
+
+    @property
+    def noise_doubt(self) -> float:
+        """Relative standard deviation of the noise's density, from the number of quiet cells."""
+        return math.sqrt(2 / max(len(self.background.mean) - 2, 1))
+
+    def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the covariance of linear functionals of the gate's samples, shape (k, n)."""
+        white = self.background.variances[0] * self.sample_rate / 2
+        count = len(self.covariance)
+        edges = np.rint(np.linspace(0, functionals.shape[1], count + 1)).astype(int)
+        summed = np.add.reduceat(functionals, edges[:-1], axis=1)
+        result: NDArray[np.float64] = white * functionals @ functionals.T
+        return result + summed @ self.covariance @ summed.T
+
+
+def cells_between(edges: NDArray[np.intp], rate: float, middle: float) -> Cells:
+    """Return begins and ends of cells between samples, s from the middle of the contact."""
+    time = np.asarray((edges - 0.5) / rate - middle, dtype=np.float64)
+    return time[:-1], time[1:]
+
+
+def _means(force: NDArray[np.float64], edges: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return the means over the samples between edges."""
+    total: NDArray[np.float64] = np.add.reduceat(force[: edges[-1]], edges[:-1])
+    return total / np.diff(edges)
+
+
+def _quiet_edges(length: int, rate: float) -> NDArray[np.intp]:
+    """Return edges of quiet cells, in samples away from the contact, up to a number of samples."""
+    edges = [0.0]
+    for width, reach in QUIET_CELLS:
+        count = int((reach - edges[-1]) / width + 1e-9)
+        edges += list(edges[-1] + width * np.arange(1, count + 1))
+    places = np.unique(np.rint(np.array(edges) * rate).astype(int))
+    return places[places <= length]
+
+
+def gate_margin(rate: float) -> int:
+    """Return the samples of the gate on each side of the contact."""
+    return GATE_SAMPLES + int((GATE_RATE / rate) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """First touch and release, and the background between two quiet parts."""
+
+    touch: Estimate
+    release: Estimate
+    background: Background
+    offset: float
+    quiet: tuple[int, int]
+
+
+def find_edges(window: Window, known: Background | None = None) -> tuple[Estimate, Estimate]:
+    """Return first touch and release, s from the first sample of a window, to about 0.1 ms.
+
+    The noise may be known from elsewhere in the signal.
+    """
+    edges = _search(window.force, window.contact, window.sample_rate, known, passes=1)
+    return edges.touch, edges.release
+
+
+def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
+    """Return the contact of a window, the force of which, N, may have been repaired."""
+    rate, contact = window.sample_rate, window.contact
+    middle = (contact[0] + contact[1]) / 2 / rate
+    edges = _search(force, contact, rate, None, passes=2)
+    background, (left, right) = edges.background, edges.quiet
+    (t0, s0), (t1, s1) = ((t.value, t.uncertainty) for t in (edges.touch, edges.release))
+    margin = gate_margin(rate)
+    gate = (
+        max(int((t0 - 3 * s0) * rate) - margin, 0),
+        min(int((t1 + 3 * s1) * rate) + margin + 1, len(force)),
+    )
+    inner = even_edges(*gate, rate)
+    _, covariance = background.predict(cells_between(inner, rate, middle))
+    reach = int(QUIET * rate)
+    span = (max(0, gate[0] - reach), min(len(force), gate[1] + reach))
+    sides = [even_edges(*side, 5 * rate) for side in ((span[0], gate[0]), (gate[1], span[1]))]
+    cells = cells_between(np.unique(np.concatenate([*sides, inner])), rate, middle)
+    time = np.arange(*span) / rate - middle
+    under = np.interp(time, (cells[0] + cells[1]) / 2, background.predict_mean(cells))
+    under += edges.offset
+    return Contact(
+        edges.touch,
+        edges.release,
+        background.peak,
+        span,
+        force[slice(*span)] - under,
+        under,
+        gate,
+        covariance,
+        (left / rate, (len(force) - right) / rate),
+        background,
+        rate,
+    )
+
+
+def _search(
+    force: NDArray[np.float64],
+    contact: tuple[int, int],
+    rate: float,
+    known: Background | None,
+    passes: int,
+) -> _Edges:
+    """Return the edges of a contact; the second pass knows where the quiet ends."""
+    first, stop = contact
+    middle = (first + stop) / 2 / rate
+    # Half of a short quiet is kept.
+    left = int(max(first - ROOM * rate, first / 2))
+    right = int(min(stop + ROOM * rate, (stop + len(force)) / 2))
+    touch = (left / rate, first / rate + ROOM)
+    release = (stop / rate - ROOM, right / rate)
+    offset = float(np.median(np.concatenate([force[:left], force[right:]])))
+    force = force - offset
+    peak = float(force[first:stop].max())
+    for last in range(passes):
+        # The first of two passes needs no more than the grid.
+        searches = 1 + 2 * last if passes > 1 else 2
+        quiet, mean = quiet_means(force, left, right, rate, middle)
+        if known is None:
+            known = fit_background(quiet, mean, peak)
+        background = Background(quiet, mean, known.variances, peak)
+        found = []
+        for sign, (near, bounds) in zip((1, -1), ((left, touch), (right, release)), strict=True):
+            ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
+            edges = sign * flank_edges(sign * near, ahead, rate, fine=last > 0)
+            found.append(find_edge(force, edges, bounds, background, rate, middle, searches))
+        (t0, s0), (t1, s1) = found
+        if last + 1 < passes:
+            room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
+            touch, release = (t0 - room0, t0 + room0), (t1 - room1, t1 + room1)
+            # What a filter spreads is no quiet.
+            beyond = gate_margin(rate) - GATE_SAMPLES
+            left = max(int(touch[0] * rate) - beyond, first // 2)
+            right = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
+    return _Edges(Estimate(t0, s0), Estimate(t1, s1), background, offset, (left, right))
+
+
+def even_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
+    """Return edges of cells of about CONTACT_CELL at a rate, in samples."""
+    count = max(1, round((stop - start) / rate / CONTACT_CELL))
+    return np.unique(np.rint(np.linspace(start, stop, 1 + count)).astype(int))
+
+
+def quiet_means(
+    force: NDArray[np.float64], left: int, right: int, rate: float, middle: float
+) -> tuple[Cells, NDArray[np.float64]]:
+    """Return the quiet cells on both sides of a contact, and their means, N."""
+    both = (
+        left - _quiet_edges(left, rate)[::-1],
+        right + _quiet_edges(len(force) - right, rate),
+    )
+    begins, ends = zip(*(cells_between(edges, rate, middle) for edges in both), strict=True)
+    mean = [_means(force, edges) for edges in both if len(edges) > 1]
+    return (np.concatenate(begins), np.concatenate(ends)), np.concatenate(mean)
+
+
+def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
+    force: NDArray[np.float64],
+    edges: NDArray[np.intp],
+    bounds: tuple[float, float],
+    background: Background,
+    rate: float,
+    middle: float,
+    searches: int,
+) -> tuple[float, float]:
+    """Return the time of touch, or of release where edges fall, s, and its deviation."""
+    turned = edges[0] > edges[-1]
+    edges = edges[::-1] if turned else edges
+    edges = edges[(edges >= 0) & (edges <= len(force))]
+    cells = cells_between(edges, rate, middle)
+    under, covariance = background.predict(cells)
+    low, high = max(edges[0] - 1, 0), min(edges[-1] + 1, len(force))
+    smooth = np.convolve(force[low:high], SMOOTHING, mode="same")[edges[0] - low :]
+    value = _means(smooth, edges - edges[0]) - under
+    # Weights of the samples in the smoothed means.
+    count = np.diff(edges)
+    weights = np.zeros((len(count), edges[-1] - edges[0] + 2))
+    cell = np.repeat(np.arange(len(count)), count)
+    for shift, weight in enumerate(SMOOTHING):
+        weights[cell, np.arange(len(cell)) + shift] += weight / count[cell]
+    covariance += background.variances[0] * rate / 2 * weights @ weights.T
+    covariance += (FLOOR * background.peak) ** 2 * np.eye(len(value))
+    time = (cells[0] + cells[1]) / 2 + middle
+    if turned:
+        flank = Flank(-time[::-1], value[::-1], covariance[::-1, ::-1], background.peak, 1 / rate)
+        touch, deviation = find_touch(flank, -bounds[1], -bounds[0], searches)
+        return -touch, deviation
+    return find_touch(Flank(time, value, covariance, background.peak, 1 / rate), *bounds, searches)
+
+
+def flank_edges(
+    quiet: int, bounds: tuple[float, float], rate: float, *, fine: bool
+) -> NDArray[np.intp]:
+    """Return edges of flank cells in samples, from the end of the quiet to behind the flank."""
+    touch, half = (bounds[0] + bounds[1]) / 2 * rate, (bounds[1] - bounds[0]) / 2 * rate
+    edges = [quiet]
+    while edges[-1] < bounds[1] * rate + FLANK * rate:
+        away = max(abs(edges[-1] - touch) - half, 0)
+        width = max(FINEST * rate, GROWTH * away, half / 10) if fine else 1e-4 * rate
+        edges.append(edges[-1] + max(1, int(width)))
+    return np.array(edges)

@@ -1,0 +1,287 @@
+"""Drops of a signal: where they are, and which pulses are bounces of which drop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+from tqdm import tqdm
+
+from thud.checks import refuse
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from thud.recordings.signal import Signal
+
+# Means over cells of this length, s, show pulses; a signal is searched in pieces of PIECE cells
+# that overlap by OVERLAP cells, more than a pulse with its quiet.
+CELL = 1e-3
+PIECE = 30_000
+OVERLAP = 2_000
+# Cells of one value of the running baseline.
+SEGMENT = 1_000
+# Pulses rise above this many deviations of the cells, or above this part of the maximum if that
+# is less, and nothing is a pulse below NO_PULSE deviations. Their edges are looked for within two
+# cells of MARGIN cells outside of FOOT of their peak: flanks of the models rise to it in 4 ms.
+RISE = 6.0
+RISE_PART = 0.4
+NO_PULSE = 4.0
+FOOT = 0.2
+MARGIN = 2
+# Quiet next to a pulse, in cells from half its height.
+SIDE = 6
+BESIDE = 20
+# Cells between two parts of one pulse.
+MERGED = 4
+# Lower pulses are no impacts: part of the highest one of a signal.
+LEAST_PART = 0.03
+# Durations of a pulse above half its peak, s: contacts of balls and tyres last 12 to 40 ms.
+DURATIONS = (0.003, 0.06)
+# A valley between two peaks of one pulse, as part of the lower one, that makes it two impacts.
+VALLEY = 0.3
+# A pulse whose peak reaches this part of the one before is a drop of its own. The limits of the
+# standards let a ball return with 0.9 of its velocity, and the force follows the velocity.
+NEW_PART = 0.93
+# Flights of a bounce, s: 2 e v0/g of a drop from 2 m with e = 1; from 0.5 mm.
+LONGEST_FLIGHT = 1.3
+SHORTEST_FLIGHT = 0.02
+# Part of the signal around one drop, s.
+BEFORE = 0.25
+AFTER = 0.5
+# Rates, Hz: twice the upper edge of the octave of 500 Hz, with room for a filter.
+LEAST_RATE = 2_000.0
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """The part of a signal around one drop.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop, as ``"file.wav, drop 3"``.
+    signal : Signal
+        The signal, which is read when the force is asked for.
+    start, stop : int
+        First sample of the part in the signal, and the one behind it.
+    contact : tuple of int
+        First sample of the contact and the one behind it, within the part; to about 1 ms.
+    bounces : tuple of Window
+        The parts around the later bounces, in order.
+    remarks : tuple of str
+        Doubts about the pulse as a whole.
+    """
+
+    name: str
+    signal: Signal
+    start: int
+    stop: int
+    contact: tuple[int, int]
+    bounces: tuple[Window, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def sample_rate(self) -> float:
+        """Samples per second, Hz."""
+        return self.signal.sample_rate
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force as read, N, shape (stop - start,)."""
+        return self.signal.read(self.start, self.stop)
+
+
+@dataclass
+class _Pulse:
+    """One pulse in the cells of a signal: samples from start to stop, and its height, N."""
+
+    start: int
+    stop: int
+    peak: float
+    bounces: list[_Pulse] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+
+def find_windows(signal: Signal, *, progress: bool = False) -> list[Window]:
+    """Return the parts of a signal around its drops, in order.
+
+    The signal is read twice: in blocks for the search, then around each drop.
+
+    Raises
+    ------
+    InputError
+        Where there is no impact, or the rate is too low.
+    """
+    rate, name = signal.sample_rate, signal.name
+    if not rate >= LEAST_RATE:
+        refuse(f"{name}: sample_rate = {rate:g} Hz is too low", f"at least {LEAST_RATE:g} Hz")
+    pulses: list[_Pulse] = []
+    width = max(1, round(rate * CELL))
+    for first, cells in _pieces(signal, progress=progress):
+        # The next piece holds what the end of this one may cut.
+        whole = first + (len(cells) - OVERLAP // 2) * width
+        if first + len(cells) * width >= signal.n_sample:
+            whole = first + (len(cells) + OVERLAP) * width
+        behind = pulses[-1].stop if pulses else 0
+        pulses += [p for p in _pulses(cells, first, rate) if behind <= p.start < p.stop <= whole]
+    highest = max((p.peak for p in pulses), default=0.0)
+    pulses = [pulse for pulse in pulses if pulse.peak > LEAST_PART * highest]
+    if not pulses:
+        refuse(f"{name}: no impact is found", "a pulse of 12 to 40 ms that rises above the noise")
+    return list(_windows(signal, pulses))
+
+
+def _pieces(signal: Signal, *, progress: bool) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Yield the first sample and the cell means of the pieces of a signal."""
+    width = max(1, round(signal.sample_rate * CELL))
+    kept = np.empty(0)
+    first = 0
+    bar = tqdm(
+        total=signal.n_sample,
+        unit="sample",
+        unit_scale=True,
+        desc=signal.name,
+        disable=not progress,
+    )
+    block = 4_096 * width
+    ready = 0
+    parts: list[NDArray[np.float64]] = []
+    for start in range(0, signal.n_sample, block):
+        stop = min(start + block, signal.n_sample)
+        force = signal.read(start, stop)
+        if not np.isfinite(force).all():
+            refuse(f"{signal.name}: a value is not finite", "real numbers")
+        whole = len(force) // width * width
+        parts.append(force[:whole].reshape(-1, width).mean(1))
+        if whole < len(force):
+            parts.append(force[whole:].mean(keepdims=True))
+        ready += len(parts[-1]) if whole == len(force) else len(parts[-1]) + len(parts[-2])
+        bar.update(stop - start)
+        if ready + len(kept) >= PIECE or stop == signal.n_sample:
+            kept = np.concatenate([kept, *parts])
+            yield first * width, kept
+            first += max(len(kept) - OVERLAP, 0)
+            kept, parts, ready = kept[-OVERLAP:], [], 0
+    bar.close()
+
+
+def _baseline(cells: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the force between the pulses: medians of segments, or a low quantile where short."""
+    n = len(cells)
+    if n < 2 * SEGMENT:
+        # In a short part a contact of up to 25 cells is taken to be no quiet.
+        part = np.clip(0.5 * (n - 25) / n, 0.08, 0.5)
+        return np.full(n, np.quantile(cells, part))
+    count = n // SEGMENT
+    whole = cells[: count * SEGMENT].reshape(count, SEGMENT)
+    middle = (np.arange(count) + 0.5) * SEGMENT
+    return np.interp(np.arange(n), middle, np.median(whole, axis=1))
+
+
+def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]:
+    """Return the pulses in cells, the first of which begins at a sample."""
+    width = max(1, round(rate * CELL))
+    level = uniform_filter1d(cells, 3, mode="nearest") - _baseline(cells)
+    below = -level[level < 0]
+    deviation = 1.4826 * float(np.median(below)) if below.size else 0.0
+    highest = float(level.max(initial=0.0))
+    rise = min(RISE * deviation, RISE_PART * highest)
+    if highest <= max(NO_PULSE * deviation, 1e-9):
+        return []
+    above = np.flatnonzero(level > max(rise, 0.01 * highest))
+    groups = np.split(above, np.flatnonzero(np.diff(above) > MERGED) + 1)
+    pulses: list[_Pulse] = []
+    for group in groups:
+        top = int(group[0] + np.argmax(level[group[0] : group[-1] + 1]))
+        behind = -(-(pulses[-1].stop - first) // width) if pulses else 0
+        if top < behind:
+            continue
+        low, high = (_walk(level, top, step, level[top] / 2) for step in (-1, 1))
+        if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
+            continue
+        # The quiet next to the pulse, which slow noise moves away from that of a second.
+        ahead, after = level[max(behind, low - BESIDE) : low - SIDE], level[high + SIDE :][:BESIDE]
+        beside = [np.quantile(part, 0.4) if part.size else 0.0 for part in (ahead, after)]
+        place = np.clip((np.arange(len(level)) - low) / max(high - low, 1), 0, 1)
+        local = level - (beside[0] + place * (beside[1] - beside[0]))
+        peak = float(local[top])
+        start = _walk(local, low, -1, FOOT * peak) - MARGIN
+        stop = _walk(local, high, 1, FOOT * peak) + 1 + MARGIN
+        start = max(start, behind)
+        doubt = _told_double(local[max(group[0], behind) : group[-1] + 1])
+        pulses.append(
+            _Pulse(
+                first + start * width, first + stop * width, peak, remarks=[doubt] if doubt else []
+            )
+        )
+    return pulses
+
+
+def _walk(level: NDArray[np.float64], place: int, step: int, foot: float) -> int:
+    """Return the outermost cell of a pulse: behind it two cells lie at its foot."""
+    while 0 <= place + step < len(level) and (
+        level[place + step] > foot
+        or (0 <= place + 2 * step < len(level) and level[place + 2 * step] > foot)
+    ):
+        place += step
+    return place
+
+
+def _told_double(level: NDArray[np.float64]) -> str:
+    """Return a sentence where a deep valley lies between two peaks of one pulse, or nothing."""
+    top = int(np.argmax(level))
+    for side in (level[top:], level[: top + 1][::-1]):
+        lowest = np.minimum.accumulate(side)
+        k = int(np.argmax(side - lowest))
+        if lowest[k] < VALLEY * side[k] and side[k] > VALLEY * level[top]:
+            return (
+                f"two impacts meet: a second peak of {side[k]:.0f} N rises from {lowest[k]:.0f} N, "
+                "without quiet between them"
+            )
+    return ""
+
+
+def _windows(signal: Signal, pulses: list[_Pulse]) -> Iterator[Window]:
+    """Yield the windows of drops, with those of their bounces."""
+    drops: list[_Pulse] = []
+    flight = LONGEST_FLIGHT
+    before: _Pulse | None = None
+    for pulse in pulses:
+        gap = np.inf if before is None else (pulse.start - before.stop) / signal.sample_rate
+        bounced = (
+            before is not None
+            and gap < 1.02 * flight
+            and pulse.peak < NEW_PART * before.peak
+            and gap > SHORTEST_FLIGHT
+        )
+        if bounced:
+            drops[-1].bounces.append(pulse)
+            flight = gap
+        else:
+            drops.append(pulse)
+            flight = LONGEST_FLIGHT
+        before = pulse
+    edges = {id(p): k for k, p in enumerate(pulses)}
+
+    def cut(pulse: _Pulse, name: str) -> Window:
+        k = edges[id(pulse)]
+        guard = round(2 * CELL * signal.sample_rate)
+        low = pulses[k - 1].stop + guard if k else 0
+        high = pulses[k + 1].start - guard if k + 1 < len(pulses) else signal.n_sample
+        low = max(low, pulse.start - round(BEFORE * signal.sample_rate))
+        high = min(high, pulse.stop + round(AFTER * signal.sample_rate), signal.n_sample)
+        low, high = min(low, pulse.start), max(high, min(pulse.stop, signal.n_sample))
+        contact = (pulse.start - low, min(pulse.stop, signal.n_sample) - low)
+        return Window(name, signal, low, high, contact, (), tuple(pulse.remarks))
+
+    for k, drop in enumerate(drops, start=1):
+        name = signal.name if len(drops) == 1 else f"{signal.name}, drop {k}"
+        bounces = tuple(
+            cut(bounce, f"{name}, bounce {j}") for j, bounce in enumerate(drop.bounces, start=1)
+        )
+        yield replace(cut(drop, name), bounces=bounces)

@@ -1,0 +1,391 @@
+"""Contact time, restitution, peak, impulse and noise of a drop, with their uncertainties.
+
+Derivations: docs/recordings_theory.md.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss
+
+from thud.checks import refuse
+from thud.levels import record_force
+from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
+from thud.recordings.faults import least_quiet, repair
+from thud.recordings.noise import Noise
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+
+__all__ = ["Drop", "Estimate", "measure_drop"]
+
+# Bounces that are measured.
+MAX_BOUNCES = 2
+# Edge of the low-pass of the peak force, Hz (paper, section 3).
+RECORDED_BAND = 1250.0
+# Quiet below which it is told, s.
+SHORT_QUIET = 0.005
+# Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the
+# error that is told, dB.
+OCTAVE_500 = (354.8, 707.9)
+TOP = 0.4
+NOTABLE_ERROR = 0.1
+# Least contact time over its uncertainty.
+MOST_DOUBT = 4.0
+# Standard deviations that make a difference worth telling.
+NOTABLE = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Drop:
+    """One drop, corrected, and what it tells.
+
+    Attributes
+    ----------
+    name : str
+        Name of the drop, as ``"file.wav, drop 3"``.
+    time : ndarray, shape (n,)
+        Time since first touch, s.
+    force : ndarray, shape (n,)
+        Force without offset, drift, hum and slow noise, N.
+    sample_rate : float
+        Samples per second, Hz.
+    onset : float
+        Time of first touch in the file, s.
+    gate : tuple of int
+        First sample of the contact with its margins, and the one behind it: levels are computed
+        over ``force[gate[0]:gate[1]]`` and the expected energy of the noise is subtracted.
+    contact_time, restitution, peak_force, impulse, effective_mass : Estimate
+        In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+    restitution_calibration : float
+        Standard uncertainty that the calibration makes of the restitution, beside that stated.
+    restitution_by : str
+        ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
+    restitutions : dict of str to Estimate
+        The restitution by each way.
+    noise : Noise
+        Noise of the quiet parts.
+    bounces : tuple of float
+        Times of first touch of later bounces since the onset, s.
+    steps, remarks : tuple of str
+        What was done to the signal, and what is doubtful; a sentence each.
+    """
+
+    name: str
+    time: NDArray[np.float64]
+    force: NDArray[np.float64]
+    sample_rate: float
+    onset: float
+    gate: tuple[int, int]
+    contact_time: Estimate
+    restitution: Estimate
+    restitution_calibration: float
+    restitution_by: str
+    restitutions: dict[str, Estimate]
+    peak_force: Estimate
+    impulse: Estimate
+    effective_mass: Estimate
+    noise: Noise
+    bounces: tuple[float, ...]
+    steps: tuple[str, ...]
+    remarks: tuple[str, ...]
+    contact: Contact
+
+    def band_energy(
+        self, lower: float, upper: float, *, exact: bool = False
+    ) -> tuple[float, float, float]:
+        """Return the energy of the force in a band, N2 s, that of the noise, and a deviation.
+
+        The energy is that of the gate less the expected energy of the noise in it; the last is
+        its standard deviation (docs/recordings_theory.md, section 4). Where the force is exact,
+        without noise, nothing is subtracted.
+        """
+        first, stop = self.gate
+        force, time = self.force[first:stop], self.time[first:stop]
+        # A record of this length has about time times band width degrees of freedom in the band.
+        nodes, weights = leggauss(12 + int(2 * (upper - lower) * (time[-1] - time[0])))
+        frequency = (lower + upper) / 2 + (upper - lower) / 2 * nodes
+        phase = 2 * np.pi * frequency[:, None] * time
+        scale = np.sqrt((upper - lower) * weights)[:, None] / self.sample_rate
+        functionals = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
+        value = functionals @ force
+        covariance = self.contact.covariance_of(functionals)
+        noise = float(np.trace(covariance))
+        second = float((covariance**2).sum())
+        variance = 4 * float(value @ covariance @ value) + 2 * second
+        if exact:
+            return float(value @ value), noise, math.sqrt(variance)
+        # The first term is too large by twice the second, on the mean.
+        variance = max(variance - 4 * second, 2 * second) + (noise * self.contact.noise_doubt) ** 2
+        return float(value @ value) - noise, noise, math.sqrt(variance)
+
+
+def measure_drop(
+    window: Window,
+    *,
+    height: float | None = None,
+    mass: float | None = None,
+    calibration_uncertainty: float = 0.0,
+    gravity: float = 9.81,
+) -> Drop:
+    """Return what one drop tells.
+
+    Parameters
+    ----------
+    window
+        The part of the signal around the drop.
+    height
+        Drop height of the lowest point, m.
+    mass
+        Mass of the source, kg.
+    calibration_uncertainty
+        Relative standard uncertainty of the force; it weights the restitution from the impulse.
+    gravity
+        Acceleration of free fall, m/s2.
+
+    Raises
+    ------
+    InputError
+        Where the pulse is clipped, cut, doubled or full of dropouts.
+    """
+    force, steps, remarks = repair(window)
+    try:
+        contact = find_contact(window, force)
+    except np.linalg.LinAlgError as error:
+        refuse(f"{window.name}: the quiet parts are no noise", "noise, drift and hum", error)
+    steps += _told_background(contact)
+    for side, quiet in zip(("before", "after"), contact.quiet, strict=True):
+        if quiet < SHORT_QUIET:
+            remarks += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
+    rate = window.sample_rate
+    landings = _landings(window, contact)
+    touch, release = contact.touch, contact.release
+    contact_time = Estimate(
+        release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
+    )
+    if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
+        refuse(
+            f"{window.name}: the contact cannot be told from the noise: "
+            f"{1e3 * contact_time.value:.3g} ms with a standard uncertainty of "
+            f"{1e3 * contact_time.uncertainty:.2g} ms",
+            f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
+        )
+    impulse = _impulse(contact)
+    flights = []
+    leaving = release
+    for landing, again in landings:
+        flights.append(
+            Estimate(
+                landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty)
+            )
+        )
+        leaving = again
+    ways, told = _restitutions(impulse, contact_time, flights, height, mass, gravity)
+    scale = 0.0
+    if height and mass:
+        # Of 1 + e + g t/v0.
+        scale = calibration_uncertainty * impulse.value / (mass * math.sqrt(2 * gravity * height))
+    told += _told_difference(ways, scale)
+    restitution, calibration = _mean(ways, scale)
+    time = (np.arange(*contact.span)) / rate - touch.value
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    return Drop(
+        name=window.name,
+        time=time,
+        force=contact.force,
+        sample_rate=rate,
+        onset=window.start / rate + touch.value,
+        gate=(first, stop),
+        contact_time=contact_time,
+        restitution=restitution,
+        restitution_calibration=calibration,
+        restitution_by=" and ".join(ways),
+        restitutions=ways,
+        peak_force=_peak(contact),
+        impulse=impulse,
+        effective_mass=_effective_mass(impulse, contact_time, ways.get("bounces"), height, gravity),
+        noise=_noise(contact),
+        bounces=tuple(landing.value - touch.value for landing, _ in landings),
+        steps=steps,
+        remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
+        contact=contact,
+    )
+
+
+def _landings(window: Window, drop: Contact) -> list[tuple[Estimate, Estimate]]:
+    """Return first touch and release of the bounces, s from the first sample of the window."""
+    found = []
+    for bounce in window.bounces[:MAX_BOUNCES]:
+        first, stop = bounce.contact
+        least = least_quiet(bounce.sample_rate)
+        if first < least or len(bounce.force) - stop < least:
+            break
+        touch, release = find_edges(bounce, drop.background)
+        late = (bounce.start - window.start) / window.sample_rate
+        found.append(
+            (
+                Estimate(late + touch.value, touch.uncertainty),
+                Estimate(late + release.value, release.uncertainty),
+            )
+        )
+    return found
+
+
+def _impulse(contact: Contact) -> Estimate:
+    """Return the time integral of the force, N s: the sum over the gate."""
+    ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
+    variance = contact.covariance_of(ones)[0, 0]
+    return Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
+
+
+def _peak(contact: Contact) -> Estimate:
+    """Return the maximum of the force below 1.25 kHz, N."""
+    low = record_force(np.pad(contact.gated, 2), contact.sample_rate)
+    place = int(np.argmax(low)) * len(contact.covariance) // len(low)
+    variance = contact.background.variances[0] * min(RECORDED_BAND, contact.sample_rate / 2)
+    variance += contact.covariance[place, place]
+    return Estimate(float(low.max()), math.sqrt(variance))
+
+
+def _noise(contact: Contact) -> Noise:
+    """Return the noise of the quiet parts."""
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    quiet = np.concatenate([contact.force[:first], contact.force[stop:]])
+    deviation = 1.4826 * float(np.median(np.abs(quiet - np.median(quiet))))
+    white, pink, brown = map(float, contact.background.variances[:3])
+    return Noise(deviation, "before and after", white, pink, brown)
+
+
+def _told_background(contact: Contact) -> tuple[str, ...]:
+    """Return what was removed, a sentence each."""
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    offset = float(contact.under[first:stop].mean())
+    steps = [f"an offset of {offset:.3g} N was removed"]
+    drift, deviation = contact.background.drift
+    if abs(drift) > NOTABLE * deviation:
+        steps.append(f"a drift of {drift:.3g} N/s was removed")
+    frequency, amplitude, deviation = contact.background.hum
+    if amplitude > NOTABLE * deviation:
+        steps.append(f"hum of {frequency:g} Hz with an amplitude of {amplitude:.3g} N was removed")
+    return tuple(steps)
+
+
+def _told_aliased(contact: Contact) -> tuple[str, ...]:
+    """Return a sentence where content at half the rate folds back into the octave of 500 Hz.
+
+    Beyond half the rate the amplitude of a pulse with kinks falls as 1/f2.
+    """
+    rate = contact.sample_rate
+    lower, upper = OCTAVE_500
+    # Long enough for several frequencies in the octave.
+    force = np.pad(contact.gated, (0, int(rate / 20) + 3 * len(contact.gated)))
+    frequency = np.fft.rfftfreq(len(force), 1 / rate)
+    power = np.abs(np.fft.rfft(force)) ** 2
+    noise = contact.background.variances[0] * rate / 2 * len(contact.gated)
+    own = power[(frequency > lower) & (frequency < upper)].mean()
+    top = max(power[frequency > TOP * rate].mean() - 3 * noise, 0.0)
+    folded = top * (0.45 * rate / (rate - upper)) ** 4
+    error = 20 * math.log10(1 + math.sqrt(folded / own))
+    if error < NOTABLE_ERROR:
+        return ()
+    told = (
+        f"the force has content up to half the rate, {rate / 2:g} Hz: without a filter before "
+        f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
+    )
+    return (told,)
+
+
+def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formula
+    impulse: Estimate,
+    contact_time: Estimate,
+    flights: list[Estimate],
+    height: float | None,
+    mass: float | None,
+    gravity: float,
+) -> tuple[dict[str, Estimate], tuple[str, ...]]:
+    """Return the restitution by each way, and remarks (docs/recordings_theory.md, section 5)."""
+    ways: dict[str, Estimate] = {}
+    speed = math.sqrt(2 * gravity * height) if height else math.nan
+    if height and mass:
+        value = impulse.value / (mass * speed) - 1 - gravity * contact_time.value / speed
+        ways["impulse"] = Estimate(
+            value,
+            math.hypot(
+                impulse.uncertainty / (mass * speed), gravity * contact_time.uncertainty / speed
+            ),
+        )
+    if height and flights:
+        scale = gravity / (2 * speed)
+        ways["bounces"] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
+    elif len(flights) > 1:
+        one, two = flights[:2]
+        told = (
+            f"the restitution of the first bounce is {two.value / one.value:.3f}; that of the drop "
+            "itself is not known without the drop height"
+        )
+        return ways, (told,)
+    return ways, ()
+
+
+def _told_difference(ways: dict[str, Estimate], scale: float) -> tuple[str, ...]:
+    """Return a sentence where impulse and bounces differ; `scale` is what the calibration makes."""
+    if len(ways) < 2:  # noqa: PLR2004 - two ways
+        return ()
+    by, other = ways["impulse"], ways["bounces"]
+    difference = by.value - other.value
+    deviation = math.hypot(by.uncertainty, scale, other.uncertainty)
+    if abs(difference) <= NOTABLE * deviation:
+        return ()
+    told = (
+        f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
+        f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
+        "check mass, height and calibration"
+    )
+    return (told,)
+
+
+def _mean(ways: dict[str, Estimate], scale: float) -> tuple[Estimate, float]:
+    """Return the mean, weighted by 1/uncertainty2, and what the calibration makes of it.
+
+    The uncertainty of the impulse holds that of the calibration, `scale`; that of the mean is
+    without it, and grows with disagreement.
+    """
+    if not ways:
+        return Estimate.unknown(), 0.0
+    shared = np.array([scale if way == "impulse" else 0.0 for way in ways])
+    own = np.array([max(one.uncertainty, 1e-12) for one in ways.values()])
+    weight = 1 / (own**2 + shared**2)
+    value = np.array([one.value for one in ways.values()])
+    mean = float(weight @ value / weight.sum())
+    # Birge's ratio.
+    spread = float(weight @ (value - mean) ** 2) / max(len(ways) - 1, 1)
+    calibration = float(weight @ shared / weight.sum())
+    variance = max(1.0, spread) / float(weight.sum()) - calibration**2
+    return Estimate(mean, math.sqrt(max(variance, 0.0))), calibration
+
+
+def _effective_mass(
+    impulse: Estimate,
+    contact_time: Estimate,
+    restitution: Estimate | None,
+    height: float | None,
+    gravity: float,
+) -> Estimate:
+    """Return impulse over (v0 (1 + e) + g t_c), kg, e from bounces."""
+    if restitution is None or not height:
+        return Estimate(math.nan, math.nan)
+    speed = math.sqrt(2 * gravity * height)
+    change = speed * (1 + restitution.value) + gravity * contact_time.value
+    value = impulse.value / change
+    parts = (
+        impulse.uncertainty / change,
+        value * speed * restitution.uncertainty / change,
+        value * gravity * contact_time.uncertainty / change,
+    )
+    return Estimate(value, math.hypot(*parts))

@@ -1,0 +1,130 @@
+"""Faults of a pulse: clipped, cut, doubled, with dropouts; repaired where that can be seen."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.checks import refuse
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.recordings.drops import Window
+
+# Least quiet on each side, s, and samples of it.
+LEAST_QUIET = 1e-3
+LEAST_SAMPLES = 4
+# Samples of one value at the top that are clipped, where the force beside them falls by more than
+# FALL steps of the digits: a smooth top of this length falls by 4.
+FLAT = 4
+FALL = 12.0
+# A sample within this part of the full scale is at it.
+FULL = 0.999
+# A jump into or out of samples of one value that makes them a dropout, over the peak force: no
+# flank rises by this much between two samples of 20 kHz.
+JUMP = 0.04
+# Samples of one value that may be held.
+HELD = 3
+# Longest total of dropouts that is repaired, s.
+REPAIRED = 1e-3
+
+
+def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
+    """Return the force with its dropouts filled, what was done, and doubts.
+
+    Raises
+    ------
+    InputError
+        Where the pulse is cut, clipped, doubled or has long dropouts.
+    """
+    rate, (first, stop), name = window.sample_rate, window.contact, window.name
+    least = least_quiet(rate)
+    if first < least or window.stop - window.start - stop < least:
+        side = "starts" if first < least else "ends"
+        refuse(
+            f"{name}: the signal {side} within the pulse or less than 1 ms "
+            f"{'before' if first < least else 'behind'} it",
+            "quiet of 1 ms or more, better 100 ms, before and after the contact",
+        )
+    for remark in window.remarks:
+        if remark.startswith("two impacts"):
+            refuse(f"{name}: {remark}", "one impact, with quiet before and after it")
+    force = window.force
+    _refuse_clipped(window, force)
+    return _fill(window, force)
+
+
+def least_quiet(rate: float) -> int:
+    """Return the samples of quiet that each side of a contact needs."""
+    return max(math.ceil(LEAST_QUIET * rate), LEAST_SAMPLES)
+
+
+def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first samples of the runs of one value, and the lengths of the runs."""
+    starts = np.flatnonzero(np.diff(force, prepend=np.nan) != 0)
+    return starts, np.diff(np.append(starts, len(force)))
+
+
+def _refuse_clipped(window: Window, whole: NDArray[np.float64]) -> None:
+    """Raise InputError where the top of the pulse is flat."""
+    first, stop = window.contact
+    force = whole[first:stop]
+    starts, lengths = _runs(force)
+    top = force.max()
+    at_top = force[starts] == top
+    k = int(np.argmax(np.where(at_top, lengths, 0)))
+    start, length = int(starts[k]), int(lengths[k])
+    changes = np.abs(np.diff(force))
+    digit = changes[changes > 0].min(initial=np.inf)
+    half = max(length // 2, 1)
+    beside = [force[max(start - half, 0)], force[min(start + length - 1 + half, len(force) - 1)]]
+    clipped = length >= FLAT and top - max(beside) > FALL * digit
+    if window.signal.full_scale is not None:
+        at_scale = np.count_nonzero(force >= FULL * window.signal.full_scale)
+        clipped, length = clipped or at_scale > 1, max(length, int(at_scale))
+    if clipped:
+        refuse(
+            f"{window.name}: the force is clipped at {top:.4g} N for "
+            f"{1e3 * length / window.sample_rate:.3g} ms",
+            "a range that holds the peak",
+        )
+
+
+def _fill(
+    window: Window, force: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[str, ...]]:
+    """Return the force with dropouts filled from both sides, what was done, and doubts."""
+    first, stop = window.contact
+    rate = window.sample_rate
+    guard = int(LEAST_QUIET * rate)
+    first, stop = first + guard, stop - guard
+    level = force - np.median(
+        np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])
+    )
+    part = level[first:stop]
+    if not part.size:
+        return force, (), ()
+    starts, lengths = _runs(part)
+    before = np.abs(part[starts] - part[np.maximum(starts - 1, 0)])
+    ends = starts + lengths - 1
+    after = np.abs(part[np.minimum(ends + 1, len(part) - 1)] - part[ends])
+    limit = JUMP * part.max()
+    zero = (force[first:stop][starts] == 0) & (before > limit) & (after > limit)
+    held = (lengths >= HELD) & ((before > limit) | (after > limit))
+    lost = np.flatnonzero(zero | held)
+    total = int(lengths[lost].sum())
+    if not total:
+        return force, (), ()
+    told = f"{len(lost)} dropouts of {1e3 * total / rate:.3g} ms in all"
+    if total > REPAIRED * rate:
+        refuse(f"{window.name}: the contact has {told}", f"up to {1e3 * REPAIRED:g} ms")
+    good = np.ones(len(force), dtype=bool)
+    for k in lost:
+        good[first + starts[k] : first + starts[k] + lengths[k]] = False
+    filled = force.copy()
+    places = np.arange(len(force))
+    filled[~good] = np.interp(places[~good], places[good], force[good])
+    return filled, (f"{told} were filled by lines",), (f"the contact has {told}",)

@@ -1,0 +1,111 @@
+"""Formats of recordings: one file each, and one table that finds them by content or suffix."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, NamedTuple
+
+from thud.checks import refuse
+from thud.recordings.channel import Channel, guarded, shown_path
+from thud.recordings.probe import look
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+# Bytes at the begin of a file by which its format is found.
+HEAD = 4096
+TOUCHED = 8
+HDF5 = b"\x89HDF\r\n\x1a\n"
+
+
+class Format(NamedTuple):
+    """A format.
+
+    Attributes
+    ----------
+    name, module : str
+        Name for messages, and name of the module that reads it.
+    suffixes : tuple of str
+        Suffixes that promise it.
+    begins : callable
+        Whether the first bytes of a file are its own.
+    looks : bool
+        Whether its library hangs, dies or fills memory on damaged files, and looks first in a
+        process of its own.
+    """
+
+    name: str
+    module: str
+    suffixes: tuple[str, ...]
+    begins: Callable[[bytes], bool]
+    looks: bool = False
+
+
+def _is_uff(head: bytes) -> bool:
+    """Whether a file begins with the mark of a universal file and the number of a data set."""
+    lines = head.lstrip(b"\r\n").splitlines()[:2]
+    return len(lines) > 1 and lines[0].strip() == b"-1" and lines[1][:6].strip().isdigit()
+
+
+def _is_text(head: bytes) -> bool:
+    """Whether a file is text: UTF-16 with its mark, or without zero bytes."""
+    return bool(head) and (head[:2] in {b"\xff\xfe", b"\xfe\xff"} or b"\0" not in head)
+
+
+FORMATS = (
+    Format("WAV", "audio", (".wav", ".rf64", ".bwf"),
+           lambda head: head[:4] in {b"RIFF", b"RF64", b"BW64"} and head[8:12] == b"WAVE"),
+    Format("FLAC", "audio", (".flac",), lambda head: head[:4] == b"fLaC"),
+    Format("TDMS", "tdms", (".tdms",), lambda head: head[:4] == b"TDSm"),
+    Format("HDF5", "hdf5", (".h5", ".hdf5", ".hdf", ".nc", ".nc4"),
+           lambda head: any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048)),
+           looks=True),
+    Format("MATLAB", "matlab", (".mat",), lambda head: head[124:128] in {b"\0\1IM", b"\1\0MI"}),
+    Format("universal", "universal", (".uff", ".unv", ".uf"), _is_uff),
+    Format("text", "text", (".csv", ".tsv", ".txt", ".asc", ".dat", ".lvm", ".prn"), _is_text),
+)  # fmt: skip
+# Contents of files that are not read, and what to do with them.
+OTHERS = {
+    b"CDF": "NetCDF 4, which `nccopy -k nc4` makes of this older NetCDF",
+    b"PK\x03\x04": "the file that is in this archive, or the table saved as CSV",
+    b"\x1f\x8b": "the file that is in this archive",
+    b"\xd0\xcf\x11\xe0": "the table saved as CSV",
+}
+
+
+def read_channels(path: Path) -> list[Channel]:
+    """Return the channels of a file by its content.
+
+    Raises
+    ------
+    InputError
+        Where the format is not known or the file is damaged.
+    """
+    with guarded(path, "a file"), path.open("rb") as file:
+        head = file.read(HEAD)
+    name = shown_path(path)
+    if not head:
+        refuse(f"{name}: is empty", "a recording")
+    found = next((one for one in FORMATS if one.begins(head)), None)
+    promised = next((one for one in FORMATS if path.suffix.lower() in one.suffixes), None)
+    other = next((hint for start, hint in OTHERS.items() if head.startswith(start)), None)
+    if other:
+        refuse(f"{name}: is of a format that is not read", other)
+    if found is None or (found.module == "text" and promised not in {None, found}):
+        kinds = ", ".join(one.name for one in FORMATS)
+        what = f"is no {promised.name} file" if promised else "is of no known format"
+        refuse(f"{name}: {what} by its first bytes", f"{kinds} files")
+    module = importlib.import_module(f"{__name__}.{found.module}")
+    if found.looks:
+        look(lambda file: _touch(module.read_channels(file)), path, found.name)
+    with guarded(path, found.name):
+        channels: list[Channel] = module.read_channels(path)
+        return channels
+
+
+def _touch(channels: list[Channel]) -> None:
+    """Read the first and the last sample of some channels."""
+    for one in channels[:TOUCHED]:
+        one.samples(0, 1)
+        one.samples(one.n_sample - 1, one.n_sample)

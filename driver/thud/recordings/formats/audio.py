@@ -1,0 +1,130 @@
+"""WAV, RF64, BWF and FLAC by soundfile."""
+
+from __future__ import annotations
+
+import os
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from thud.checks import refuse
+from thud.recordings.channel import Channel, guarded, library, shown_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# Counts of full scale by the kind of samples, None for floats.
+SUBTYPES = {
+    "PCM_S8": 2.0**7, "PCM_U8": 2.0**7, "PCM_16": 2.0**15, "PCM_24": 2.0**23, "PCM_32": 2.0**31,
+    "FLOAT": None, "DOUBLE": None,
+}  # fmt: skip
+# Length of a chunk of which only the 64 bit table of a RF64 file, or nobody, knows the length.
+UNKNOWN = 0xFFFFFFFF
+# Maximum number of channels, and of chunks of a file.
+MOST_CHANNELS = 1024
+MOST_CHUNKS = 10000
+# Places of the date and the time in a broadcast chunk, and their lengths.
+DATE = slice(320, 330)
+CLOCK = slice(330, 338)
+
+
+@dataclass(frozen=True)
+class AudioSamples:
+    """One channel of an audio file, opened for each piece."""
+
+    path: Path
+    column: int
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the samples from start to before stop."""
+        soundfile = library("soundfile", "WAV and FLAC")
+        with guarded(self.path, "an audio file"), soundfile.SoundFile(os.fsencode(self.path)) as f:
+            f.seek(start)
+            block: NDArray[np.float64] = f.read(stop - start, dtype="float64", always_2d=True)
+        return np.ascontiguousarray(block[:, self.column])
+
+
+def read_channels(path: Path) -> list[Channel]:
+    """Return the channels of an audio file; integers are fractions of full scale."""
+    soundfile = library("soundfile", "WAV and FLAC")
+    name = shown_path(path)
+    with path.open("rb") as file:
+        is_flac = file.read(4) == b"fLaC"
+        date = "" if is_flac else _read_chunks(file, name)
+    with soundfile.SoundFile(os.fsencode(path)) as file:
+        kind, count, columns = file.subtype, file.frames, file.channels
+        rate = float(file.samplerate)
+    if kind not in SUBTYPES:
+        refuse(f"{name}: samples of the kind {kind}", ", ".join(SUBTYPES))
+    if columns > MOST_CHANNELS:
+        refuse(f"{name}: {columns} channels", f"up to {MOST_CHANNELS}")
+    # The rest of a lossless file that is cut off is missing at its last sample.
+    if count < 1 or (is_flac and not _is_complete(path, count)):
+        refuse(f"{name}: is cut off or has no samples", "a complete file")
+    counts = SUBTYPES[kind]
+    return [
+        Channel(
+            name="",
+            number=column + 1,
+            n_sample=count,
+            samples=AudioSamples(path, column),
+            unit="FS" if counts else "",
+            sample_rate=rate,
+            counts=counts,
+            date=date,
+        )
+        for column in range(columns)
+    ]
+
+
+def _is_complete(path: Path, count: int) -> bool:
+    """Whether the last sample of a file is there."""
+    return AudioSamples(path, 0)(count - 1, count).size == 1
+
+
+def _read_chunks(file: BinaryIO, name: str) -> str:
+    """Return the date of a WAV file; raise InputError where its samples are cut off.
+
+    The library reads what is left of a file that is cut off, without a word.
+    """
+    size = os.fstat(file.fileno()).st_size
+    lengths: dict[bytes, int] = {}
+    date, missing = "", None
+    for kind, begin, length in _chunks(file, lengths, size):
+        if kind == b"data":
+            missing = begin + length - size
+        if kind == b"ds64":
+            file.seek(begin)
+            lengths[b"data"] = struct.unpack("<QQ", file.read(16))[1]
+        if kind == b"bext":
+            file.seek(begin)
+            text = file.read(CLOCK.stop)
+            parts = (text[part].strip(b"\0 ").decode("ascii", "replace") for part in (DATE, CLOCK))
+            date = " ".join(part for part in parts if part.isprintable() and part)
+    if missing is None:
+        refuse(f"{name}: has no samples that can be found", "an undamaged WAV file")
+    if missing > 0:
+        refuse(f"{name}: is cut off, {missing} bytes are missing", "a complete file")
+    return date
+
+
+def _chunks(
+    file: BinaryIO, lengths: dict[bytes, int], size: int
+) -> Iterator[tuple[bytes, int, int]]:
+    """Yield kind, begin and length of the chunks of a WAV file."""
+    begin = 12
+    for _ in range(MOST_CHUNKS):
+        file.seek(begin)
+        head = file.read(8)
+        if len(head) < 8 or begin >= size:  # noqa: PLR2004 - of a chunk
+            return
+        kind, length = struct.unpack("<4sI", head)
+        if length == UNKNOWN:
+            length = lengths.get(kind, length)
+        yield kind, begin + 8, length
+        begin += 8 + length + length % 2

@@ -1,0 +1,250 @@
+"""HDF5, NetCDF 4 and MATLAB 7.3 by h5py."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud.checks import refuse
+from thud.recordings.channel import MIB, Channel, guarded, library, shown_path, shown_text
+from thud.recordings.grid import even_grid
+from thud.recordings.words import (
+    DATE,
+    TIME_UNITS,
+    UNIT,
+    find_rate,
+    find_word,
+    is_time,
+    read_number,
+    split_title,
+    text_of,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# Maximum numbers of objects and attributes that are looked at, and of groups inside each other.
+MOST_OBJECTS = 10_000
+MOST_ATTRIBUTES = 256
+DEEPEST = 32
+# Maximum numbers of bytes of a header's value and of a chunk.
+LONGEST_WORD = 4096
+LARGEST_CHUNK = 2**26
+# More than this, a packed dataset does not shrink.
+PACKED = 1100
+SHORTEST = 8
+MOST_COLUMNS = 256
+# Longer times are not read.
+MOST_TIMES = 2**22
+# Classes of MATLAB that are vectors of numbers in the file but mean something else.
+MATLAB_CLASS = frozenset({"matlabclass"})
+MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
+
+
+@dataclass(frozen=True)
+class Hdf5Samples:
+    """One row or column of a dataset, opened for each piece; scaled as NetCDF says."""
+
+    path: Path
+    dataset: str
+    column: tuple[int, int] | None
+    scale: float = 1.0
+    offset: float = 0.0
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the samples from start to before stop."""
+        h5py = library("h5py", "HDF5")
+        with guarded(self.path, "HDF5"), h5py.File(os.fsencode(self.path), "r") as file:
+            piece: Any = slice(start, stop)
+            if self.column is not None:
+                axis, place = self.column
+                piece = (place, piece) if axis == 0 else (piece, place)
+            values = np.asarray(file[self.dataset][piece], dtype=np.float64)
+            return values * self.scale + self.offset
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A numeric dataset that may be a channel, with its names and values of headers."""
+
+    key: str
+    data: Any
+    header: list[tuple[str, object]]
+
+    @property
+    def axis(self) -> int:
+        """Axis of the samples."""
+        return int(np.argmax(self.data.shape))
+
+    @property
+    def n_sample(self) -> int:
+        """Number of samples."""
+        return int(max(self.data.shape))
+
+    @property
+    def parent(self) -> str:
+        """Path of the group."""
+        return self.key.rpartition("/")[0]
+
+
+def read_channels(path: Path) -> list[Channel]:
+    """Return the numeric vectors of a file, and the columns of its slender matrices."""
+    h5py = library("h5py", "HDF5")
+    name = shown_path(path)
+    with h5py.File(os.fsencode(path), "r") as file:
+        found = _walk(h5py, file, path)
+        times = [one for one in found if is_time(one.key.rpartition("/")[2])]
+        channels: list[Channel] = []
+        for one in found:
+            if one not in times or len(found) == 1:
+                channels += _channels(path, one, times, len(channels))
+    if not channels:
+        refuse(f"{name}: has no dataset of {SHORTEST} or more real numbers", "a recorded channel")
+    return channels
+
+
+def _walk(h5py: Any, file: Any, path: Path) -> list[_Found]:  # noqa: ANN401 - a library
+    """Return the datasets that may be channels."""
+    found: list[_Found] = []
+    waiting: list[tuple[str, int, list[tuple[str, object]]]] = [("", 0, [])]
+    seen = {h5py.h5o.get_info(file.id).addr}
+    while waiting:
+        place, depth, above = waiting.pop()
+        if depth > DEEPEST:
+            refuse(f"{shown_path(path)}: groups more than {DEEPEST} deep", "a recording")
+        group = file[place or "/"]
+        header = [*_attributes(h5py, group), *above]
+        vectors = []
+        for key, entry in _entries(h5py, group, seen, shown_path(path)):
+            if isinstance(entry, h5py.Group):
+                waiting.append((f"{place}/{key}", depth + 1, header))
+            elif _is_word(h5py, entry.shape, entry.dtype) and not entry.chunks:
+                header.insert(0, (key, text_of(entry[()])))
+            elif _is_channel(entry, f"{shown_path(path)}: {shown_text(key)}", path):
+                vectors.append((f"{place}/{key}", entry))
+        for key, data in vectors:
+            own = _attributes(h5py, data)
+            if find_word(own, MATLAB_CLASS) not in MATLAB_OTHERS:
+                found.append(_Found(key, data, [*own, *header]))
+    return found
+
+
+def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
+    """Yield groups and datasets of a group; follow hard links only, each object once."""
+    for key in group:
+        link = group.get(key, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            refuse(f"{name}: {shown_text(key)} is a link to another file", "the other file")
+        # MATLAB keeps the contents of cells under this name.
+        if not isinstance(link, h5py.HardLink) or key == "#refs#":
+            continue
+        entry = group[key]
+        address = h5py.h5o.get_info(entry.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        if len(seen) > MOST_OBJECTS:
+            refuse(f"{name}: more than {MOST_OBJECTS} objects", "a recording")
+        if isinstance(entry, h5py.Group) or getattr(entry, "shape", None) is not None:
+            yield key, entry
+
+
+def _attributes(h5py: Any, entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - a library
+    """Return the attributes of an object that hold one number or text."""
+    if len(entry.attrs) > MOST_ATTRIBUTES:
+        return []
+    found = ((key, entry.attrs.get_id(key)) for key in entry.attrs)
+    return [
+        (key, text_of(entry.attrs[key]))
+        for key, one in found
+        if _is_word(h5py, one.shape, one.dtype)
+    ]
+
+
+def _is_word(h5py: Any, shape: tuple[int, ...], dtype: Any) -> bool:  # noqa: ANN401 - a library
+    """Whether a value is one number or text; damaged files claim any number of them."""
+    is_text = h5py.check_string_dtype(dtype) is not None
+    return (
+        math.prod(shape) == 1
+        and (dtype.kind in "iufSU" or is_text)
+        and dtype.itemsize <= LONGEST_WORD
+    )
+
+
+def _is_channel(data: Any, name: str, path: Path) -> bool:  # noqa: ANN401 - of a library
+    """Whether a dataset may be a channel; raise InputError where it is not plain numbers inside."""
+    if data.dtype.kind not in "iuf" or len(data.shape) not in {1, 2}:
+        return False
+    if max(data.shape) < SHORTEST or math.prod(data.shape) // max(data.shape) > MOST_COLUMNS:
+        return False
+    if data.is_virtual or data.external:
+        refuse(f"{name}: lies in another file", "the other file")
+    size = math.prod(data.shape) * data.dtype.itemsize
+    held = data.id.get_storage_size() * (PACKED if data.chunks else 1)
+    if size > held or (not data.chunks and size > path.stat().st_size):
+        refuse(f"{name}: claims {size} bytes and holds {held} at most", "an undamaged HDF5 file")
+    if data.chunks and math.prod(data.chunks) * data.dtype.itemsize > LARGEST_CHUNK:
+        refuse(
+            f"{name}: chunks of {math.prod(data.chunks) * data.dtype.itemsize / MIB:.0f} MiB",
+            f"chunks of up to {LARGEST_CHUNK // MIB} MiB",
+        )
+    return True
+
+
+def _channels(path: Path, one: _Found, times: list[_Found], before: int) -> list[Channel]:
+    """Return the channels of a dataset."""
+    count = math.prod(one.data.shape) // one.n_sample
+    rate, date = find_rate(one.header), find_word(one.header, DATE)
+    steps: tuple[str, ...] = ()
+    same = next(
+        (t for t in times if t.n_sample == one.n_sample and one.parent.startswith(t.parent)), None
+    )
+    if rate is None and same is not None:
+        rate, steps, since = _rate_of_times(path, same)
+        date = date or since
+    scale, offset = (
+        number[0] if (number := read_number(find_word(one.header, frozenset({word})))) else usual
+        for word, usual in (("scalefactor", 1.0), ("addoffset", 0.0))
+    )
+    title = one.key.strip("/")
+    samples = Hdf5Samples(path, one.key, None, scale, offset)
+    return [
+        Channel(
+            name=title + (f"[{i + 1}]" if count > 1 else ""),
+            number=before + i + 1,
+            n_sample=one.n_sample,
+            samples=samples
+            if len(one.data.shape) == 1
+            else replace(samples, column=(1 - one.axis, i)),
+            unit=find_word(one.header, UNIT) or split_title(title.rpartition("/")[2])[1],
+            sample_rate=rate,
+            date=date,
+            steps=steps,
+        )
+        for i in range(count)
+    ]
+
+
+def _rate_of_times(path: Path, times: _Found) -> tuple[float, tuple[str, ...], str]:
+    """Return the rate of a dataset of times, Hz, what was done, and their begin if it is told."""
+    name = f"{shown_path(path)}: {shown_text(times.key)}"
+    if times.n_sample > MOST_TIMES:
+        refuse(
+            f"{name}: {times.n_sample} times", f"up to {MOST_TIMES}, or an attribute sample_rate"
+        )
+    unit, _, since = find_word(times.header, UNIT).partition(" since ")
+    unit = unit or split_title(times.key)[1]
+    values = np.asarray(times.data[()], dtype=np.float64).ravel()
+    if unit.casefold() not in TIME_UNITS:
+        refuse(
+            f"{name}: unit = {shown_text(unit)!r} is no time", ", ".join(filter(None, TIME_UNITS))
+        )
+    _, step, steps = even_grid(values * TIME_UNITS[unit.casefold()], name)
+    return 1 / step, steps, since

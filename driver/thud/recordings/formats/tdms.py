@@ -1,0 +1,112 @@
+"""TDMS files of LabVIEW by npTDMS."""
+
+from __future__ import annotations
+
+import logging
+import os
+import struct
+import weakref
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from thud.checks import refuse
+from thud.recordings.channel import BoundedFile, Channel, guarded, library, shown_path
+from thud.recordings.words import DATE, UNIT, find_rate, find_word, text_of
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+MOST_CHANNELS = 1024
+MOST_SEGMENTS = 200_000
+# Mark, kinds of contents, version, and lengths of a segment and of its description.
+LEAD = struct.Struct("<4sIIQQ")
+
+
+@dataclass(frozen=True)
+class TdmsSamples:
+    """One channel of a TDMS file, which stays open: its description may be long."""
+
+    file: _OpenFile
+    group: str
+    name: str
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the samples from start to before stop."""
+        with guarded(self.file.path, "TDMS"):
+            channel = self.file.tdms[self.group][self.name]
+            return np.asarray(channel[start:stop], dtype=np.float64)
+
+
+class _OpenFile:
+    """A TDMS file that is opened when it is needed, also in another process."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[type[_OpenFile], tuple[Path]]:
+        return _OpenFile, (self.path,)
+
+    @cached_property
+    def tdms(self) -> Any:  # noqa: ANN401 - of the library
+        """The file of the library; closed with this object."""
+        file = self.path.open("rb")
+        weakref.finalize(self, file.close)
+        return library("nptdms", "TDMS").TdmsFile.open(BoundedFile(file, shown_path(self.path)))
+
+
+def read_channels(path: Path) -> list[Channel]:
+    """Return the numeric channels of a TDMS file."""
+    library("nptdms", "TDMS")
+    # What it warns of is refused here.
+    logging.getLogger("nptdms").setLevel(logging.ERROR)
+    with path.open("rb") as raw:
+        _require_complete(raw, shown_path(path))
+    file = _OpenFile(path)
+    found = [(group, one) for group in file.tdms.groups() for one in group.channels()]
+    if len(found) > MOST_CHANNELS:
+        refuse(f"{shown_path(path)}: {len(found)} channels", f"up to {MOST_CHANNELS}")
+    return [
+        _channel(file, number, group, one)
+        for number, (group, one) in enumerate(found, start=1)
+        if one.dtype.kind in "iuf" and len(one)
+    ]
+
+
+def _channel(file: _OpenFile, number: int, group: Any, one: Any) -> Channel:  # noqa: ANN401
+    """Return a channel of a TDMS file."""
+    size = file.path.stat().st_size
+    if len(one) > size:  # a sample has at least a byte
+        refuse(
+            f"{shown_path(file.path)}: {len(one)} samples in {size} bytes", "an undamaged TDMS file"
+        )
+    owners = [owner.properties for owner in (one, group, file.tdms)]
+    items = [(str(key), text_of(value)) for owner in owners for key, value in owner.items()]
+    return Channel(
+        name=one.name,
+        number=number,
+        n_sample=len(one),
+        samples=TdmsSamples(file, group.name, one.name),
+        unit=find_word(items, UNIT),
+        sample_rate=find_rate(items),
+        date=find_word(items, DATE),
+    )
+
+
+def _require_complete(file: BinaryIO, name: str) -> None:
+    """Raise InputError where a segment is cut off, which the library only warns of."""
+    size = os.fstat(file.fileno()).st_size
+    begin = 0
+    for _ in range(MOST_SEGMENTS):
+        file.seek(begin)
+        lead = file.read(LEAD.size)
+        if not lead:
+            return
+        if len(lead) < LEAD.size or begin + LEAD.size + LEAD.unpack(lead)[3] > size:
+            refuse(f"{name}: is cut off in the segment at byte {begin}", "a complete file")
+        begin += LEAD.size + LEAD.unpack(lead)[3]
+    refuse(f"{name}: more than {MOST_SEGMENTS} segments", "a recording")

@@ -1,0 +1,100 @@
+"""Drops that differ from the others."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+# Probability that any of several drops that differ by chance is marked.
+SIGNIFICANCE = 0.05
+# Deviation, in the unit of the values, that is rounding and marks no drop.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A drop that differs from the others by more than chance: marked, never left out.
+
+    Attributes
+    ----------
+    name, quantity : str
+        Name of the drop, and the quantity in which it differs.
+    value : float
+        Its value.
+    score, critical : float
+        Deviation from the mean in standard deviations, and the largest one that chance explains.
+    """
+
+    name: str
+    quantity: str
+    value: float
+    score: float
+    critical: float
+
+    def __str__(self) -> str:
+        """Return a sentence."""
+        return (
+            f"{self.name}: {self.quantity} {self.value:.6g} lies {self.score:.2f} standard "
+            f"deviations from the mean of the drops (Grubbs, 5 %: {self.critical:.2f})"
+        )
+
+
+def find_outliers(
+    values: Sequence[float] | NDArray[np.float64],
+    names: Sequence[str],
+    quantity: str,
+    uncertainty: Sequence[float] | NDArray[np.float64] | None = None,
+    significance: float = SIGNIFICANCE,
+) -> tuple[Outlier, ...]:
+    """Return the drops whose value differs from that of the others.
+
+    Grubbs' two-sided test, exact for three and more normal values; with ten or more values,
+    Rosner's generalisation looks for one outlier in five. A deviation within the expanded
+    uncertainty (1.96 times the standard one) of the value itself marks no drop.
+
+    Parameters
+    ----------
+    values : array_like, shape (n_drop,)
+        Values; those that are not finite are left out.
+    names
+        Names of the drops.
+    quantity
+        What the values are, for the message.
+    uncertainty : array_like, shape (n_drop,), optional
+        Standard uncertainties of the values alone.
+    significance
+        Probability that any of the drops is marked where all differ by chance.
+    """
+    data = np.asarray(values, dtype=np.float64)
+    own = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
+    rest = [int(i) for i in np.flatnonzero(np.isfinite(data))]
+    removed: list[Outlier] = []
+    last = 0
+    for step in range(max(1, len(rest) // 5)):
+        count = len(rest)
+        if count < 3:  # noqa: PLR2004 - two values lie at the same distance of their mean
+            break
+        mean, deviation = data[rest].mean(), data[rest].std(ddof=1)
+        worst = max(rest, key=lambda i: abs(data[i] - mean))
+        distance = abs(data[worst] - mean)
+        if distance <= ROUNDING:
+            break
+        quantile = student.ppf(1 - significance / (2 * count), count - 2)
+        critical = (count - 1) / math.sqrt(count) * quantile / math.sqrt(count - 2 + quantile**2)
+        score = distance / deviation
+        removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
+        rest.remove(worst)
+        # Rosner: all up to the last that exceeds its critical value are outliers.
+        if score > critical and distance > norm.ppf(0.975) * own[worst]:
+            last = step + 1
+    return tuple(removed[:last])

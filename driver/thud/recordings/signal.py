@@ -1,0 +1,131 @@
+"""One recorded channel as a force, read piece by piece."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.checks import refuse, require_array, require_number, require_real
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import ArrayLike, NDArray
+
+# Bytes of a file that are hashed at once.
+HASHED = 2**20
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One channel of one file, in newtons; only what is asked for is read.
+
+    Attributes
+    ----------
+    name : str
+        Name of the file, and of the channel where there are several.
+    path : str
+        Path of the file; empty for an array.
+    sample_rate : float
+        Samples per second, Hz.
+    n_sample : int
+        Number of samples.
+    full_scale : float or None
+        Largest force that the format of the file can hold, N; None where that is not known.
+    date : str
+        Date of the measurement where the file says so, or empty.
+    calibration : str
+        How the values of the file became newtons, in words.
+    calibration_uncertainty : float or None
+        Relative standard uncertainty of the calibration; None where it is not known.
+    steps : tuple of str
+        What reading has done, a sentence each.
+    remarks : tuple of str
+        What is possible but not plausible, a sentence each.
+    samples : callable
+        Returns the force, N, shape (stop - start,), of the samples from start to before stop.
+    """
+
+    name: str
+    path: str
+    sample_rate: float
+    n_sample: int
+    samples: Callable[[int, int], NDArray[np.float64]] = field(repr=False)
+    full_scale: float | None = None
+    date: str = ""
+    calibration: str = ""
+    calibration_uncertainty: float | None = None
+    steps: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+    @classmethod
+    def from_array(cls, force: ArrayLike, sample_rate: float, name: str = "recording") -> Signal:
+        """Return the signal of a force in memory, N, shape (n_sample,)."""
+        values = require_real(f"{name}: force", require_array(f"{name}: force", force, (1,)))
+        require_number(f"{name}: sample_rate", sample_rate)
+        if not sample_rate > 0:
+            refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")
+        if not np.isfinite(values).all():
+            refuse(f"{name}: a value is not finite", "real numbers")
+        return cls(name, "", float(sample_rate), len(values), ArraySamples(values))
+
+    @cached_property
+    def checksum(self) -> str:
+        """SHA-256 of the file, of an array that of its values, in hexadecimal digits."""
+        digest = hashlib.sha256()
+        if not self.path:
+            digest.update(self.read(0, self.n_sample).tobytes())
+            return digest.hexdigest()
+        try:
+            with Path(self.path).open("rb") as file:
+                while block := file.read(HASHED):
+                    digest.update(block)
+        except OSError as error:
+            refuse(f"{self.name}: cannot be read ({error.strerror})", "a readable file", error)
+        return digest.hexdigest()
+
+    def read(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the force of the samples from start to before stop, N, positive in compression.
+
+        Parameters
+        ----------
+        start, stop
+            Numbers of samples, 0 to `n_sample`.
+
+        Returns
+        -------
+        ndarray, shape (stop - start,)
+
+        Raises
+        ------
+        InputError
+            Where the file has changed, is damaged there, or holds values that are not finite.
+        """
+        if not 0 <= start <= stop <= self.n_sample:
+            refuse(f"{self.name}: samples {start} to {stop}", f"samples 0 to {self.n_sample}")
+        force = self.samples(start, stop)
+        if force.shape != (stop - start,):
+            refuse(
+                f"{self.name}: {force.size} samples from sample {start} on, {stop - start} are due",
+                "a file that is complete and does not change",
+            )
+        if not np.isfinite(force).all():
+            place = start + int(np.flatnonzero(~np.isfinite(force))[0])
+            refuse(f"{self.name}: sample {place + 1} is not finite", "real numbers")
+        return force
+
+
+@dataclass(frozen=True, eq=False)
+class ArraySamples:
+    """Samples that are in memory, shape (n_sample,)."""
+
+    values: NDArray[np.float64]
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return a copy of the samples from start to before stop."""
+        return self.values[start:stop].copy()

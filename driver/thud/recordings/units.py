@@ -1,0 +1,178 @@
+"""Units of recorded values, and their conversion to newtons by a calibration."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from thud.checks import refuse
+
+# By unit: the unit it is a multiple of, and the multiple.
+UNITS: dict[str, tuple[str, float]] = {
+    "N": ("N", 1.0), "kN": ("N", 1e3), "MN": ("N", 1e6), "mN": ("N", 1e-3), "daN": ("N", 10.0),
+    "kgf": ("N", 9.80665), "kp": ("N", 9.80665), "lbf": ("N", 4.4482216152605),
+    "V": ("V", 1.0), "mV": ("V", 1e-3), "uV": ("V", 1e-6), "µV": ("V", 1e-6), "μV": ("V", 1e-6),
+    "pC": ("pC", 1.0), "nC": ("pC", 1e3),
+    "counts": ("counts", 1.0), "FS": ("FS", 1.0),
+}  # fmt: skip
+# The unit of values of a file that names none.
+ASSUMED = "N?"
+# Other spellings, in lower case.
+SPELLINGS = {
+    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "n": "N", "kn": "kN",
+    "lb": "lbf", "lbs": "lbf", "volt": "V", "volts": "V", "v": "V", "mv": "mV", "millivolt": "mV",
+    "millivolts": "mV", "pc": "pC", "count": "counts", "digit": "counts", "digits": "counts",
+    "lsb": "counts", "bit": "counts", "bits": "counts", "cts": "counts", "adc": "counts",
+    "fs": "FS", "full scale": "FS", "fullscale": "FS",
+}  # fmt: skip
+ALLOWED = ", ".join(UNITS)
+EXAMPLES = "such as 250 (N per unit), '250 N/V', '4.1 pC/N, 10 mV/pC', '10 V/FS, 4 mV/N'"
+FACTOR = re.compile(
+    r"(?P<value>[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(?P<top>[^\s/]+)\s*/\s*(?P<bottom>.+)"
+)
+# Maximum number of factors of a chain, and sizes of N per unit that any plate has.
+MOST = 8
+SIZES = (1e-30, 1e30)
+
+
+class Factor(NamedTuple):
+    """A number of one unit per another, both without multiples."""
+
+    value: float
+    top: str
+    bottom: str
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """How recorded values become newtons.
+
+    Attributes
+    ----------
+    chain : str
+        Factors from the recorded unit to newtons, in any order: ``"250 N/V"``, or with a charge
+        amplifier ``"4.1 pC/N, 10 mV/pC"``.
+    uncertainty : float or None
+        Relative standard uncertainty; None where it is not known.
+    origin : str
+        How it was found, in words.
+    """
+
+    chain: str
+    uncertainty: float | None = None
+    origin: str = ""
+
+    def __post_init__(self) -> None:
+        """Raise InputError where the chain or the uncertainty are not allowed."""
+        read_chain(self.chain)
+        if self.uncertainty is None:
+            return
+        number = isinstance(self.uncertainty, int | float)
+        if not number or not 0 <= self.uncertainty < 1:
+            refuse(f"calibration: uncertainty = {self.uncertainty!r}", "0 <= uncertainty < 1")
+
+
+def find_unit(text: str) -> str:
+    """Return the unit that a text names; empty where it names none.
+
+    >>> find_unit("Newtons"), find_unit("mmHg")
+    ('N', '')
+    """
+    word = text.strip()
+    return word if word in UNITS else SPELLINGS.get(word.casefold(), "")
+
+
+def require_unit(text: object, place: str) -> str:
+    """Return the unit that a text names; raise InputError where it names none."""
+    unit = find_unit(text) if isinstance(text, str) else ""
+    if not unit:
+        refuse(f"{place}: unit = {text!r} is not known", ALLOWED)
+    return unit
+
+
+def read_chain(text: object) -> list[Factor]:
+    """Return the factors of a chain; raise InputError where it is none.
+
+    >>> read_chain("10 mV/pC")
+    [Factor(value=0.01, top='V', bottom='pC')]
+    """
+    if not isinstance(text, str):
+        refuse(f"calibration = {text!r} is not allowed", EXAMPLES)
+    parts = [part.strip() for part in re.split(r"[;,]", text[:1000]) if part.strip()]
+    factors = []
+    for part in parts:
+        found = FACTOR.fullmatch(part)
+        value = float(found["value"]) if found else 0.0
+        if not found or not SIZES[0] < abs(value) < SIZES[1]:
+            refuse(f"calibration: {part[:60]!r} is not a number with units", EXAMPLES)
+        (top, over), (bottom, under) = (
+            UNITS[require_unit(found[side], f"calibration {part[:60]!r}")]
+            for side in ("top", "bottom")
+        )
+        factors.append(Factor(value * over / under, top, bottom))
+    if not 1 <= len(factors) <= MOST:
+        refuse(f"calibration: {len(factors)} factors", f"1 to {MOST}, {EXAMPLES}")
+    return factors
+
+
+def newtons_per_unit(
+    unit: str, calibration: float | str | Calibration | None, counts: float | None, place: str
+) -> tuple[float, str, float | None]:
+    """Return N per unit of the values, how that was found in words, and its relative uncertainty.
+
+    The uncertainty is None where it is not known.
+
+    Parameters
+    ----------
+    unit
+        Unit of the values, `ASSUMED`, or empty where a number of N per value is given.
+    calibration
+        N per unit, a chain of factors, or None where the values are forces.
+    counts
+        Counts of full scale where the values are integers, else None.
+    place
+        File and channel, for messages.
+    """
+    if unit == ASSUMED:
+        return 1.0, "values taken to be in N", None
+    base, multiple = UNITS.get(unit, ("", 1.0))
+    if calibration is None:
+        if base != "N":
+            refuse(f"{place}: the values are in {unit} and no calibration is given", EXAMPLES)
+        return multiple, f"values in {unit}", None
+    if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
+        if not SIZES[0] < abs(calibration) < SIZES[1]:
+            refuse(f"{place}: calibration = {calibration!r} is not allowed", EXAMPLES)
+        return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
+    known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
+    factors = read_chain(known.chain)
+    scale = Factor(counts, "counts", "FS") if counts else None
+    found = _follow(base, factors, scale)
+    if found is None:
+        refuse(
+            f"{place}: calibration {known.chain!r} does not lead from {unit} to N by all its "
+            "factors",
+            EXAMPLES,
+        )
+    value = found * multiple
+    if not math.isfinite(value) or not SIZES[0] < abs(value) < SIZES[1]:
+        refuse(f"{place}: calibration {known.chain!r} gives {value:g} N per {unit}", EXAMPLES)
+    words = f"{known.chain}: {value:.6g} N per {unit}" + (f" ({known.origin})" * bool(known.origin))
+    return value, words, known.uncertainty
+
+
+def _follow(unit: str, factors: list[Factor], scale: Factor | None) -> float | None:
+    """Return N per unit by a path that takes each factor once, that of full scale if need be."""
+    if unit == "N" and not factors:
+        return 1.0
+    for i, (value, top, bottom) in enumerate(factors):
+        others = factors[:i] + factors[i + 1 :]
+        # An amplifier, 10 V/V, is undone.
+        for start, end, step in ((top, bottom, 1 / value), (bottom, top, value)):
+            if start == unit and (rest := _follow(end, others, scale)) is not None:
+                return step * rest
+    return _follow(unit, [*factors, scale], None) if scale else None

@@ -1,0 +1,103 @@
+"""A measured recording as NetCDF: the content of ``recording.nc``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import h5netcdf  # noqa: F401 - xarray names a missing one late
+import numpy as np
+import xarray as xr
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+# Unit and meaning of the numbers of each drop.
+ESTIMATES = {
+    "contact_time": ("s", "contact time"),
+    "restitution": ("1", "coefficient of restitution"),
+    "peak_force": ("N", "maximum force below 1.25 kHz"),
+    "impulse": ("N s", "impulse of the contact"),
+    "effective_mass": ("kg", "impulse over the change of velocity"),
+}
+# Name and meaning of the levels of the average, by their keys in a report.
+LEVELS = {
+    "level": ("level", "force exposure level of the average, re 1 N and 1 s"),
+    "uncertainty": ("level_uncertainty", "standard uncertainty of the level"),
+    "expanded_uncertainty": ("level_expanded", "expanded uncertainty of the level, 95 %"),
+    "background": ("background", "level of the noise over the same gate"),
+    "spread": ("spread", "standard deviation of the levels of the drops"),
+}
+FILES = {"name": "name", "sha256": "SHA-256", "date": "date", "calibration": "calibration"}
+PROVENANCE = (
+    "name", "thud", "source", "verdict", "confidence", "laboratory", "ball", "serial", "date",
+    "temperature", "mass", "height", "calibration_uncertainty",
+)  # fmt: skip
+
+
+def netcdf(data: dict[str, Any]) -> bytes:
+    """Return the content of a NetCDF file of what a report says."""
+    return bytes(recording_dataset(data).to_netcdf(engine="h5netcdf"))
+
+
+def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
+    """Return drops, levels and files of what `thud.report.data.report_data` returns."""
+    drops, files = data["drops"], data["files"]
+    onset = {"units": "s", "long_name": "time of first touch in the file"}
+    variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}
+    for name, (unit, meaning) in ESTIMATES.items():
+        for key, suffix, of in (
+            ("value", "", ""),
+            ("uncertainty", "_uncertainty", "standard uncertainty of the "),
+        ):
+            values = _numbers(one[name][key] for one in drops)
+            about = {"units": unit, "long_name": of + meaning}
+            variables[name + suffix] = ("drop", values, about)
+    coordinates: dict[str, Any] = {"drop": ("drop", _texts(one["name"] for one in drops))}
+    for bands, found in data["levels"].items():
+        words = {"units": "Hz", "long_name": "nominal frequency"}
+        coordinates[bands] = (bands, np.array(found["band"]), words)
+        for key, (name, meaning) in LEVELS.items():
+            about = {"units": "dB", "long_name": meaning}
+            variables[f"{bands}_{name}"] = (bands, _numbers(found[key]), about)
+        flag = {"long_name": "corrected for the background, an upper bound in it, or no level"}
+        variables[f"{bands}_flag"] = (bands, _texts(found["flag"]), flag)
+        about = {"units": "dB", "long_name": "force exposure level of each drop"}
+        levels = np.array([_numbers(row) for row in found["drops"]])
+        variables[f"{bands}_drop_level"] = (("drop", bands), levels, about)
+    for key, meaning in FILES.items():
+        words = {"long_name": f"{meaning} of the file"}
+        variables[f"file_{key}"] = ("file", _texts(one[key] for one in files), words)
+    return xr.Dataset(variables, coordinates, _attributes(data))
+
+
+def _attributes(data: dict[str, Any]) -> dict[str, Any]:
+    """Return where the numbers come from."""
+    known = {key: data[key] for key in PROVENANCE if data[key] not in (None, "")}
+    told = {
+        kind: "\n".join(
+            dict.fromkeys(
+                f"{one['name']}: {sentence}"
+                for key in ("files", "drops")
+                for one in data[key]
+                for sentence in one[kind]
+            )
+        )
+        for kind in ("steps", "remarks")
+    }
+    found = {**known, "instruments": "\n".join(data["instruments"]), **told}
+    return {k: _plain(one) if isinstance(one, str) else one for k, one in found.items()}
+
+
+def _numbers(values: Iterable[float | None]) -> NDArray[np.float64]:
+    return np.array([np.nan if one is None else one for one in values], dtype=np.float64)
+
+
+def _texts(values: Iterable[str]) -> NDArray[np.object_]:
+    return np.array([_plain(one) for one in values], dtype=object)
+
+
+def _plain(text: str) -> str:
+    """Return a text that HDF5 can hold: no zeros, no lone surrogates."""
+    return text.replace("\0", " ").encode("utf-8", "replace").decode()

@@ -1,0 +1,68 @@
+"""Sentences about many drops, in few lines."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
+
+
+def group_sentences(said: Iterable[tuple[str, str]], places: int, kind: str) -> list[str]:
+    """Return sentences that differ in numbers only as one, with the range of each number.
+
+    Parameters
+    ----------
+    said
+        Place (name of a drop or a file) and sentence.
+    places
+        Number of all places.
+    kind
+        What places are, such as ``"drops"``.
+
+    >>> group_sentences([("a", "an offset of 3 N"), ("b", "an offset of 4.5 N")], 2, "drops")
+    ['an offset of 3 to 4.5 N (2 of 2 drops)']
+    """
+    groups: dict[str, list[tuple[str, list[str]]]] = {}
+    for place, sentence in said:
+        pattern = NUMBER.sub("\0", sentence)
+        groups.setdefault(pattern, []).append((place, NUMBER.findall(sentence)))
+    found = []
+    for pattern, members in groups.items():
+        names = list(dict.fromkeys(place for place, _ in members))
+        columns = zip(*(numbers for _, numbers in members), strict=True)
+        text = pattern
+        for column in columns:
+            text = text.replace("\0", _range(column), 1)
+        if places > 1:
+            text += f" ({names[0]})" if len(names) == 1 else f" ({len(names)} of {places} {kind})"
+        found.append(text)
+    return found
+
+
+def fit_lines(
+    items: Sequence[str], lines: int, count: Callable[[str], int], rest: str = "in report.json"
+) -> list[str]:
+    """Return the items that fit in a number of lines, and how many more there are.
+
+    `count` returns the lines of a text.
+    """
+    if sum(map(count, items)) <= lines:
+        return list(items)
+    kept: list[str] = []
+    used = 1
+    for item in items:
+        used += count(item)
+        if used > lines:
+            break
+        kept.append(item)
+    return [*kept, f"and {len(items) - len(kept)} more, {rest}"]
+
+
+def _range(texts: Sequence[str]) -> str:
+    """Return the minimum and the maximum of numbers as they are written."""
+    low, high = min(texts, key=float), max(texts, key=float)
+    return low if float(low) == float(high) else f"{low} to {high}"

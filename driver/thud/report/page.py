@@ -1,0 +1,384 @@
+"""The page of a calibration report: one sheet of A4 in one file, from its data and its figures."""
+
+from __future__ import annotations
+
+import html
+import io
+import math
+import re
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+
+from thud.recordings.levels import BACKGROUND, MARGIN
+from thud.recordings.verdict import VERDICTS
+from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
+from thud.report.notes import fit_lines, group_sentences
+from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from matplotlib.figure import Figure
+
+# Sizes of text, pt; width of the page within its margins, of a column, of labels and of
+# the verdict, mm.
+SIZE = 7.3
+WIDTH, COLUMN, LABEL, REASON = 186.0, 91.0, 23.0, 112.0
+# Lines of a value, of the instruments, of files, of the blocks of notes and of a note.
+VALUE_LINES, INSTRUMENT_LINES, FILES = 2, 6, 5
+RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 5, 7
+SENTENCE_LINES = 3
+# Of two drops, none is an outlier.
+MIN_DROPS = 2
+STANDARDS = {
+    "rubber_ball": "JIS A 1418-2, ISO 10140-5 and ISO 16283-2",
+    "tyre": "JIS A 1418-2",
+}
+# Part of a range that lies within the limits, and its ends.
+LOW, HIGH = 25.0, 75.0
+
+
+def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) -> str:
+    """Return the page as self-contained HTML.
+
+    Parameters
+    ----------
+    data
+        What `thud.report.data.report_data` returns.
+    figures
+        Two figures of column width.
+    checksum
+        SHA-256 of ``report.json``.
+    """
+    source = data["source"].replace("_", " ")
+    body = _BODY.substitute(
+        source=_text(source),
+        verdict=_text(data["verdict"]),
+        reason=_text(_reason(data["criteria"])),
+        about=_pairs(_about(data)),
+        measured=_pairs(_measured(data)),
+        head="".join(f"<th>{_text(name)}</th>" for name in _columns(HEAD, "")),
+        rows="\n".join(map(_row, data["criteria"])),
+        rule=_text(_rule(data)),
+        figures="\n".join(f"<td>{_svg(one, f'f{i}')}</td>" for i, one in enumerate(figures)),
+        results=_notes("Drops and methods", _results(data), RESULT_LINES),
+        done=_notes("Done to the signals", _told(data, "steps") or ["nothing"], STEP_LINES),
+        remarks=_notes("Remarks", _told(data, "remarks") or ["none"], REMARK_LINES),
+        files=_files(data["files"]),
+        footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),
+    )
+    title = f"Calibration report: {data['serial'] or data['name']}"
+    used = "".join(sorted(set(html.unescape(re.sub(r"<[^>]*>", "", body)))))
+    return _PAGE.substitute(
+        title=_text(title),
+        fonts=font_faces(used),
+        family=FAMILY,
+        size=SIZE,
+        body=body,
+    )
+
+
+def page_text(data: dict[str, Any]) -> str:
+    """Return the words that a laboratory chooses, which may need any font."""
+    keys = ("laboratory", "ball", "serial", "date", "name")
+    files = [one[key] for one in data["files"] for key in ("name", "calibration")]
+    return _plain("".join([*(data[key] for key in keys), *data["instruments"], *files]))
+
+
+def _plain(text: str) -> str:
+    """Return a text in one line of printable characters."""
+    line = " ".join(text.split())
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
+
+
+def _text(text: str) -> str:
+    """Return a text as HTML."""
+    return html.escape(_plain(text))
+
+
+def _reason(criteria: Sequence[dict[str, Any]]) -> str:
+    """Return which criteria are not met."""
+    parts = []
+    for verdict in VERDICTS[1:]:
+        names = [style_of(one).title.split(",")[0] for one in criteria if one["verdict"] == verdict]
+        if names:
+            parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
+    return clip("; ".join(parts), 0.93 * SIZE, REASON, 2) if parts else "all criteria are met"
+
+
+def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return what the ball is."""
+    temperature = data["temperature"]
+    return [
+        ("Laboratory", data["laboratory"]),
+        ("Ball", data["ball"]),
+        ("Serial number", data["serial"]),
+        ("Measured on", data["date"]),
+        ("Temperature", "" if temperature is None else f"{number(temperature, 1)} °C"),
+    ]
+
+
+def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
+    """Return how it was measured."""
+    files, drops = data["files"], len(data["drops"])
+    rates = sorted({one["sample_rate"] for one in files})
+    listed = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
+    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {listed} kHz"
+    ways = list(dict.fromkeys(one["calibration"] for one in files if one["calibration"]))
+    share = data["calibration_uncertainty"]
+    given = f"u = {100 * share:.2g} %" if share is not None else "uncertainty not given"
+    way = f"{ways[0]}{f' and {len(ways) - 1} more' if len(ways) > 1 else ''}" if ways else NOT_KNOWN
+    instruments = [clip(_plain(one), SIZE, COLUMN - LABEL) for one in data["instruments"]]
+    fitted = fit_lines(instruments, INSTRUMENT_LINES, lambda _: 1)
+    return [
+        ("Recordings", amount),
+        ("Calibration", f"{way}; {given}"),
+        ("Instruments", "\n".join(fitted)),
+    ]
+
+
+def _pairs(pairs: Iterable[tuple[str, str]]) -> str:
+    """Return labels and values as rows."""
+    rows = []
+    for label, value in pairs:
+        lines = value.split("\n") if "\n" in value else [_clipped(value, VALUE_LINES)]
+        shown = "<br>".join(map(_text, lines)) if any(lines) else NOT_KNOWN
+        rows.append(f'<tr><th>{_text(label)}</th><td dir="auto">{shown}</td></tr>')
+    return "\n".join(rows)
+
+
+def _clipped(value: str, lines: int) -> str:
+    return clip(_plain(value), SIZE, COLUMN - LABEL, lines)
+
+
+def _columns(row: Sequence[str], picture: str) -> list[str]:
+    """Return a row with a picture before the verdict."""
+    return [*row[:-1], picture, row[-1]]
+
+
+def _row(criterion: dict[str, Any]) -> str:
+    """Return a criterion as a row of the table."""
+    cells = _columns([_text(cell) for cell in criterion_row(criterion)], _range(criterion))
+    style = criterion["verdict"].replace(" ", "-")
+    return f'<tr class="{style}">' + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+
+
+def _range(criterion: dict[str, Any]) -> str:
+    """Return a picture of the limits, the value and its expanded uncertainty."""
+    (lower, upper), value = limits_of(criterion), criterion["value"]
+    box = f'<rect x="{LOW}" y="1" width="{HIGH - LOW}" height="8" fill="#ccc"/>'
+    if value is None or lower == upper:
+        return ""
+    scale = (HIGH - LOW) / (upper - lower)
+    place = LOW + scale * (value - lower)
+    shown = min(max(place, 2.0), 98.0)
+    width = scale * (criterion["expanded_uncertainty"] or 0.0)
+    ends = [min(max(end, 1.0), 99.0) for end in (place - width, place + width)]
+    bar = "".join(f"M{end:.2f} 2.5V7.5" for end in ends) + f"M{ends[0]:.2f} 5H{ends[1]:.2f}"
+    bar *= ends[0] < ends[1]
+    mark = f'<circle cx="{shown:.2f}" cy="5" r="1.8"/>'
+    if shown != place:
+        tip = math.copysign(3.0, place - shown)
+        mark = f'<path d="M{shown + tip / 2:.2f} 5l{-tip} -3v6z"/>'
+    return (
+        f'<svg class="range" viewBox="0 0 100 10" aria-hidden="true">{box}'
+        f'<path d="{bar}" fill="none" stroke="#000" stroke-width="0.9"/>{mark}</svg>'
+    )
+
+
+def _rule(data: dict[str, Any]) -> str:
+    """Return how limits and verdicts are to be read."""
+    own = any(not one["limits_of_standard"] for one in data["criteria"])
+    limits = f"Limits of {STANDARDS.get(data['source'], 'the standards')}"
+    limits += ", those marked * of the laboratory. " if own else ". "
+    return limits + (
+        "U: expanded uncertainty for 95 % (JCGM 100, Student's t). A criterion conforms where "
+        "value ± U lies within its limits, does not conform where it lies outside, and cannot be "
+        "decided otherwise (JCGM 106). Spread: standard deviation of single drops."
+    )
+
+
+def _results(data: dict[str, Any]) -> list[str]:
+    """Return sentences on drops, other quantities and methods."""
+    drops, low, high = data["drops"], *BACKGROUND
+    names = {"peak_force": ("peak force below 1.25 kHz", "N", 0), "impulse": ("impulse", "N s", 2)}
+    names["effective_mass"] = ("effective mass", "kg", 3)
+    means = []
+    for key, (title, unit, decimals) in names.items():
+        known = [one[key]["value"] for one in drops if one[key]["value"] is not None]
+        if known:
+            means.append(f"{title} {number(sum(known) / len(known), decimals)} {unit}")
+    ways = list(dict.fromkeys(one["restitution_by"] for one in drops if one["restitution_by"]))
+    found = [f"mean: {', '.join(means)}"]
+    if ways:
+        found.append(f"restitution by {', '.join(ways)}")
+    averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
+    found.append(
+        f"levels: {averaged}, method exact (band energy of the contact and at least "
+        f"{1e3 * MARGIN:g} ms of silence around it)"
+    )
+    flags = {one["flag"] for one in data["criteria"]}
+    if "corrected" in flags:
+        found.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
+    if "background" in flags:
+        found.append(f"levels less than {low:g} dB above the background are upper bounds")
+    bands = [f"{one['band']:g}" for one in data["criteria"] if one["band"] is not None]
+    for method, differences in data["method_differences"].items():
+        if any(differences):
+            values = " / ".join("–" if d is None else number(d, 2) for d in differences)
+            found.append(
+                f"method {method} differs by up to {values} dB at {bands[0]} to {bands[-1]} Hz"
+            )
+    return [*found, _outliers(data["outliers"])] if len(drops) > MIN_DROPS else found
+
+
+def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
+    """Return a sentence on the drops that differ from the others."""
+    names: dict[str, list[str]] = {}
+    for one in outliers:
+        names.setdefault(one["name"], []).append(one["quantity"].split(",")[0])
+    if not names:
+        return "no drop differs from the others by more than chance (Grubbs, 5 %)"
+    listed = "; ".join(f"{name} ({', '.join(what)})" for name, what in names.items())
+    return f"{_count(len(names), 'outlier')}, marked and not left out (Grubbs, 5 %): {listed}"
+
+
+def _told(data: dict[str, Any], kind: str) -> list[str]:
+    """Return the steps or remarks of files and drops; those of several in one sentence."""
+    found = []
+    for key in ("files", "drops"):
+        said = [(one["name"], sentence) for one in data[key] for sentence in one[kind]]
+        found += group_sentences(said, len(data[key]), key)
+    return found
+
+
+def _notes(title: str, sentences: Sequence[str], lines: int) -> str:
+    """Return sentences as a list that takes a limited number of lines."""
+    width = COLUMN - 5.0
+    clipped = [clip(_plain(one), SIZE, width, SENTENCE_LINES) for one in sentences]
+    fitted = fit_lines(clipped, lines, lambda one: count_lines(one, SIZE, width))
+    items = "".join(f"<li>{_text(one)}</li>" for one in fitted)
+    return f"<h2>{_text(title)}</h2><ul>{items}</ul>"
+
+
+def _files(files: Sequence[dict[str, Any]]) -> str:
+    """Return the names and checksums of the files, those that fit."""
+    shown = files if len(files) <= FILES else files[: FILES - 1]
+    room = WIDTH - text_width("0" * 66, SIZE)
+    rows = [
+        f"<tr><td>{_text(clip(_plain(one['name']), SIZE, room))}</td>"
+        f"<td>{_text(one['sha256'])}</td></tr>"
+        for one in shown
+    ]
+    if len(shown) < len(files):
+        rest = f"and {_count(len(files) - len(shown), 'file')} more, in report.json"
+        rows.append(f"<tr><td>{_text(rest)}</td><td></td></tr>")
+    return "\n".join(rows)
+
+
+def _count(number_of: int, what: str) -> str:
+    return f"{number_of} {what}{'s' * (number_of != 1)}"
+
+
+def _svg(figure: Figure, prefix: str) -> str:
+    """Return a figure as a part of a page, its names with a prefix."""
+    content = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": "thud", "svg.fonttype": "none"}):
+        figure.savefig(content, format="svg", metadata={"Date": None})
+    text = content.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
+    text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", text)
+    box = re.search(r'viewBox="[^"]*"', text)
+    assert box  # noqa: S101 - matplotlib writes it
+    head = f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax">'
+    return head + text[text.index(">") + 1 :]
+
+
+_BODY = Template("""<header>
+<div class="verdict"><b>$verdict</b><br>$reason</div>
+<h1>Calibration report</h1>
+<p>Heavy/soft impact source: $source</p>
+</header>
+<table class="columns"><tr>
+<td><table class="pairs">$about</table></td>
+<td><table class="pairs">$measured</table></td>
+</tr></table>
+<table class="criteria">
+<thead><tr>$head</tr></thead>
+<tbody>
+$rows
+</tbody>
+</table>
+<p class="rule">$rule</p>
+<table class="columns figures"><tr>
+$figures
+</tr></table>
+<table class="columns"><tr>
+<td>$results</td>
+<td>$done$remarks</td>
+</tr></table>
+<h2>Files and their SHA-256</h2>
+<table class="files">$files</table>
+<table class="signature"><tr>
+<td>Place and date</td><td>Name</td><td>Signature</td>
+</tr></table>
+<footer>$footer</footer>
+""")
+
+_PAGE = Template("""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>$title</title>
+<style>
+$fonts
+@page { size: A4; margin: 9mm 12mm 8mm; }
+:root { color-scheme: light; }
+html { font: ${size}pt/3.4mm '$family', sans-serif; color: #000; background: #fff; }
+body { width: 186mm; margin: 0 auto; font-variant-ligatures: none; overflow-wrap: anywhere; }
+@media screen { body { padding: 11mm 12mm; } }
+h1 { font-size: 15pt; line-height: 6mm; margin: 0 0 1mm; }
+h2 { font-size: ${size}pt; line-height: 3.4mm; margin: 2mm 0 0.6mm; }
+header { border-bottom: 0.4mm solid #000; padding-bottom: 1.5mm; margin-bottom: 2mm;
+  height: 13.5mm; }
+header p { margin: 0; font-size: 9pt; line-height: 4mm; }
+.verdict { float: right; width: 118mm; height: 12.6mm; box-sizing: border-box; padding: 0.8mm 2mm;
+  border: 0.5mm solid #000; text-align: center; font-size: 0.93em; line-height: 2.9mm;
+  overflow: hidden; }
+.verdict b { font-size: 11pt; line-height: 4.4mm; text-transform: uppercase; }
+table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
+td, th { padding: 0; vertical-align: top; text-align: left; }
+.columns { table-layout: fixed; }
+.columns > tbody > tr > td + td { padding-left: 2mm; }
+.columns > tbody > tr > td:first-child { padding-right: 2mm; }
+.pairs { table-layout: fixed; }
+.pairs th { width: 23mm; font-weight: normal; color: #444; }
+.criteria { margin-top: 2mm; border-bottom: 0.3mm solid #000; }
+.criteria th, .criteria td { text-align: right; padding: 0.5mm 0 0.5mm 2mm; white-space: nowrap; }
+.criteria th { border-top: 0.3mm solid #000; border-bottom: 0.2mm solid #000; }
+.criteria tbody tr + tr td { border-top: 0.1mm solid #bbb; }
+.criteria th:first-child, .criteria td:first-child { text-align: left; padding-left: 0; }
+.criteria th:last-child, .criteria td:last-child { text-align: left; width: 29mm; }
+.does-not-conform td:last-child { font-weight: bold; }
+.cannot-be-decided td:last-child { text-decoration: underline; }
+.range { width: 34mm; height: 3.4mm; display: block; margin: 0 auto; }
+.rule { margin: 0.8mm 0 1.2mm; }
+.figures { height: 64mm; }
+.figure { display: block; width: 91mm; height: 64mm; }
+ul { margin: 0; padding: 0 0 0 3mm; list-style: '–  '; }
+.files { table-layout: auto; }
+.files td:last-child { text-align: right; white-space: nowrap; }
+.signature { margin: 11mm -4mm 0; width: 194mm; table-layout: fixed; border-spacing: 4mm 0;
+  border-collapse: separate; }
+.signature td { border-top: 0.2mm solid #000; padding-top: 0.5mm; }
+footer { margin-top: 2mm; color: #444; font-size: 6pt; }
+</style>
+</head>
+<body>
+$body
+</body>
+</html>
+""")

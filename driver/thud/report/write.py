@@ -1,0 +1,127 @@
+"""Write the calibration report of a recording: a page to be signed, and its data."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from thud.errors import ReportWarning
+from thud.files import replace_file
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from matplotlib.figure import Figure
+
+    from thud.recordings.recording import Recording
+
+JSON, HTML, PDF = "report.json", "report.html", "report.pdf"
+
+
+def write_report(recording: Recording, directory: str | os.PathLike[str]) -> list[Path]:
+    """Write ``report.json``, ``report.html`` and ``report.pdf`` and return their paths.
+
+    The page is one sheet of A4; lists that are too long for it are complete in ``report.json``.
+
+    Parameters
+    ----------
+    recording
+        The recording.
+    directory
+        Directory of the files; it is made where there is none.
+
+    Raises
+    ------
+    OSError
+        Where a file cannot be written.
+
+    Warns
+    -----
+    ReportWarning
+        Where WeasyPrint is missing, so that there is no PDF, or a font for some letters; and
+        where the report of another recording is replaced.
+    """
+    # Matplotlib, SciPy and fontTools take their time.
+    from thud.plot.recording import recording_forces, recording_levels  # noqa: PLC0415
+    from thud.report.data import report_data  # noqa: PLC0415
+
+    folder, data = Path(directory), report_data(recording)
+    figures = [recording_forces(recording), recording_levels(recording)]
+    contents = {JSON: json_bytes(data), **page_contents(data, figures, folder)}
+    write_files(folder, data, contents)
+    return [folder / name for name in contents]
+
+
+def json_bytes(data: dict[str, Any]) -> bytes:
+    """Return the content of ``report.json``."""
+    return (json.dumps(data, indent=1, allow_nan=False) + "\n").encode()
+
+
+def page_contents(
+    data: dict[str, Any], figures: Sequence[Figure], folder: Path
+) -> dict[str, bytes]:
+    """Return the page as HTML and, where it can be made, PDF, by the names of the files.
+
+    Warn where there is no PDF, or no font for some letters; the folder is for the message.
+    """
+    from thud.report.fonts import missing_characters  # noqa: PLC0415 - they take their time
+    from thud.report.page import page_text, report_page  # noqa: PLC0415
+    from thud.report.pdf import NEEDED, html_to_pdf  # noqa: PLC0415
+
+    page = report_page(data, figures, hashlib.sha256(json_bytes(data)).hexdigest())
+    contents = {HTML: page.encode()}
+    try:
+        contents[PDF] = html_to_pdf(page)
+    except ImportError as error:
+        cause = " ".join(str(error).split())
+        message = f"{folder}: {PDF} is not written ({cause}); allowed: {NEEDED}"
+        warnings.warn(message, ReportWarning, stacklevel=3)
+        return contents
+    missing = missing_characters(page_text(data))
+    if missing:
+        message = (
+            f"{folder}: no installed font has {missing}, of the names in {PDF}; allowed: "
+            "a font that has them, such as that of Debian's fonts-noto-cjk"
+        )
+        warnings.warn(message, ReportWarning, stacklevel=3)
+    return contents
+
+
+def write_files(
+    folder: Path, data: dict[str, Any], contents: Mapping[str, bytes], names: Iterable[str] = ()
+) -> None:
+    """Write the files of a recording; warn where they replace those of another one.
+
+    Where a report lies in the directory, files of `names` that have no content are of an earlier
+    recording: they are removed. So is the PDF of a page that has none.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    earlier = _earlier(folder)
+    if earlier is not None and earlier != _checksums(data):
+        message = f"{folder}: replaces the results of another recording"
+        warnings.warn(message, ReportWarning, stacklevel=3)
+    stale = {PDF} if HTML in contents else set()
+    stale |= set(names if earlier is not None else ())
+    for name in stale - set(contents):
+        (folder / name).unlink(missing_ok=True)
+    for name, content in contents.items():
+        replace_file(folder / name, content)
+
+
+def _checksums(data: dict[str, Any]) -> list[str]:
+    return [one["sha256"] for one in data["files"]]
+
+
+def _earlier(folder: Path) -> list[str] | None:
+    """Return the checksums of the recording whose report is in a directory; None of none."""
+    from thud.report.data import FORMAT  # noqa: PLC0415 - SciPy takes its time
+
+    try:
+        data = json.loads((folder / JSON).read_text(encoding="utf-8"))
+        return _checksums(data) if data["format"] == FORMAT else None
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return None

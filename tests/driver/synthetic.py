@@ -1,0 +1,116 @@
+"""Synthetic recordings: pulses of known truth with the faults that recordings have."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Exponents of the power spectra of noise.
+COLOURS = {"white": 0, "pink": 1, "brown": 2}
+# Below this, Hz, the spectra of coloured noise are even.
+FLAT_BELOW = 1.0
+
+
+def coloured_noise(
+    n: int, rate: float, deviation: float, colour: str, rng: np.random.Generator
+) -> np.ndarray:
+    """Return noise of an expected standard deviation from 1 Hz to half the rate."""
+    if n == 0:
+        return np.zeros(0)
+    power = COLOURS[colour]
+    if power == 0:
+        return rng.normal(0, deviation, n)
+    # Ten seconds: slow parts are drawn from a longer record than is kept.
+    length = 2 * max(n, int(5 * rate))
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    density = 1 / np.maximum(frequency, FLAT_BELOW) ** power
+    density *= deviation**2 / (density.sum() * rate / length)
+    draws = rng.normal(size=(2, len(frequency)))
+    spectrum = (draws[0] + 1j * draws[1]) * np.sqrt(density * rate * length / 4)
+    start = int(rng.integers(0, length - n))
+    return np.fft.irfft(spectrum, length)[start : start + n]
+
+
+def noise_density(rate: float, deviation: float, colour: str) -> float:
+    """Return the one-sided density at 1 Hz, N2/Hz, of `coloured_noise`."""
+    half = rate / 2
+    integral = {"white": half, "pink": 1 + np.log(half), "brown": 2 - 1 / half}[colour]
+    return deviation**2 / integral
+
+
+def band_limited(
+    force: np.ndarray, sample_rate: float, rate: float, time: np.ndarray
+) -> np.ndarray:
+    """Return a pulse at times, s, what is above half of a rate removed.
+
+    The low-pass is a raised cosine between 0.4 and 0.5 of the rate: an anti-aliasing filter.
+    """
+    length = 1 << int(np.ceil(np.log2(2 * len(force) + 8)))
+    spectrum = np.fft.rfft(force, length)
+    frequency = np.fft.rfftfreq(length, 1 / sample_rate)
+    if rate < sample_rate:
+        edge = np.clip((frequency / rate - 0.4) / 0.1, 0, 1)
+        spectrum *= 0.5 + 0.5 * np.cos(np.pi * edge)
+    # Eight times as many samples, between which a line misses by less than 1e-3 of a step.
+    fine = 8 * np.fft.irfft(spectrum, 8 * length)
+    places = np.arange(-4 * len(force), 12 * len(force))
+    grid, fine = places / (8 * sample_rate), fine[places]
+    return np.interp(time, grid, fine, left=0.0, right=0.0)
+
+
+def half_sine(
+    rate: float, start: float, n: int, peak: float = 1500.0, duration: float = 0.02
+) -> np.ndarray:
+    """Return samples of a half-sine pulse that starts `start` s after the first."""
+    time = np.arange(n) / rate - start
+    return np.where((time > 0) & (time < duration), peak * np.sin(np.pi * time / duration), 0.0)
+
+
+# Amplitudes of the harmonics of hum, over the first.
+HARMONICS = (1.0, 0.5, 0.3)
+
+
+def make_recording(  # noqa: PLR0913 - each is one fault
+    force: np.ndarray,
+    sample_rate: float,
+    *,
+    rate: float | None = None,
+    noise_db: float = np.inf,
+    colour: str = "white",
+    offset: float = 0.0,
+    drift: float = 0.0,
+    hum: tuple[float, float] = (50.0, 0.0),
+    before: float = 0.1,
+    after: float = 0.1,
+    seed: int = 0,
+    drops: tuple[tuple[float, float], ...] = ((0.0, 1.0),),
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a recording, N, and the force in it without faults.
+
+    Parameters
+    ----------
+    force
+        A pulse that starts at first touch, N, at `sample_rate`; its contact ends with it.
+    rate
+        Rate of the recording, Hz; points of the pulse are interpolated.
+    before, after
+        Quiet before the first touch and after the end of the last pulse, s.
+    drops
+        Time of each first touch since the first, s, and the factor of its force.
+    """
+    rng = np.random.default_rng(seed)
+    rate = rate or sample_rate
+    duration = (len(force) - 1) / sample_rate
+    n = int((before + drops[-1][0] + duration + after) * rate)
+    time = np.arange(n) / rate - before
+    grid = np.arange(len(force)) / sample_rate
+    clean = np.zeros(n)
+    for start, factor in drops:
+        clean += factor * np.interp(time - start, grid, force, left=0.0, right=0.0)
+    peak = float(np.max(force))
+    recording = clean + offset + drift * time
+    frequency, amplitude = hum
+    for k, part in enumerate(HARMONICS, start=1):
+        phase = rng.uniform(0, 2 * np.pi)
+        recording += amplitude * part * np.sin(2 * np.pi * k * frequency * time + phase)
+    recording += coloured_noise(n, rate, peak * 10 ** (-noise_db / 20), colour, rng)
+    return recording, clean

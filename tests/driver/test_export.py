@@ -1,0 +1,288 @@
+"""The blocked force in files for other programs, and a plate that it drives."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import math
+import sys
+from argparse import ArgumentParser
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+from scipy.sparse.linalg import eigsh
+from synthetic import make_recording
+
+import thud
+from thud import export_force
+from thud.cli.export import EXPORT, KINDS
+from thud.export_force import EXPORTS, BlockedForce, blocked_force
+from thud.recordings.reading import open_signals
+from thud.recordings.recording import read_recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+soundfile = pytest.importorskip("soundfile", reason="the extra recordings is not installed")
+
+IMPACT = thud.solve()
+FORCE = blocked_force(IMPACT)
+PEAK, DURATION = 1500.0, 0.02
+
+
+def export(*words: str) -> int:
+    """Run the command as the driver does."""
+    parser = ArgumentParser()
+    for names, settings in EXPORT.arguments:
+        parser.add_argument(*names, **settings)
+    return EXPORT.function(parser.parse_args(words))
+
+
+def half_sine(rate: float, start: float = 0.0) -> BlockedForce:
+    """Return the pulse of the closed form."""
+    time = np.arange(round(DURATION * rate) + 1) / rate
+    force = PEAK * np.sin(np.pi * time / DURATION)
+    return BlockedForce("half_sine", force, rate, start, "floor", "closed form", "0")
+
+
+@pytest.mark.parametrize(
+    ("kind", "digits"), [("wav", 2.0**-24), ("csv", 0), ("uff", 5e-12), ("mat", 0)]
+)
+def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_path: Path) -> None:
+    if kind == "uff":
+        pytest.importorskip("pyuff", reason="the extra recordings is not installed")
+    ending, write = EXPORTS[kind]
+    path = write(FORCE, tmp_path / f"force{ending}")[0]
+    calibration = 2048.0 if kind == "wav" else None
+    (signal,) = open_signals(path, calibration=calibration)
+    # A universal file holds six digits of the time step.
+    assert signal.sample_rate == pytest.approx(44100.0, rel=5e-6 if kind == "uff" else 1e-12)
+    read = signal.read(0, signal.n_sample)
+    assert read.shape == FORCE.force.shape
+    assert (np.abs(read - FORCE.force) <= digits * np.abs(FORCE.force)).all()
+
+
+def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
+    thud.write_case(IMPACT.case, tmp_path / "case.nml")
+    checksum = hashlib.sha256((tmp_path / "case.nml").read_bytes()).hexdigest()
+    for kind, (ending, write) in EXPORTS.items():
+        if kind == "uff":
+            pytest.importorskip("pyuff", reason="the extra recordings is not installed")
+        text = b"".join(p.read_bytes() for p in write(FORCE, tmp_path / f"force{ending}"))
+        if kind == "mat":
+            from scipy.io import loadmat  # noqa: PLC0415 - for this format only
+
+            about = loadmat(tmp_path / "force.mat")["about"]
+            text = "\n".join(np.ravel(about)).encode()
+        for word in ("force on the floor", "N, positive", "Sample rate: 44100 Hz", checksum):
+            assert word.encode() in text, f"{kind}: {word}"
+
+
+def test_full_scale_of_wav_is_a_power_of_two_above_the_peak(tmp_path: Path) -> None:
+    path, note = export_force.export_wav(FORCE, tmp_path / "force.wav")
+    scale = 2.0 ** math.ceil(math.log2(FORCE.force.max()))
+    word = f"Scale: {scale:g} N per full scale"
+    with soundfile.SoundFile(str(path)) as file:
+        assert word in file.comment
+        samples = file.read()
+    assert note.read_text().startswith(word)
+    assert 0.5 <= np.abs(samples).max() <= 1.0
+
+
+def test_wav_refuses_a_rate_that_is_not_whole(tmp_path: Path) -> None:
+    force = half_sine(44100.5)
+    with pytest.raises(thud.InputError, match=r"44100.5 Hz; allowed: whole numbers"):
+        export_force.export_wav(force, tmp_path / "force.wav")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("start", [0.0, -3e-3])
+def test_spectrum_is_the_transform_of_the_half_sine(start: float) -> None:
+    rate = 44100.0
+    frequency, spectrum = half_sine(rate, start).spectrum()
+    # Integral of sin(pi t/T) exp(-i 2 pi f t), but for 1/(2 T).
+    omega, k = 2 * np.pi * frequency, np.pi / DURATION
+    known = np.abs(omega - k) > 1e-6 * k
+    omega = omega[known]
+    exact = PEAK * k * (1 + np.exp(-1j * omega * DURATION)) / (k**2 - omega**2)
+    exact *= np.exp(-1j * omega * start)
+    band = frequency[known] <= 1000
+    # The sum misses by dt2/12 times the steps of the slope at both ends, to leading order.
+    error = 2 * PEAK * k / (12 * rate**2)
+    assert np.abs(spectrum[known] - exact)[band].max() < 1.1 * error
+
+
+def test_spectrum_holds_the_energy_of_the_force(tmp_path: Path) -> None:
+    (path,) = export_force.export_spectrum(FORCE, tmp_path / "spectrum.csv")
+    frequency, real, imaginary, magnitude, phase = np.genfromtxt(path, delimiter=",").T[:, 1:]
+    spectrum = real + 1j * imaginary
+    assert magnitude * np.exp(1j * phase) == pytest.approx(spectrum, abs=1e-12)
+    weight = np.full(len(frequency), 2.0)
+    weight[[0, -1]] = 1.0
+    energy = (weight * magnitude**2).sum() * frequency[1]
+    assert energy == pytest.approx((FORCE.force**2).sum() / FORCE.sample_rate, rel=1e-12)
+    assert real[0] == pytest.approx(FORCE.force.sum() / FORCE.sample_rate, rel=1e-12)
+
+
+@pytest.mark.parametrize("rate", [4000.0, 48000.0, 96000.0])
+def test_resampling_changes_levels_by_no_more_than_it_says(rate: float) -> None:
+    found = blocked_force(IMPACT, rate=rate)
+    assert found.sample_rate == rate
+    error = float(found.remarks[0].split()[-4])
+    largest = np.abs(FORCE.spectrum()[1]).max()
+    bands = thud.get_bands()
+    before = IMPACT.levels()
+    after = thud.force_exposure_levels(found.force, rate)
+    # Root mean square of |F| in each band.
+    mean = np.sqrt(10 ** (before / 10) / 2 / (bands.upper - bands.lower))
+    bound = 20 * np.log10(1 + error * largest / mean)
+    # The error is printed to two digits, and known at whole frequencies.
+    assert (np.abs(after - before) < 1.1 * bound + 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("rate", "sentence"),
+    [
+        (100.0, "rate = 100.0 is not allowed; allowed: 2500"),
+        (math.nan, "rate = nan is not allowed"),
+        (44100.3, "is no ratio of small whole numbers"),
+    ],
+)
+def test_rates_that_are_refused(rate: float, sentence: str) -> None:
+    with pytest.raises(thud.InputError, match=sentence):
+        blocked_force(IMPACT, rate=rate)
+
+
+def test_force_is_that_which_the_case_judges() -> None:
+    case = thud.Case(levels=thud.Levels(force="elastic"))
+    impact = thud.solve_case(case)
+    assert np.array_equal(blocked_force(impact).force, impact.elastic_force)
+    assert np.array_equal(FORCE.force, IMPACT.floor_force)
+    assert "elastic" in blocked_force(impact).words()[0]
+
+
+def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
+    force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", remarks=("a\r\nb",))
+    for ending, write in EXPORTS.values():
+        if ending == ".uff":
+            pytest.importorskip("pyuff", reason="the extra recordings is not installed")
+        assert write(force, tmp_path / f"force{ending}")
+    (signal,) = open_signals(tmp_path / "force.csv")
+    assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Return a file with two drops."""
+    count = round(1.02 * IMPACT.contact_time * IMPACT.sample_rate)
+    force, _ = make_recording(
+        IMPACT.floor_force[:count], IMPACT.sample_rate,
+        noise_db=50, offset=10.0, before=0.2, after=0.3, drops=((0.0, 1.0), (2.0, 1.0)),
+    )  # fmt: skip
+    path = tmp_path / "two.wav"
+    soundfile.write(path, force.astype(np.float32), 44100, subtype="FLOAT")
+    return path
+
+
+def test_recording_gives_the_force_of_a_drop(recording: Path) -> None:
+    found = read_recording(recording)
+    force = blocked_force(found, drop=2)
+    time, expected = found.to_force_history(2)
+    assert np.array_equal(force.force, expected)
+    assert force.time == pytest.approx(time, abs=1e-12)
+    assert force.checksum == hashlib.sha256(recording.read_bytes()).hexdigest()
+    assert "drop 2" in force.origin
+    assert any("offset" in remark for remark in force.remarks)
+
+
+def test_command_writes_what_is_asked_for(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert list(KINDS) == list(EXPORTS)
+    case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
+    assert export(case, "--csv", "--wav", "-o", str(tmp_path / "a")) == 0
+    names = ["rubber_ball_100cm.csv", "rubber_ball_100cm.wav", "rubber_ball_100cm.wav.txt"]
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == names
+    assert capsys.readouterr().out.count("rubber_ball_100cm") == 3
+    assert export(str(recording), "--spectrum", "--drop", "2", "-q", "-o", str(tmp_path / "b")) == 0
+    assert [path.name for path in (tmp_path / "b").iterdir()] == ["two_drop_2_spectrum.csv"]
+    assert not capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ((), "no format is given; allowed: --wav, --csv, --uff, --mat, --spectrum"),
+        (("--csv", "--drop", "3"), "drop = 3 does not exist; allowed: 1 to 2"),
+        (("--csv", "--config", "no.toml"), "no.toml"),
+    ],
+)
+def test_bad_input_gets_one_sentence(
+    words: tuple[str, ...], sentence: str, recording: Path, tmp_path: Path
+) -> None:
+    with pytest.raises((thud.InputError, OSError), match=sentence) as caught:
+        export(str(recording), *words, "-o", str(tmp_path / "out"))
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("words", [("--drop", "2"), ("--config", "lab.toml")])
+def test_cases_have_neither_drops_nor_a_laboratory(words: tuple[str, ...], tmp_path: Path) -> None:
+    case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
+    with pytest.raises(thud.InputError, match=words[0].lstrip("-")):
+        export(case, "--csv", *words, "-o", str(tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["no.nml", "no.wav", "no", "\0.csv"])
+def test_missing_files_get_one_sentence(name: str, tmp_path: Path) -> None:
+    with pytest.raises((thud.InputError, OSError)):
+        export(str(tmp_path / name), "--csv", "-o", str(tmp_path / "out"))
+
+
+@pytest.fixture(scope="module")
+def plate():  # noqa: ANN201 - a module
+    """Return the example."""
+    pytest.importorskip("skfem", reason="scikit-fem, of the extra bench, is not installed")
+    path = REPOSITORY / "docs/examples/plate_scikit_fem.py"
+    spec = importlib.util.spec_from_file_location("plate_scikit_fem", path)
+    module = importlib.util.module_from_spec(spec)
+    # Its dataclass looks for its module.
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_frequency_of_the_plate_of_scikit_fem_is_of_fourth_order(plate) -> None:  # noqa: ANN001
+    length, width = plate.LENGTH, plate.WIDTH
+    exact = ((np.pi / length) ** 2 + (np.pi / width) ** 2) * np.sqrt(plate.STIFFNESS / plate.MASS)
+    errors = []
+    for elements in (2, 4, 8):
+        found = plate.new_plate(elements)
+        (value,) = eigsh(found.stiffness.tocsc(), 1, found.mass.tocsc(), sigma=0)[0]
+        errors.append(np.sqrt(value) / exact - 1)
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(4, abs=0.2)
+
+
+def test_velocity_of_the_plate_of_scikit_fem_is_that_of_the_modal_sum(plate) -> None:  # noqa: ANN001
+    rate = 22050.0
+    force = np.pad(half_sine(rate).force, (0, 220))
+    exact = plate.modal_velocity(force, 1 / rate)
+    largest = np.abs(exact).max()
+    # The kinks of the pulse reach modes whose waves are as short as the elements: second order.
+    misses = [
+        np.abs(plate.plate_velocity(plate.new_plate(n), force, 1 / rate) - exact).max() / largest
+        for n in (4, 8)
+    ]
+    assert misses[1] < misses[0] / 4
+    assert misses[1] < 0.02
+
+
+def test_example_reads_exported_force(plate, tmp_path: Path) -> None:  # noqa: ANN001
+    (path,) = export_force.export_csv(FORCE, tmp_path / "force.csv")
+    force, step = plate.read_force(path)
+    assert np.array_equal(force, FORCE.force)
+    assert step == pytest.approx(1 / 44100.0, rel=1e-12)

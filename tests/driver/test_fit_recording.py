@@ -1,0 +1,208 @@
+"""Fits to measured drops of a recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+from synthetic import make_recording
+
+import thud
+from thud.recordings.recording import Recording, read_recording
+from thud.recordings.signal import Signal
+from thud.studies.fit import KIND
+from thud.studies.fitting.force_target import ForceTarget
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+soundfile = pytest.importorskip("soundfile", reason="the extra recordings is not installed")
+
+NOISE_DB = 50.0
+# A miss by four standard errors has a probability of 6e-5.
+FAR = 4.0
+COARSE = thud.FiniteElement(radial_elements=4, polar_elements=32)
+CASE = thud.Case(ball=thud.Ball(youngs_modulus=2.08e6), model=COARSE)
+STUDY = """
+[target]
+file = "record.wav"
+{more}
+
+[parameters]
+youngs_modulus = {{ start = 1.4, unit = "MPa" }}
+"""
+
+
+def pulse(impact: thud.Impact) -> np.ndarray:
+    """Return the force of the contact, N."""
+    return impact.floor_force[: round(1.02 * impact.contact_time * impact.sample_rate)]
+
+
+def write(path: Path, *impacts: thud.Impact, **faults: object) -> float:
+    """Write a recording of impacts, each 2 s after the one before; return its noise, N."""
+    parts = [
+        make_recording(
+            pulse(impact), impact.sample_rate, before=0.2, after=1.8, seed=seed,
+            **{"noise_db": NOISE_DB, "offset": 15.0, "drift": 3.0, **faults},
+        )[0]
+        for seed, impact in enumerate(impacts)
+    ]  # fmt: skip
+    rate = round(impacts[0].sample_rate)
+    soundfile.write(path, np.concatenate(parts).astype(np.float32), rate, subtype="FLOAT")
+    return float(impacts[0].floor_force.max() * 10 ** (-NOISE_DB / 20))
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, float]:
+    """Return a recording of the ball by finite elements, and its noise, N."""
+    path = tmp_path_factory.mktemp("recordings") / "ball.wav"
+    noise = write(path, thud.solve_case(CASE), hum=(50.0, 2.0))
+    return read_recording(path), noise
+
+
+def test_finite_elements_find_modulus_and_loss_of_a_recording(
+    record: tuple[Recording, float],
+) -> None:
+    start = replace(CASE, ball=thud.Ball(youngs_modulus=1.6e6))
+    found = thud.fit(record[0], {"youngs_modulus": None, "loss_factor": 0.15}, start)
+    for name, truth in (("youngs_modulus", 2.08e6), ("loss_factor", 0.2)):
+        assert abs(found.values[name] - truth) < FAR * found.standard_errors[name]
+        assert found.standard_errors[name] < 5e-3 * truth
+    # First touch at 0.2 s of the file.
+    touch = record[0].drops[0].onset + found.time_shift
+    assert abs(touch - 0.2) < FAR * found.standard_errors["time_shift"] + 0.5 / 44100
+    assert found.known_noise
+    assert not found.warnings
+
+
+def test_residuals_tell_the_law_of_the_loss(tmp_path: Path) -> None:
+    ball = thud.Ball(youngs_modulus=1.75e6)
+    options = {"loss_factor": 0.18}
+    laws = {law: thud.ModalBall(damping_law=law, **options) for law in ("rising", "constant")}
+    write(tmp_path / "ball.wav", thud.solve_case(thud.Case(ball=ball, model=laws["rising"])))
+    recording = read_recording(tmp_path / "ball.wav")
+    names = ["youngs_modulus", "loss_factor"]
+    found = thud.fit(recording, names, thud.Case(model=laws["rising"]))
+    assert not found.warnings
+    with pytest.warns(thud.FitWarning, match="the model does not explain the data"):
+        other = thud.fit(recording, names, thud.Case(model=laws["constant"]))
+    assert other.reduced_chi_square > 2 * found.reduced_chi_square
+
+
+def test_noise_is_that_of_the_quiet(record: tuple[Recording, float]) -> None:
+    misfit = ForceTarget(record[0]).misfit()
+    # 0.2 s of quiet hold 500 values below 1.25 kHz; the background takes some of them.
+    assert misfit.unit_deviation == pytest.approx(record[1], rel=FAR / np.sqrt(2 * 450))
+    assert ForceTarget(record[0], noise=3.0).misfit().unit_deviation == 3.0
+
+
+def test_noise_above_the_band_does_not_count(record: tuple[Recording, float]) -> None:
+    drop = record[0].drops[0]
+    random = np.random.default_rng(5)
+    # Differences of white noise have little of it at low frequencies.
+    blue = np.diff(random.normal(scale=5.0, size=len(drop.force) + 1))
+    target = ForceTarget(replace(record[0], drops=(replace(drop, force=drop.force + blue),)))
+    frequency = np.linspace(0, target.below, 1000)
+    density = (2 * np.sin(np.pi * frequency / drop.sample_rate)) ** 2
+    expected = np.hypot(record[1], 5.0 * np.sqrt(density.mean()))
+    assert target.misfit().unit_deviation == pytest.approx(expected, rel=FAR / np.sqrt(2 * 450))
+    assert np.hypot(record[1], 5.0 * np.sqrt(2)) > 1.5 * expected
+
+
+def test_too_little_quiet_leaves_the_noise_to_the_residuals() -> None:
+    impact = thud.solve()
+    force, _ = make_recording(
+        pulse(impact), impact.sample_rate, before=0.006, after=0.006, noise_db=NOISE_DB
+    )
+    assert not ForceTarget(_measured(force, impact.sample_rate)).misfit().known_noise
+
+
+def _measured(force: np.ndarray, rate: float) -> Recording:
+    """Return the recording of a force in memory."""
+    from thud.recordings.drops import find_windows  # noqa: PLC0415 - one test in two
+    from thud.recordings.estimates import measure_drop  # noqa: PLC0415 - likewise
+
+    windows = find_windows(Signal.from_array(force, rate))
+    return Recording("memory", tuple(measure_drop(window) for window in windows), ())
+
+
+@pytest.fixture
+def two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Write two drops of balls of different moduli."""
+    monkeypatch.chdir(tmp_path)
+    write(
+        tmp_path / "record.wav",
+        thud.solve(),
+        thud.solve(thud.Ball(youngs_modulus=1.8e6)),
+    )
+    return tmp_path
+
+
+def run(folder: Path, more: str = "") -> thud.Fit:
+    """Run the study of the recording."""
+    (folder / "study.toml").write_text(STUDY.format(more=more))
+    return KIND.run(thud.read_study("study.toml", "fit"))
+
+
+@pytest.mark.parametrize(("more", "truth"), [("", 1.6e6), ("drop = 2", 1.8e6)])
+def test_studies_read_recordings_and_choose_the_drop(two: Path, more: str, truth: float) -> None:
+    found = run(two, more)
+    error = found.standard_errors["youngs_modulus"]
+    assert abs(found.values["youngs_modulus"] - truth) < FAR * error
+    assert error < 1e-3 * truth
+
+
+def test_table_is_measured_where_a_drop_is_chosen(two: Path) -> None:
+    samples, rate = soundfile.read(two / "record.wav")
+    np.savetxt(
+        two / "record.csv", np.column_stack([np.arange(len(samples)) / rate, samples]), "%.9f"
+    )
+    text = STUDY.format(more="drop = 2").replace("record.wav", "record.csv")
+    (two / "study.toml").write_text(text)
+    found = KIND.run(thud.read_study("study.toml", "fit"))
+    assert found.values["youngs_modulus"] == pytest.approx(1.8e6, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("more", "sentence"),
+    [
+        ("drop = 3", "target: drop = 3 is not allowed; allowed: whole numbers from 1 to 2"),
+        ("drop = 0", "drop = 0 is not allowed"),
+        ("drop = 'one'", "drop = 'one' is not allowed"),
+        ("config = 1", r"\[target\] config = 1 is not allowed; allowed: text in quotes"),
+        ("config = 'no.toml'", "no.toml"),
+        ("drops = 1", "'drops' is not known"),
+    ],
+)
+def test_bad_targets_get_one_sentence(two: Path, more: str, sentence: str) -> None:
+    with pytest.raises((thud.InputError, OSError), match=sentence) as caught:
+        run(two, more)
+    assert "\n" not in str(caught.value)
+
+
+def test_recording_that_is_missing_or_none_gets_one_sentence(two: Path) -> None:
+    (two / "record.wav").write_bytes(b"RIFF")
+    with pytest.raises(thud.InputError, match=r"record\.wav"):
+        run(two)
+    (two / "record.wav").unlink()
+    with pytest.raises(thud.InputError, match=r"record\.wav: cannot be read"):
+        run(two)
+
+
+def test_arrays_have_one_drop() -> None:
+    impact = thud.solve()
+    with pytest.raises(thud.InputError, match="target: drop = 2 is not allowed"):
+        ForceTarget((impact.time, impact.floor_force), drop=2).misfit()
+
+
+@pytest.mark.parametrize("name", ["fit_recording", "fit_recording_constant_loss"])
+def test_studies_of_the_repository_can_be_read(name: str) -> None:
+    study = thud.read_study(REPOSITORY / f"inputs/studies/{name}.toml", "fit")
+    misfit = study.target.misfit()
+    # make_recording.py: 5 N of noise, 0.2 s of quiet.
+    assert misfit.unit_deviation == pytest.approx(5.0, rel=FAR / np.sqrt(2 * 450))
+    viscosity = "constant_loss" if "constant" in name else "kelvin_voigt"
+    assert study.case.model.viscosity == viscosity

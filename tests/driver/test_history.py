@@ -1,0 +1,301 @@
+"""The control chart of a ball: trends that are more than chance, reports of one ball."""
+
+from __future__ import annotations
+
+import argparse
+import copy
+import json
+from datetime import date, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import thud
+from thud.cli.history import run_history
+from thud.levels import get_bands
+from thud.plot.history import draw_history
+from thud.recordings.verdict import VERDICTS, Contribution, Quantity, decide
+from thud.report.data import FORMAT
+from thud.report.history import YEAR, History, _trend, read_history
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+LEVELS = (39.0, 31.0, 23.0, 17.0, 12.5)
+LIMITS = (29.5, 32.5)
+
+
+def report(day: str, levels: Any = LEVELS, deviation: float = 0.1, **keys: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return what a report says that a chart needs, the verdicts by the library."""
+    part = (Contribution("repeatability", deviation),)
+    decisions = decide(
+        [Quantity(float(level), part) for level in levels],
+        contact_time=Quantity(0.02, (Contribution("repeatability", 1e-4),)),
+        restitution=0.8,
+        peaks=1.0,
+        mass=2.5,
+    ).decisions
+    rows = [
+        {
+            "name": one.name,
+            "unit": one.unit,
+            "band": float(get_bands().nominal[i]) if i < 5 else None,
+            "value": None if np.isnan(one.value) else one.value,
+            "uncertainty": one.quantity.uncertainty,
+            "expanded_uncertainty": one.quantity.expanded,
+            "upper_bound": False,
+            "lower": one.lower,
+            "upper": one.upper,
+            "limits_of_standard": True,
+            "margin": None if np.isnan(one.value) else one.margin,
+            "verdict": one.verdict,
+            "spread": None,
+            "background": None,
+            "contributions": [vars(c) for c in one.quantity.contributions],
+        }
+        for i, one in enumerate(decisions)
+    ]
+    return {
+        "format": FORMAT, "ball": "ball", "serial": "7", "source": "rubber_ball", "date": day,
+        "verdict": VERDICTS[0], "criteria": rows, **keys,
+    }  # fmt: skip
+
+
+def history(slope: float = 0.0, count: int = 6, seed: int | None = None) -> History:
+    """Return the history of a ball whose level at 63 Hz drifts by a slope per year."""
+    rng = np.random.default_rng(seed)
+    dates = [datetime(2015, 1, 1) + k * YEAR for k in range(count)]  # noqa: DTZ001
+    reports = []
+    for k, day in enumerate(dates):
+        noise = 0.1 * rng.standard_normal(5) if seed is not None else np.zeros(5)
+        levels = np.array(LEVELS) + noise
+        levels[1] += slope * k
+        reports.append(report(day.date().isoformat(), levels))
+    return History("ball 7", tuple(dates), tuple(reports))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Write five reports of a drifting ball, the last first."""
+    rng = np.random.default_rng(4)
+    for k in reversed(range(5)):
+        levels = np.array(LEVELS) + 0.02 * rng.standard_normal(5) + 0.35 * k * np.eye(5)[1]
+        save(tmp_path / f"year_{9 - k}" / "report.json", report(f"{2018 + k}-06-01", levels))
+    return tmp_path
+
+
+def save(path: Path, content: dict[str, Any]) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_line_is_that_of_least_squares() -> None:
+    rng = np.random.default_rng(1)
+    time, value, deviation = (
+        np.sort(rng.uniform(0, 9, 12)),
+        rng.normal(31, 1, 12),
+        rng.uniform(0.1, 1, 12),
+    )
+    found = _trend(time, value, deviation, LIMITS, 0.05)
+    slope, start = np.polyfit(time, value, 1, w=1 / deviation)
+    assert found.slope == pytest.approx(slope)
+    np.testing.assert_allclose(found.value, start + slope * time[[0, -1]])
+
+
+def test_trend_without_noise_reaches_the_limit_on_its_day() -> None:
+    found = history(slope=0.1, count=11)
+    trend = found.trends()[1]
+    assert trend is not None
+    assert trend.significant
+    assert trend.slope == pytest.approx(0.1)
+    # From 31 to 32.5 dB by 0.1 dB a year; the line is sure to 0.1 dB.
+    assert trend.reached == pytest.approx(15, abs=1e-9)
+    assert trend.earliest < 15 < trend.latest
+    (remark,) = found.remarks()
+    due = (date(2015, 1, 1) + 15 * YEAR).isoformat()
+    assert remark.startswith("63 Hz, dB: changes by +0.100 ± 0.0")
+    assert f"reaches a limit on {due} (95 %: " in remark
+    assert [row[-1] for row in found.table()][1:4] == ["–", due, "–"]
+
+
+def test_ball_that_does_not_change_has_no_trend() -> None:
+    told = sum(
+        any(trend is not None and trend.significant for trend in history(seed=k).trends())
+        for k in range(300)
+    )
+    # Five levels differ, the test is for all of them together: at most 5 % (99.9 % of the draws).
+    assert told <= binom.ppf(0.999, 300, 0.05)
+
+
+def test_drift_is_found() -> None:
+    trends = [history(slope=0.2, seed=k).trends()[1] for k in range(40)]
+    assert sum(trend is not None and trend.significant for trend in trends) > 30
+
+
+def test_interval_of_the_date_holds_the_truth() -> None:
+    rng = np.random.default_rng(3)
+    time, inside, runs = np.arange(8.0), 0, 400
+    for _ in range(runs):
+        value = 31 + 0.15 * time + 0.1 * rng.standard_normal(8)
+        trend = _trend(time, value, np.full(8, 0.1), LIMITS, 0.05)
+        inside += trend.earliest <= 10 <= trend.latest
+    # The wider of two intervals holds it at least as often as it says.
+    assert inside >= binom.ppf(0.001, runs, 0.95)
+
+
+def test_ends_of_the_date_are_those_of_the_interval_of_the_line() -> None:
+    rng = np.random.default_rng(5)
+    time, deviation = np.sort(rng.uniform(0, 9, 12)), rng.uniform(0.05, 0.2, 12)
+    value = 31 + 0.2 * time + deviation * rng.standard_normal(12)
+    trend = _trend(time, value, deviation, LIMITS, 0.05)
+    line, covariance = np.polyfit(time, value, 1, w=1 / deviation, cov="unscaled")
+    factor = trend.expanded / np.sqrt(covariance[0, 0])
+    assert trend.earliest < trend.reached < trend.latest
+    for end in (trend.earliest, trend.latest):
+        width = factor * np.sqrt(np.array([end, 1]) @ covariance @ np.array([end, 1]))
+        assert abs(np.polyval(line, end) - LIMITS[1]) == pytest.approx(width)
+
+
+@pytest.mark.parametrize("stated", [0.0, 0.001])
+def test_few_points_on_a_line_by_chance_are_no_trend(stated: float) -> None:
+    rng = np.random.default_rng(6)
+    time, runs = np.arange(4.0), 600
+    values = 31 + 0.1 * rng.standard_normal((runs, 4))
+    told = sum(_trend(time, v, np.full(4, stated), LIMITS, 0.05).significant for v in values)
+    assert binom.ppf(0.001, runs, 0.05) <= told <= binom.ppf(0.999, runs, 0.05)
+
+
+def test_scatter_beyond_the_stated_uncertainty_counts() -> None:
+    time, value = np.arange(6.0), np.array([31.0, 31.5, 30.6, 31.6, 31.0, 31.8])
+    trusting, doubting = (
+        _trend(time, value, np.full(6, deviation), LIMITS, 0.05) for deviation in (0.01, 0.4)
+    )
+    assert not trusting.significant
+    assert trusting.slope == pytest.approx(doubting.slope)
+    assert trusting.expanded > 0.2
+
+
+def test_few_reports_and_equal_values_have_no_trend() -> None:
+    assert history(slope=0.5, count=2).trends() == [None] * 10
+    trends = history(slope=0.5, count=5).trends()
+    assert [i for i, trend in enumerate(trends) if trend] == [1]
+
+
+def test_chart_shows_each_criterion_its_limits_and_verdicts(folder: Path) -> None:
+    found = read_history([folder])
+    figure = draw_history(found)
+    figure.draw_without_rendering()
+    panels = {axes.get_ylabel().replace("\n", " "): axes for axes in figure.axes}
+    assert panels.keys() == {
+        *(f"{band:g} Hz, dB" for band in get_bands().nominal),
+        *("Contact time, ms", "Restitution", "Peaks of the force", "Mass, kg", "Drop height, m"),
+    }
+    second = panels["63 Hz, dB"]
+    assert len(second.containers) == 5
+    markers = [bar.lines[0].get_marker() for bar in second.containers]
+    assert markers == ["o", "o", "o", "o", "s"]
+    (area,) = second.collections[:1]
+    box = area.get_datalim(second.transData)
+    assert (box.y0, box.y1) == LIMITS
+    (line,) = [one for one in second.lines if one.get_linestyle() == "--"]
+    assert np.diff(line.get_ydata())[0] == pytest.approx(4 * 0.35, abs=0.1)
+    assert "not known" in [text.get_text() for text in panels["Drop height, m"].texts]
+    parts = [axes.get_tightbbox() for axes in figure.axes] + [figure.legends[0].get_window_extent()]
+    for i, part in enumerate(parts):
+        for other in parts[:i]:
+            across = min(part.x1, other.x1) - max(part.x0, other.x0)
+            up = min(part.y1, other.y1) - max(part.y0, other.y0)
+            assert across < 2 or up < 2
+
+
+def test_reports_are_in_the_order_of_their_dates(folder: Path) -> None:
+    head, *rows = read_history([folder / "year_5", folder]).table()
+    assert head[1:6] == tuple(f"{2018 + k}-06-01" for k in range(5))
+    assert [row[0] for row in rows][-1] == "verdict"
+    assert rows[1][5].startswith("32.4")
+    assert rows[1][5].endswith(" ?")
+    assert rows[1][-2].endswith(" *")
+
+
+def test_table_of_many_reports_is_not_wide() -> None:
+    head = history(count=30).table()[0]
+    assert len(head) == 11
+    assert head[1] == "2015-01-01"
+    assert head[-3] == history(count=30).dates[-1].date().isoformat()
+
+
+def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    chart = folder / "chart"
+    options = argparse.Namespace(
+        reports=[str(folder)], output=str(chart), different_balls=False, quiet=False
+    )
+    assert run_history(options) == 0
+    assert sorted(path.name for path in chart.iterdir()) == ["history.png", "history.svg"]
+    printed = capsys.readouterr().out
+    assert printed.startswith("ball 7\n")
+    assert "63 Hz, dB: changes by +0.3" in printed
+    assert f"Chart: {chart / 'history.png'}" in printed
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"serial": "8"}, "serial number '8' is not that of .*; allowed: reports of one ball"),
+        ({"ball": "other"}, "ball 'other' is not that of"),
+        ({"source": "tyre"}, "source 'tyre' or its criteria .*; allowed: reports of one source"),
+        ({"criteria": report("2030-01-01")["criteria"][1:]}, "or its criteria are not those of"),
+        ({"date": ""}, "its date '' is not known; allowed: a date"),
+        ({"date": 3}, "no calibration report of this version"),
+        ({"format": "another"}, "no calibration report of this version"),
+        ({"criteria": []}, "no calibration report of this version"),
+        ({"criteria": [3]}, "no calibration report of this version"),
+    ],
+)
+def test_reports_that_do_not_belong_are_refused(
+    folder: Path, change: dict[str, Any], words: str
+) -> None:
+    save(folder / "z" / "report.json", {**report("2030-01-01"), **change})
+    with pytest.raises(thud.InputError, match=words):
+        read_history([folder])
+
+
+def test_broken_entries_are_refused(folder: Path) -> None:
+    whole = report("2030-01-01")
+    for key, value in (("value", "3"), ("lower", None), ("verdict", "good"), ("upper", True)):
+        broken = copy.deepcopy(whole)
+        broken["criteria"][2][key] = value
+        path = save(folder / "broken.json", broken)
+        with pytest.raises(thud.InputError, match=r"broken\.json: is no calibration report"):
+            read_history([folder, path])
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "[" * 100_000, "\x00", '{"format": 1e999}'])
+def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "report.json"
+    path.write_text(text)
+    with pytest.raises(thud.InputError, match=r"report\.json: .*; allowed: report\.json of"):
+        read_history([path])
+    with pytest.raises(thud.InputError, match="holds no report"):
+        read_history([save(tmp_path / "empty" / "x.json", {}).parent])
+    with pytest.raises(thud.InputError, match=r"cannot be read .No such file"):
+        read_history([tmp_path / "none.json"])
+
+
+def test_different_balls_are_compared_where_told(folder: Path) -> None:
+    save(folder / "z" / "report.json", {**report("2030-01-01"), "serial": "8"})
+    found = read_history([folder], different_balls=True)
+    assert found.title == "2 balls"
+    assert len(found.reports) == 6
+
+
+def test_far_days_are_not_told() -> None:
+    found = history(slope=0.1, count=11)
+    far = [copy.deepcopy(one) for one in found.reports]
+    for one in far:
+        one["criteria"][1]["upper"] = 300.0
+    distant = History("ball", found.dates, tuple(far))
+    assert distant.remarks() == ["63 Hz, dB: changes by +0.100 ± 0.019 per year"]
+    assert distant.table()[2][-1] == "–"

@@ -1,0 +1,216 @@
+"""Files and tables of a measured recording: they say the same, and belong to one recording."""
+
+from __future__ import annotations
+
+import csv
+import html
+import json
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+from thud.errors import ReportWarning
+from thud.recordings import results
+from thud.report.rows import HEAD
+from thud.report.write import PDF
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FOLDER = REPOSITORY / "inputs/recordings"
+FILES = {"levels.csv", "criteria.csv", "recording.nc", "report.json"}
+PICTURES = {"report.html", "force.png", "force.svg", "levels.png", "levels.svg"}
+
+
+@pytest.fixture(scope="module")
+def noisy() -> thud.Recording:
+    """Return a recording whose level at 500 Hz lies in the background."""
+    impact = thud.solve()
+    force = np.pad(impact.floor_force, int(0.1 * impact.sample_rate))
+    force += np.random.default_rng(1).normal(scale=100, size=len(force))
+    recording = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)
+    assert recording.average().flag[-1] == "background"
+    return replace(recording, calibration_uncertainty=0.01)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """Return the rows of a table without its comments."""
+    lines = [line for line in path.read_text().splitlines() if not line.startswith("#")]
+    return list(csv.DictReader(lines))
+
+
+def names(folder: Path) -> set[str]:
+    """Return the names of the files, with or without the PDF that an extra makes."""
+    return {path.name for path in folder.iterdir()} - {PDF}
+
+
+def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Path) -> None:
+    results.save(noisy, tmp_path)
+    head, *screen = results.table(noisy)
+    table = rows_of(tmp_path / "criteria.csv")
+    data = json.loads((tmp_path / "report.json").read_text())
+    rows = re.findall(r'<tr class="[a-z-]+">(.*?)</tr>', (tmp_path / "report.html").read_text())
+    page = [
+        [html.unescape(re.sub(r"<svg.*?</svg>|<[^>]*>", "", cell)) for cell in row.split("</td>")]
+        for row in rows
+    ]
+    columns = [HEAD.index(title) for title in head[:-1]]
+    keys = {"value": "value", "uncertainty": "expanded_uncertainty", "margin": "margin"}
+    for shown, row, one, cells in zip(screen, table, data["criteria"], page, strict=True):
+        assert [cells[i] for i in columns] == list(shown[:-1])
+        assert shown[-1] == row["verdict"] == one["verdict"]
+        assert shown[-1] in cells
+        assert row["upper_bound"] == str(one["upper_bound"]).lower()
+        assert one["upper_bound"] == shown[1].startswith("at most ")
+        scale = 1e3 if row["criterion"] == "contact_time" else 1.0
+        for text, (column, key) in zip((shown[1], shown[2], shown[4]), keys.items(), strict=True):
+            number = text.removeprefix("at most ").replace("−", "-")
+            if number in ("–", "not given", "not known"):
+                assert row[column] == ""
+                assert one[key] is None
+            else:
+                decimals = len(number.partition(".")[2])
+                assert float(row[column]) == one[key]
+                assert f"{scale * one[key]:z.{decimals}f}" == number
+    by_name = {row["criterion"]: row for row in table}
+    bound = by_name["octave_500"]
+    assert bound["upper_bound"] == "true"
+    assert bound["value"]
+    assert bound["margin"] == ""
+    assert by_name["peak_count"]["uncertainty"] == ""
+    assert by_name["octave_63"]["margin"]
+    assert by_name["octave_63"]["upper_bound"] == "false"
+
+
+def test_levels_and_criteria_disagreed_on_uncertainty(
+    noisy: thud.Recording, tmp_path: Path
+) -> None:
+    results.save(noisy, tmp_path, figures=False)
+    rows = rows_of(tmp_path / "levels.csv")
+    data = json.loads((tmp_path / "report.json").read_text())
+    criteria = rows_of(tmp_path / "criteria.csv")[:5]
+    for row, criterion in zip(rows, criteria, strict=False):
+        assert row["level_dB"] == criterion["value"]
+        assert row["expanded_dB"] == criterion["uncertainty"]
+    found = [one for bands in data["levels"].values() for one in bands["uncertainty"]]
+    assert [float(row["standard_uncertainty_dB"]) for row in rows] == found
+    # 1 % of the force is 0.086 dB.
+    assert min(found) > 0.086
+
+
+def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
+    noisy: thud.Recording, tmp_path: Path
+) -> None:
+    results.save(noisy, tmp_path, figures=False)
+    decisions = noisy.conformity().decisions
+    for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
+        assert bool(row["uncertainty"]) == bool(one.quantity.contributions), one.name
+
+
+def test_criteria_are_counted_in_words() -> None:
+    verdicts = ["conforms"] * 7 + ["does not conform"] * 2 + ["cannot be decided"]
+    counts = "7 criteria conform, 2 do not conform, 1 cannot be decided"
+    assert results.count_verdicts(verdicts) == counts
+    assert results.count_verdicts(["cannot be decided"]) == "1 criterion cannot be decided"
+
+
+def test_report_of_another_recording_lay_beside_new_numbers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, drop in (("a", 1), ("b", 2)):
+        (tmp_path / name).mkdir()
+        content = (FOLDER / f"drop_{drop}.csv").read_bytes()
+        (tmp_path / name / "drop.csv").write_bytes(content)
+    remark = "outputs/drop: replaces the results of another recording"
+    out = tmp_path / "outputs/drop"
+    # Without a report of thud beside it, nobody knows whose page this is.
+    out.mkdir(parents=True)
+    (out / "report.html").write_text("mine")
+    assert cli.main(["measure", "a/drop.csv", "-q", "--no-figures"]) == 0
+    assert names(out) == FILES | {"report.html"}
+    for _ in range(2):
+        assert cli.main(["measure", "a/drop.csv", "-q"]) == 0
+        assert names(out) == FILES | PICTURES
+        assert remark not in capsys.readouterr().err
+    (out / PDF).write_bytes(b"signed")
+    assert cli.main(["measure", "b/drop.csv", "-q", "--no-figures"]) == 0
+    assert remark in capsys.readouterr().err
+    assert names(out) == FILES
+    assert not (out / PDF).exists()
+    (origin,) = thud.read_recording("b/drop.csv").origins
+    (file,) = json.loads((out / "report.json").read_text())["files"]
+    assert file["sha256"] == origin.checksum
+
+
+def test_page_that_failed_left_half_of_the_results(
+    noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> Any:  # noqa: ANN401
+        raise MemoryError
+
+    (tmp_path / "levels.csv").write_text("earlier")
+    monkeypatch.setattr(results, "page_contents", fail)
+    with pytest.raises(MemoryError):
+        results.save(noisy, tmp_path)
+    assert names(tmp_path) == {"levels.csv"}
+    assert (tmp_path / "levels.csv").read_text() == "earlier"
+
+
+def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
+    files = [FOLDER / f"drop_{i}.csv" for i in (1, 2, 3)]
+    recording = thud.read_recording(files, height=1.0, mass=2.5)
+    drops = tuple(replace(drop, remarks=("long " * 20000,)) for drop in recording.drops)
+    config = replace(recording.config, laboratory="Ωmega\udcff\0")
+    recording = replace(recording, drops=drops, config=config)
+    results.save(recording, tmp_path, figures=False)
+    with xr.open_dataset(tmp_path / "recording.nc") as found:
+        assert found.sizes == {"drop": 3, "octave": 5, "third": 15, "file": 3}
+        units = {"contact_time": "s", "restitution": "1", "peak_force": "N", "impulse": "N s"}
+        for name, unit in units.items():
+            estimates = [getattr(drop, name) for drop in recording.drops]
+            np.testing.assert_array_equal(found[name], [one.value for one in estimates])
+            doubts = [one.uncertainty for one in estimates]
+            np.testing.assert_array_equal(found[f"{name}_uncertainty"], doubts)
+            assert found[name].attrs["units"] == unit
+        quantities = [one.quantity for one in recording.conformity().decisions[:5]]
+        expanded = [one.expanded for one in quantities]
+        np.testing.assert_array_equal(found["octave_level_expanded"], expanded)
+        np.testing.assert_array_equal(found["third_level"], recording.levels("third"))
+        np.testing.assert_array_equal(found["octave_drop_level"], recording.average().drops)
+        assert list(found["file_sha256"].values) == [one.checksum for one in recording.origins]
+        assert found.attrs["verdict"] == recording.conformity().verdict
+        assert found.attrs["thud"] == thud.__version__
+        assert found.attrs["laboratory"].startswith("Ωmega")
+        assert len(found.attrs["remarks"]) > 300_000
+
+
+def test_without_xarray_a_remark_tells_what_is_left_out(
+    noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results.save(noisy, tmp_path, figures=False)
+    assert names(tmp_path) == FILES
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    monkeypatch.delitem(sys.modules, "thud.report.dataset")
+    words = r"recording\.nc is not written: xarray is not installed; allowed: pip install"
+    with pytest.warns(ReportWarning, match=words):
+        results.save(noisy, tmp_path, figures=False)
+    assert names(tmp_path) == FILES - {"recording.nc"}
+
+
+def test_tables_need_no_figures() -> None:
+    code = (
+        "import sys, thud.recordings.results; "
+        "print({'matplotlib', 'weasyprint', 'xarray'} & set(sys.modules))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == "set()"

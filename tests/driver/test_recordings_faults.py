@@ -1,0 +1,122 @@
+"""Damaged recordings, a part of the campaign of tests/faults, and what it has found."""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+from recording_files import WRITERS, half_sine
+
+from thud.errors import InputError
+from thud.recordings import probe
+from thud.recordings.reading import open_signals
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+sys.path.insert(0, str(REPOSITORY / "tests/faults"))
+from mutate_recordings import count_handles, mutate
+
+CAMPAIGN = REPOSITORY / "tests/faults/mutate_recordings.py"
+
+
+def test_damaged_recordings_are_read_or_refused() -> None:
+    done = subprocess.run(
+        [sys.executable, CAMPAIGN, "--files", "2100", "--seed", "3"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    counts = dict(line.split(": ") for line in done.stdout.splitlines())
+    assert int(counts["read"]) > 100
+    assert int(counts["read"]) + int(counts["refused"]) == 2100
+
+
+def hang(path: Path) -> None:
+    del path
+    while True:
+        time.sleep(1)
+
+
+def die(path: Path) -> None:
+    del path
+    os.abort()
+
+
+def fill(path: Path) -> None:
+    del path
+    np.ones(2**34)
+
+
+def stumble(path: Path) -> None:
+    raise KeyError(path.name)
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (hang, "p.h5: is not read within 0.5 s; allowed: an undamaged HDF5 file"),
+        (die, "p.h5: makes its library fail; allowed: an undamaged HDF5 file"),
+        (fill, "p.h5: asks for too much memory; allowed: an undamaged HDF5 file"),
+        (stumble, "p.h5: cannot be read as HDF5 ('p.h5'); allowed: a complete"),
+    ],
+)
+def test_what_libraries_do_stays_in_the_first_look(
+    action: Callable[[Path], None], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(probe, "PATIENCE", 0.5)
+    handles, before = count_handles(), children()
+    with pytest.raises(InputError) as caught:
+        probe.look(action, tmp_path / "p.h5", "HDF5")
+    assert words in str(caught.value)
+    assert count_handles() == handles
+    assert children() == before
+
+
+def children() -> set[str]:
+    """Return the processes that this one has started and not yet waited for."""
+    tasks = Path("/proc/self/task").glob("*/children")
+    return {child for task in tasks for child in task.read_text().split()}
+
+
+def test_length_of_a_text_in_hdf5_does_not_fill_memory(tmp_path: Path) -> None:
+    """The library reserves what the length of a text claims before it looks for the text."""
+    path = tmp_path / "plate.h5"
+    with h5py.File(path, "w") as file:
+        file["force"] = half_sine(8000.0)
+        file["force"].attrs["units"] = "N" * 77
+    data = path.read_bytes()
+    assert data.count(struct.pack("<I", 77)) >= 1
+    path.write_bytes(data.replace(struct.pack("<I", 77), struct.pack("<I", 2**32 - 1)))
+    with pytest.raises(InputError, match=r"cannot be read as HDF5|too much memory"):
+        open_signals(path)
+
+
+@pytest.mark.parametrize(
+    ("number", "outcome"), [(51359, "read"), (56588, "refused"), (84959, "refused")]
+)
+def test_damaged_matlab_files_do_not_crash(number: int, outcome: str, tmp_path: Path) -> None:
+    """The compiled reader of scipy died of these of the campaign's files."""
+    path = tmp_path / "plain.mat"
+    force = half_sine(8000.0, 0.02, 0.02)
+    force += np.random.default_rng(1).normal(0, 3, force.size)
+    WRITERS["plain.mat"](path, force, 8000.0, "N")
+    path.write_bytes(mutate(path.read_bytes(), np.random.default_rng([1, number])))
+    try:
+        assert open_signals(path)
+    except InputError as error:
+        assert outcome == "refused"
+        assert "; allowed: " in str(error)
+    else:
+        assert outcome == "read"

@@ -1,0 +1,621 @@
+"""Levels, average, outliers, force plate, uncertainty and verdict of recorded drops."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.signal import lsim, lti
+from scipy.stats import binom
+
+import thud
+from thud.recordings.background import noise_energies
+from thud.recordings.levels import METHODS, average_levels, compare_methods, measure_levels
+from thud.recordings.low_pass import BAND_EDGE, attenuation, low_pass_force
+from thud.recordings.outliers import find_outliers
+from thud.recordings.plate import Plate, check_plate, correct_plate
+from thud.recordings.verdict import (
+    Contribution,
+    Quantity,
+    average_estimates,
+    decide,
+    level_quantities,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+# Half-sine of 1500 N and 20 ms: closed form of the band energies, dB.
+HALF_SINE = [38.3125, 30.6046, 19.2578, 8.9323, -0.4390]
+NOMINAL = [39.0, 31.0, 23.0, 17.0, 12.5]
+NAMES = [f"drop {i + 1}" for i in range(20)]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Stand-in for an estimate."""
+
+    value: float
+    uncertainty: float
+
+    def __float__(self) -> float:  # noqa: D105
+        return self.value
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Stand-in for the noise of a recording: white."""
+
+    density: float
+    source: str = "before and after"
+
+    def spectrum(self, frequency: np.ndarray) -> np.ndarray:  # noqa: D102
+        return np.full(np.shape(frequency), self.density)
+
+
+@dataclass(frozen=True)
+class Drop:
+    """Stand-in for a drop: a half-sine with noise whose offset was removed."""
+
+    time: np.ndarray
+    force: np.ndarray
+    sample_rate: float
+    noise: Noise
+    contact_time: Estimate = field(default_factory=lambda: Estimate(0.02, 0.0))
+    bounces: tuple[float, ...] = ()
+    name: str = "drop 1"
+
+
+def half_sine(time: np.ndarray, contact: float = 0.02) -> np.ndarray:
+    inside = (time >= 0) & (time <= contact)
+    return np.where(inside, 1500 * np.sin(np.pi * time / contact), 0.0)
+
+
+def make_drop(
+    deviation: float = 0.0,
+    rate: float = 25600.0,
+    *,
+    before: float = 0.1,
+    after: float = 0.1,
+    seed: int = 0,
+    **options: Any,  # noqa: ANN401 - fields of a drop
+) -> Drop:
+    time = (np.arange(round((before + 0.02 + after) * rate)) - round(before * rate)) / rate
+    noise = np.random.default_rng(seed).normal(scale=deviation, size=len(time))
+    quiet = (time < 0) | (time > 0.02)
+    if deviation:
+        noise -= noise[quiet].mean()
+    density = 2 * deviation**2 / rate
+    name = f"drop {seed + 1}"
+    return Drop(time, half_sine(time) + noise, rate, Noise(density), name=name, **options)
+
+
+def closed_form(rate: float) -> np.ndarray:
+    """Return the levels of the sampled half-sine: a sum of two geometric series, squared."""
+    count = round(0.02 * rate)
+    assert count == pytest.approx(0.02 * rate, abs=1e-9)
+    edges = thud.get_bands()
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    levels = []
+    for lower, upper in zip(edges.lower, edges.upper, strict=True):
+        frequency = (lower + upper) / 2 + (upper - lower) / 2 * nodes
+        angle, turn = 2 * np.pi * frequency / rate, np.pi / count
+        # Sum of sin(turn n) exp(-i angle n) over n = 0 ... count.
+        series = [
+            (1 - np.exp(1j * (s * turn - angle) * count)) / (1 - np.exp(1j * (s * turn - angle)))
+            for s in (1, -1)
+        ]
+        spectrum = 1500 / rate * (series[0] - series[1]) / 2j
+        energy = (upper - lower) * np.sum(weights * np.abs(spectrum) ** 2)
+        levels.append(10 * np.log10(energy))
+    return np.array(levels)
+
+
+@pytest.mark.parametrize("rate", [2500, 8000, 25600, 51200, 96000])
+def test_half_sine_by_all_methods(rate: int) -> None:
+    sampled = closed_form(rate)
+    # Aliases of a spectrum that falls by 12 dB per octave: 2 (f/(rate - f))**2 in amplitude.
+    alias = (thud.get_bands().upper / (rate - thud.get_bands().upper)) ** 2
+    assert (np.abs(sampled - HALF_SINE) <= 20 * np.log10(1 + 2 * alias) + 6e-5).all()
+    drop = make_drop(rate=rate)
+    exact = measure_levels(drop)
+    np.testing.assert_allclose(exact.level, sampled, rtol=0, atol=1e-3)
+    found = compare_methods(drop)
+    assert tuple(found) == METHODS
+    np.testing.assert_array_equal(found["exact"], exact.level)
+    # Bins of 1 Hz miss up to half a bin at both edges: |F|**2 there, over the band's energy.
+    edges = thud.get_bands()
+    for band, (lower, upper) in enumerate(zip(edges.lower, edges.upper, strict=True)):
+        pulse = np.array([lower, upper])
+        density = 2 * (2 * 1500 * 0.02 / np.pi * np.cos(np.pi * 0.02 * pulse)) ** 2
+        density /= (1 - (2 * 0.02 * pulse) ** 2) ** 2
+        missed = 0.5 * density.sum() / 10 ** (sampled[band] / 10)
+        assert abs(found["fft"][band] - sampled[band]) < -10 * np.log10(1 - missed) + 0.02
+    # The skirts of the filters take energy from lower bands: as much as the integral of
+    # abs(H F)**2 says, see below, and at most 0.7 dB in any octave.
+    if rate >= 8000:
+        np.testing.assert_allclose(
+            found["filter"] - sampled, [0.074, 0.629, 0.005, 0.384, 0.654], rtol=0, atol=0.003
+        )
+
+
+def test_skirts_of_the_filters_leak_as_computed() -> None:
+    """500 Hz, 39 dB below 31.5 Hz, reads 0.65 dB more, by what lies just below its edge."""
+    low, high = 1000 * 10 ** np.array([-0.45, -0.15])
+    frequency = np.linspace(0.0031, 4000, 800_000)
+    pulse = 2 * 1500 * 0.02 / np.pi * np.cos(np.pi * 0.02 * frequency)
+    density = 2 * (pulse / (1 - (0.04 * frequency) ** 2)) ** 2
+    response = 1 / (1 + ((frequency**2 - low * high) / (frequency * (high - low))) ** 6)
+    step = frequency[1] - frequency[0]
+    inside = (frequency >= low) & (frequency <= high)
+    exact = np.sum(density[inside]) * step
+    passed = density * response * step
+    leak = {
+        "below": passed[frequency < low].sum() / exact,
+        "below 178 Hz": passed[frequency < low / 2].sum() / exact,
+        "above": passed[frequency > high].sum() / exact,
+        "edges": passed[inside].sum() / exact - 1,
+    }
+    assert leak["below"] == pytest.approx(0.256, abs=0.001)
+    assert leak["below 178 Hz"] == pytest.approx(0.0038, abs=1e-4)
+    total = 10 * np.log10(1 + leak["below"] + leak["above"] + leak["edges"])
+    found = compare_methods(make_drop(rate=96000.0))
+    assert found["filter"][4] - found["exact"][4] == pytest.approx(total, abs=0.01)
+
+
+def test_method_is_a_contribution_of_the_others_only() -> None:
+    for method in METHODS:
+        found = measure_levels(make_drop(), method=method)
+        expected = np.abs(found.measured - measure_levels(make_drop()).level) / math.sqrt(3)
+        np.testing.assert_allclose(found.contributions["method"], expected)
+        assert found.steps[-1].startswith("levels: ")
+        assert method in found.steps[-1]
+    assert not measure_levels(make_drop()).contributions["method"].any()
+
+
+def test_low_pass_does_nothing_to_the_bands() -> None:
+    for rate in (8000.0, 25600.0, 96000.0):
+        drop = make_drop(rate=rate)
+        for bands in ("octave", "third"):
+            raw, low = measure_levels(drop, bands), measure_levels(drop, bands, low_pass=True)
+            np.testing.assert_allclose(low.level, raw.level, rtol=0, atol=2e-3)
+            assert "1.25 kHz" in low.steps[0]
+            assert low.contributions["filter"].max() < 0.003
+    sine = np.sin(2 * np.pi * BAND_EDGE * np.arange(4000) / 25600)
+    passed, _ = low_pass_force(sine, 25600.0)
+    # Zero phase, half the energy, at the band edge; 19 dB at 1.6 kHz, the paper's force plate.
+    np.testing.assert_allclose(passed[1000:3000], sine[1000:3000] / math.sqrt(2), atol=1e-6)
+    assert attenuation(np.array([BAND_EDGE, 1600.0]), 1e6) == pytest.approx([3.01, 19.10], abs=0.01)
+    short, sentence = low_pass_force(sine, 2500.0)
+    assert short is sine
+    assert "2500 Hz" in sentence
+
+
+@pytest.mark.parametrize("bands", ["octave", "third"])
+@pytest.mark.parametrize("rate", [2500.0, 25600.0, 96000.0])
+def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -> None:
+    drop = make_drop(3.0, rate)
+    force = np.ones(round(0.026 * rate))
+    mean, _, _ = noise_energies(drop, force, bands)  # type: ignore[arg-type]
+    edges = thud.get_bands(bands)
+    expected = drop.noise.density * (edges.upper - edges.lower) * len(force) / rate
+    np.testing.assert_allclose(mean, expected, rtol=1e-3)
+
+
+def test_noise_that_rises_towards_0_hz() -> None:
+    """Brown noise, 1/f**2, without the offset of the quiet time, against realisations."""
+    rate, count = 8000.0, 300
+
+    @dataclass(frozen=True)
+    class Brown(Noise):
+        def spectrum(self, frequency: np.ndarray) -> np.ndarray:
+            return self.density / np.asarray(frequency) ** 2
+
+    drop = replace(make_drop(rate=rate, after=0.1), noise=Brown(100.0))
+    gated = np.arange(-24, 184)
+    mean, _, _ = noise_energies(drop, np.ones(len(gated)), "octave")  # type: ignore[arg-type]
+    rng = np.random.default_rng(3)
+    # Increments of the variance 2 pi**2 S f**2 / rate give the density S.
+    deviation = math.sqrt(2 * np.pi**2 * 100.0 / rate)
+    energies = []
+    for _ in range(count):
+        noise = np.cumsum(rng.normal(scale=deviation, size=len(drop.time)))
+        noise -= noise[(drop.time < 0) | (drop.time > 0.02)].mean()
+        start = int(np.argmin(np.abs(drop.time))) + gated[0]
+        energies.append(10 ** (thud.force_exposure_levels(noise[start:][: len(gated)], rate) / 10))
+    # Their mean scatters by 10 %; the drift over the quiet time is only nearly an offset.
+    np.testing.assert_allclose(np.mean(energies, axis=0), mean, rtol=0.25)
+
+
+@pytest.mark.parametrize(
+    ("deviation", "rate", "before"), [(5.0, 51200.0, 0.1), (40.0, 8000.0, 0.02), (150.0, 8000.0, 1)]
+)
+def test_uncertainty_from_noise_is_the_scatter(
+    deviation: float, rate: float, before: float
+) -> None:
+    """Errors of many realisations against their own standard uncertainties."""
+    count = 200
+    true = measure_levels(make_drop(rate=rate)).level
+    found = [
+        measure_levels(make_drop(deviation, rate, before=before, after=0.03, seed=seed))
+        for seed in range(count)
+    ]
+    error = np.array([f.level for f in found]) - true
+    uncertainty = np.array([f.uncertainty for f in found])
+    # Where the level is well above the background, dB are proportional to energies.
+    clear = np.array([f.measured - f.background for f in found]).min(axis=0) > 9
+    assert clear[:2].all()
+    ratio = np.sqrt(np.mean(error**2, axis=0) / np.mean(uncertainty**2, axis=0))[clear]
+    assert (ratio < 1.15).all()
+    assert (ratio > 0.85).all()
+    lowest, highest = binom.ppf([1e-4, 1 - 1e-4], count, 0.95)
+    covered = np.sum(np.abs(error) < 1.96 * uncertainty, axis=0)[clear]
+    assert (covered >= lowest).all()
+    assert (covered <= highest).all()
+
+
+def test_background_is_flagged_and_corrected_as_the_standards_say() -> None:
+    rate = 25600.0
+    clean = measure_levels(make_drop(rate=rate))
+    assert (clean.background == -np.inf).all()
+    assert not clean.uncertainty.any()
+    assert (clean.flag == "").all()
+    for above, flag in ((20.0, ""), (14.9, "corrected"), (6.1, "corrected"), (5.9, "background")):
+        # White noise in the file itself is not needed: the level is taken against its density.
+        density = 10 ** ((clean.level[3] - above) / 10)
+        density /= (thud.get_bands().upper - thud.get_bands().lower)[3] * 0.026
+        found = measure_levels(
+            replace(make_drop(rate=rate), noise=Noise(density))  # type: ignore[arg-type]
+        )
+        assert found.level[3] - found.background[3] <= above + 0.01
+        assert found.flag[3] == flag
+        correction = -10 * math.log10(1 - 10 ** (-max(above, 6.0) / 10))
+        if flag:
+            assert found.measured[3] - found.level[3] == pytest.approx(correction, abs=0.003)
+            assert any("250" in step for step in found.steps)
+            assert found.contributions["background"][3] == 0
+        else:
+            # Not corrected, so it counts.
+            assert found.level[3] == found.measured[3]
+            assert found.contributions["background"][3] == pytest.approx(correction, rel=0.01)
+
+
+def test_later_bounce_and_a_cut_record_stay_outside_the_gate() -> None:
+    drop = make_drop(before=0.001, after=0.5)
+    level = measure_levels(drop).level
+    np.testing.assert_allclose(level, measure_levels(make_drop()).level, atol=1e-9)
+    bounce = half_sine(drop.time - 0.021, 0.02)
+    twice = Drop(drop.time, drop.force + bounce, drop.sample_rate, drop.noise, bounces=(0.021,))
+    np.testing.assert_allclose(measure_levels(twice).level, level, atol=1e-9)
+
+
+def test_drop_without_a_contact_time_has_no_levels() -> None:
+    with pytest.raises(thud.InputError, match="drop 1: the contact time is not known"):
+        measure_levels(make_drop(contact_time=Estimate(math.nan, math.nan)))
+    with pytest.raises(thud.InputError, match="method = 'welch' is not known"):
+        measure_levels(make_drop(), method="welch")
+
+
+def test_average_is_that_of_energies() -> None:
+    drops = [make_drop(2.0, seed=i) for i in range(5)]
+    scales = [1.0, 1.01, 0.99, 1.02, 0.98]
+    found = [
+        measure_levels(Drop(d.time, s * d.force, d.sample_rate, d.noise, name=d.name))
+        for s, d in zip(scales, drops, strict=True)
+    ]
+    average = average_levels(found)
+    energies = np.array([10 ** (f.level / 10) for f in found])
+    np.testing.assert_allclose(average.level, 10 * np.log10(energies.mean(axis=0)), atol=1e-9)
+    np.testing.assert_allclose(average.spread, np.std([f.level for f in found], axis=0, ddof=1))
+    np.testing.assert_allclose(average.standard_error, average.spread / math.sqrt(5), rtol=0.05)
+    assert average.names == tuple(d.name for d in drops)
+    # The scatter holds the noise.
+    np.testing.assert_allclose(
+        average.uncertainty,
+        np.hypot(average.standard_error, average.contributions["background"]),
+    )
+    single = average_levels(found[:1])
+    np.testing.assert_allclose(single.level, found[0].level)
+    np.testing.assert_allclose(single.uncertainty, found[0].uncertainty)
+    assert np.isnan(single.spread).all()
+    assert "repeatability" not in single.contributions
+    with pytest.raises(thud.InputError, match="there are none"):
+        average_levels([])
+    with pytest.raises(thud.InputError, match="differ in bands or method"):
+        average_levels([found[0], measure_levels(drops[0], "third")])
+
+
+def test_drops_that_differ_are_marked_and_kept() -> None:
+    found = [measure_levels(make_drop(1.0, seed=i)) for i in range(6)]
+    assert average_levels(found).outliers == ()
+    odd = make_drop(1.0, seed=6)
+    found.append(
+        measure_levels(Drop(odd.time, 1.05 * odd.force, odd.sample_rate, odd.noise, name="odd"))
+    )
+    average = average_levels(found)
+    assert {o.name for o in average.outliers} == {"odd"}
+    assert "odd" in average.names
+    assert len(average.drops) == 7
+    assert "standard deviations from the mean" in str(average.outliers[0])
+    # Equal drops differ by rounding.
+    same = [measure_levels(make_drop()) for _ in range(5)]
+    assert average_levels(same).outliers == ()
+
+
+def test_grubbs_critical_values_are_the_published_ones() -> None:
+    # Grubbs 1969, two-sided 5 %: 1.155, 1.715, 2.290, 2.709 for 3, 5, 10, 20 values.
+    for count, critical in ((3, 1.1547), (5, 1.7150), (10, 2.2900), (20, 2.7082)):
+        values = np.zeros(count)
+        values[0], values[1:] = 100.0, np.linspace(-1e-3, 1e-3, count - 1)
+        (found,) = find_outliers(values, NAMES, "level") or [None]
+        if count > 3:
+            assert found is not None
+            assert found.critical == pytest.approx(critical, abs=1e-3)
+
+
+@pytest.mark.parametrize("count", [3, 5, 9, 15])
+def test_rate_of_false_outliers(count: int) -> None:
+    rng = np.random.default_rng(count)
+    trials = 1000
+    marked = sum(bool(find_outliers(rng.normal(size=count), NAMES, "level")) for _ in range(trials))
+    # Rosner's values are approximate for two and three outliers of few drops: up to 7 %.
+    lowest, highest = binom.ppf([1e-3, 1 - 1e-3], trials, [0.05, 0.05 if count < 10 else 0.07])
+    assert lowest <= marked <= highest
+
+
+def test_two_outliers_do_not_hide_each_other_and_noise_marks_none() -> None:
+    values = [*np.random.default_rng(1).normal(size=13), 30.0, 31.0]
+    assert [o.name for o in find_outliers(values, NAMES, "level")] == ["drop 15", "drop 14"]
+    assert find_outliers(values, NAMES, "level", uncertainty=[20.0] * 15) == ()
+    assert find_outliers([1.0, np.nan, 2.0], NAMES, "level") == ()
+
+
+def through_plate(
+    force: Callable[[np.ndarray], np.ndarray], rate: float, plate: Plate
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return time and the force that a plate measures, integrated at 64 times the rate."""
+    fine = np.arange(round(0.1 * rate * 64)) / (64 * rate) - 0.03
+    omega, quality = 2 * np.pi * plate.resonance, plate.quality * math.sqrt(plate.loading)
+    system = lti([omega**2], [1, omega / quality, omega**2])
+    _, measured, _ = lsim(system, force(fine), fine - fine[0])
+    return fine[::64], np.asarray(measured)[::64]
+
+
+@pytest.mark.parametrize("rate", [25600.0, 96000.0])
+@pytest.mark.parametrize(
+    "plate", [Plate(1600, 30), Plate(1050, 5), Plate(2500, 80, mass=10, added_mass=4)]
+)
+def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
+    time, measured = through_plate(half_sine, rate, plate)
+    corrected, sentence = correct_plate(measured, rate, plate)
+    before = np.abs(thud.force_exposure_levels(measured, rate) - HALF_SINE)
+    after = np.abs(thud.force_exposure_levels(corrected, rate) - HALF_SINE)
+    assert before.max() > 0.3
+    # Aliases of what the plate measures fall by 24 dB per octave above its resonance.
+    assert after.max() < 1e-3
+    assert np.abs(corrected - half_sine(time)).max() < 0.01 * 1500
+    assert f"resonance of {plate.resonance:.4g} Hz" in sentence
+
+
+def test_constant_force_passes_the_correction() -> None:
+    for length in (100, 4097):
+        corrected, _ = correct_plate(np.full(length, 7.0), 25600.0, Plate(1600, 30))
+        np.testing.assert_allclose(corrected, 7.0, rtol=1e-12)
+
+
+def test_uncertain_resonance_makes_levels_uncertain() -> None:
+    plate = Plate(1600, 30, frequency_uncertainty=0.01)
+    _, measured = through_plate(half_sine, 51200.0, plate)
+    right, _ = correct_plate(measured, 51200.0, plate)
+    wrong, _ = correct_plate(measured, 51200.0, Plate(1600 * 1.01, 30))
+    change = thud.force_exposure_levels(wrong, 51200.0, "third") - thud.force_exposure_levels(
+        right, 51200.0, "third"
+    )
+    bound = plate.level_uncertainty("third")
+    assert (np.abs(change) < bound).all()
+    assert abs(change[-1]) > 0.6 * bound[-1]
+
+
+def test_resonance_near_the_bands_is_refused() -> None:
+    with pytest.raises(thud.InputError, match=r"too near to the bands.*allowed: 1001 Hz or more"):
+        correct_plate(np.ones(100), 25600.0, Plate(900, 30))
+    # The added mass lowers it.
+    with pytest.raises(thud.InputError, match=r"resonance, 919\.2 Hz"):
+        correct_plate(np.ones(100), 25600.0, Plate(1300, 30, mass=5, added_mass=5))
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ((0.0, 30.0), "plate: frequency = 0.0 is not allowed"),
+        ((1600.0, -1.0), "plate: quality = -1.0"),
+        ((1600.0, 30.0, None, 1.0), "plate: mass = None"),
+        ((1600.0, 30.0, 5.0, -1.0), "plate: added_mass = -1.0"),
+        ((math.nan, 30.0), "plate: frequency = nan"),
+    ],
+)
+def test_impossible_plates_are_refused(values: tuple[Any, ...], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        Plate(*values)
+
+
+def test_plate_is_held_against_the_standard() -> None:
+    unknown = check_plate()
+    assert [check.met for check in unknown] == [None] * 4
+    paper = check_plate(Plate(1600, 30), full_scale=4000.0, time_constant=1.0)
+    assert [check.met for check in paper] == [False, False, False, None]
+    assert "4000 N" in paper[2].sentence
+    # A resonance of 7.2 kHz and a time constant of 3.92 s are just enough: 2 %.
+    edge = check_plate(Plate(7142, 1e3), full_scale=5000.0, time_constant=3.92)
+    assert [check.met for check in edge[:3]] == [True, True, True]
+    short = check_plate(Plate(7139, 1e3), time_constant=3.9)
+    assert [check.met for check in short[:2]] == [False, False]
+    corrected = Plate(1600, 30, frequency_uncertainty=0.005)
+    assert check_plate(corrected, corrected=True)[1].met
+    assert not check_plate(Plate(1600, 30, frequency_uncertainty=0.05), corrected=True)[1].met
+    forces = [500.0, 1000.0, 2000.0, 5000.0]
+    straight = check_plate(
+        calibration=[(f, 1.3 * f * (1 + 0.001 * i)) for i, f in enumerate(forces)]
+    )
+    assert straight[3].met
+    assert check_plate(calibration=[(f, f * (1 + f / 5e4)) for f in forces])[3].met is False
+    assert check_plate(calibration=[(f, f) for f in forces[:3]])[3].met is None
+    with pytest.raises(thud.InputError, match="two or more pairs"):
+        check_plate(calibration=[(0.0, 1.0)])
+
+
+def test_budget_after_the_gum() -> None:
+    """JCGM 100, H.1: end gauge; combined 32 nm, 16 degrees of freedom, 93 nm at 99 %."""
+    parts = [(25.0, 18), (5.8, 24), (3.9, 5), (6.7, 8), (2.9, 50), (16.6, 2)]
+    # Only the kinds of the lines count here: 31.7 nm and 16.7, which the GUM truncates to 16.
+    gauge = Quantity(838.0, tuple(Contribution(str(i), u, v) for i, (u, v) in enumerate(parts)))
+    expected = math.sqrt(sum(u**2 for u, _ in parts))
+    assert gauge.uncertainty == pytest.approx(expected)
+    assert gauge.freedom == pytest.approx(expected**4 / sum(u**4 / v for u, v in parts))
+    exact = Quantity(1.0)
+    assert (exact.uncertainty, exact.freedom, exact.expanded) == (0.0, math.inf, 0.0)
+    # Of five drops alone: t = 2.776.
+    drops = average_estimates([Estimate(v, 0.1) for v in (1.0, 2.0, 3.0, 4.0, 5.0)])
+    assert drops.value == 3
+    assert drops.uncertainty == pytest.approx(math.sqrt(2.5 / 5))
+    assert drops.coverage_factor == pytest.approx(2.7764, abs=1e-4)
+    # A single one has its own noise only; two have t = 12.7.
+    assert average_estimates([Estimate(1.0, 0.1)]).expanded == pytest.approx(0.196, abs=1e-3)
+    pair = average_estimates([Estimate(1.0, 0.1), Estimate(1.2, 0.1)])
+    assert pair.coverage_factor == pytest.approx(12.706, abs=1e-3)
+    shared = pair.with_contributions(Contribution("calibration", 0.3))
+    assert shared.uncertainty == pytest.approx(math.hypot(0.1, 0.3))
+    assert shared.freedom == pytest.approx((0.1**2 + 0.3**2) ** 2 / 0.1**4)
+    assert math.isnan(average_estimates([]).value)
+
+
+def test_level_budget_has_calibration_and_plate() -> None:
+    average = average_levels([measure_levels(make_drop(1.0, seed=i)) for i in range(3)])
+    plate = np.full(5, 0.02)
+    levels = level_quantities(average, calibration=0.01, plate=plate)
+    names = [c.name for c in levels[0].contributions]
+    assert names == [
+        "repeatability", "noise", "window", "method", "filter", "background", "calibration",
+        "plate",
+    ]  # fmt: skip
+    calibration = next(c for c in levels[0].contributions if c.name == "calibration")
+    assert calibration.uncertainty == pytest.approx(20 * math.log10(1.01), rel=0.01)
+    for band, level in enumerate(levels):
+        shared = math.hypot(calibration.uncertainty, 0.02)
+        assert level.uncertainty == pytest.approx(math.hypot(average.uncertainty[band], shared))
+        assert level.freedom > 2
+
+
+def with_levels(level: Quantity, band: int = 0, **others: Any) -> str:  # noqa: ANN401
+    levels: list[Any] = list(NOMINAL)
+    levels[band] = level
+    options = {
+        "contact_time": 0.02, "restitution": 0.8, "peaks": 1, "mass": 2.5, "drop_height": 1.0,
+        **others,
+    }  # fmt: skip
+    verdict = decide(levels, **options)
+    return verdict.verdict
+
+
+def test_verdict_has_a_guard_band_on_both_sides() -> None:
+    def level(value: float, uncertainty: float) -> Quantity:
+        return Quantity(value, (Contribution("noise", uncertainty),))
+
+    # Limits 38 to 40 dB; 1.96 times 0.1 dB.
+    for value, word in (
+        (37.80, "does not conform"), (37.81, "cannot be decided"), (38.19, "cannot be decided"),
+        (38.20, "conforms"), (39.80, "conforms"), (39.81, "cannot be decided"),
+        (40.19, "cannot be decided"), (40.20, "does not conform"),
+    ):  # fmt: skip
+        assert with_levels(level(value, 0.1)) == word
+    # An exact value on the limit conforms; one that is uncertain by more than the range never.
+    assert with_levels(level(38.0, 0.0)) == "conforms"
+    assert with_levels(level(39.0, 1.0)) == "cannot be decided"
+    assert with_levels(level(39.0, math.nan)) == "cannot be decided"
+    assert with_levels(level(math.nan, 0.1)) == "cannot be decided"
+    # An upper bound can only fail.
+    bound = (Contribution("noise", 0.1),)
+    assert with_levels(Quantity(39.0, bound, upper_bound=True)) == "cannot be decided"
+    assert with_levels(Quantity(45.0, bound, upper_bound=True)) == "cannot be decided"
+    assert with_levels(Quantity(37.0, bound, upper_bound=True)) == "does not conform"
+
+
+def test_verdict_names_each_criterion_of_the_library() -> None:
+    verdict = decide(NOMINAL, contact_time=Estimate(0.02, 1e-4), restitution=0.8, peaks=2)
+    expected = thud.judge(NOMINAL, 0.02, 0.8, 2, math.nan, math.nan)
+    assert [d.name for d in verdict.decisions] == [c.name for c in expected.criteria]
+    assert [(d.lower, d.upper) for d in verdict.decisions] == [
+        (c.lower, c.upper) for c in expected.criteria
+    ]
+    assert [d.verdict for d in verdict.decisions] == [
+        *["conforms"] * 7, "does not conform", *["cannot be decided"] * 2,
+    ]  # fmt: skip
+    assert verdict.verdict == "does not conform"
+    assert not verdict
+    first = verdict.decisions[0]
+    assert (first.margin, first.probability) == (1.0, 1.0)
+    assert verdict.decisions[7].margin == -1
+    assert with_levels(Quantity(39.0)) == "conforms"
+    assert with_levels(Quantity(39.0), mass=math.nan) == "cannot be decided"
+    assert with_levels(Quantity(39.0), restitution=0.95, mass=math.nan) == "does not conform"
+    with pytest.raises(thud.InputError, match="levels have the shape"):
+        decide(NOMINAL[:4])
+    with pytest.raises(thud.InputError, match="bowling_ball"):
+        decide(NOMINAL, source="bowling_ball")
+
+
+def test_probability_of_conformity_counts_both_limits() -> None:
+    half = Quantity(40.0, (Contribution("noise", 0.1),))
+    wide = Quantity(39.0, (Contribution("noise", 1.0),))
+    decisions = [decide([q, *NOMINAL[1:]]).decisions[0] for q in (half, wide)]
+    assert decisions[0].probability == pytest.approx(0.5)
+    assert decisions[1].probability == pytest.approx(0.6827, abs=1e-4)
+
+
+@pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])
+def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
+    scatter: float, calibration: float
+) -> None:
+    """JCGM 101: five drops with a shared error of calibration, on and far beyond the limits."""
+    rng = np.random.default_rng(4)
+    trials = 500
+    covered = 0
+    words: dict[float, list[str]] = {}
+    for true in (37.0, 38.0, 39.0, 40.0):
+        words[true] = []
+        for _ in range(trials):
+            drops = true + rng.normal(scale=scatter, size=5) + rng.normal(scale=calibration)
+            quantity = average_estimates(
+                [Estimate(float(d), 0.0) for d in drops], Contribution("calibration", calibration)
+            )
+            covered += abs(quantity.value - true) <= quantity.expanded
+            words[true].append(_decide_level(quantity))
+    # Welch and Satterthwaite are exact for one contribution, and within a percent here for two.
+    lowest, highest = binom.ppf([1e-4, 1 - 1e-4], 4 * trials, [0.95 - 0.01, 0.95 + 0.015])
+    assert lowest <= covered <= highest
+    # On a limit, which conforms, each wrong and each right decision takes at most 2.5 %.
+    worst = binom.ppf(1 - 1e-4, trials, 0.025)
+    for limit in (38.0, 40.0):
+        assert words[limit].count("does not conform") <= worst
+        assert words[limit].count("conforms") <= worst
+    assert words[37.0].count("conforms") == 0
+    assert words[39.0].count("does not conform") == 0
+
+
+def _decide_level(quantity: Quantity) -> str:
+    return decide([quantity, *NOMINAL[1:]]).decisions[0].verdict
+
+
+def test_energy_of_bands_adds_up_to_neighbours() -> None:
+    """Thirds of an octave hold its energy, for exact levels and for the noise."""
+    drop = make_drop(5.0)
+    thirds, octaves = measure_levels(drop, "third"), measure_levels(drop)
+    starts = range(0, 16, 3)
+    for attribute in ("measured", "background"):
+        energy = 10 ** (getattr(thirds, attribute) / 10)
+        sums = [energy[a:b].sum() for a, b in pairwise(starts)]
+        np.testing.assert_allclose(10 * np.log10(sums), getattr(octaves, attribute), atol=1e-3)

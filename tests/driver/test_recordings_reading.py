@@ -1,0 +1,860 @@
+"""Recordings: every format, unit and rate, what is found and told, and files that are refused."""
+
+from __future__ import annotations
+
+import math
+import os
+import pickle
+import struct
+import time
+import tomllib
+import tracemalloc
+import zlib
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+import soundfile
+from conftest import REPOSITORY
+from recording_files import DURATION, PEAK, SOUND, WITH_UNIT, WRITERS, broadcast_chunk, half_sine
+
+from thud.errors import InputError
+from thud.levels import force_exposure_levels, get_bands
+from thud.recordings.calibration import calibrate
+from thud.recordings.config import PlateConfig, read_config
+from thud.recordings.reading import open_signals
+from thud.recordings.signal import Signal
+from thud.recordings.units import Calibration
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+RATES = (2500.0, 8000.0, 44100.0, 48000.0, 51200.0, 96000.0)
+# Levels of the half sine of 1500 N and 20 ms, dB (physics, section 10).
+HALF_SINE = (38.3125, 30.6046, 19.2578, 8.9323, -0.4390)
+# Recorded values per newton, and what the user says about them.
+UNITS: dict[str, tuple[float, dict[str, Any]]] = {
+    "N": (1.0, {}),
+    "kN": (1e-3, {}),
+    "V": (4e-3, {"calibration": "250 N/V"}),
+    "mV": (4.0, {"calibration": "4.1 pC/N, 0.97560975609756097 mV/pC"}),
+    "counts": (8.0, {"calibration": 0.125}),
+}
+FULL_SCALE = 1600.0
+LSB = {"pcm16": 2.0**-15, "pcm24": 2.0**-23, "pcm32": 2.0**-31, "float": 2.0**-24}
+
+
+@cache
+def sampled_levels(rate: float) -> tuple[float, ...]:
+    """Return the octave levels of the samples of the half sine, dB, by its spectrum and images.
+
+    |F(f)| of the half sine is 2 P T / pi |cos(pi f T) / (1 - 4 f2 T2)|; samples have the sum of
+    its images at multiples of the rate. Gauss-Legendre over each band.
+    """
+    start = math.ceil(0.01 * rate) / rate - 0.01
+    node, weight = np.polynomial.legendre.leggauss(60)
+    images = np.arange(-4000, 4001) * rate
+    levels = []
+    for lower, upper in zip(get_bands().lower, get_bands().upper, strict=True):
+        frequency = (upper - lower) / 2 * node + (upper + lower) / 2
+        f = frequency[:, np.newaxis] + images
+        spectrum = (
+            2 * PEAK * DURATION / np.pi * np.cos(np.pi * f * DURATION)
+            / (1 - 4 * f**2 * DURATION**2)
+            * np.exp(-1j * np.pi * f * DURATION + 2j * np.pi * f * start)
+        ).sum(axis=1)  # fmt: skip
+        energy = (upper - lower) / 2 * weight @ (2 * abs(spectrum) ** 2)
+        levels.append(10 * math.log10(energy))
+    return tuple(levels)
+
+
+def test_images_vanish_at_high_rates() -> None:
+    np.testing.assert_allclose(sampled_levels(1e6), HALF_SINE, atol=1e-3)
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_samples_have_the_levels_of_their_spectrum(rate: float) -> None:
+    # Of 8001 images the rest falls as the second power of their number.
+    found = force_exposure_levels(half_sine(rate), rate)
+    np.testing.assert_allclose(found, sampled_levels(rate), atol=5e-4)
+
+
+def read_all(path: Path, **given: Any) -> tuple[Signal, NDArray[np.float64]]:  # noqa: ANN401
+    (signal,) = open_signals(path, **given)
+    return signal, signal.read(0, signal.n_sample)
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("name", WITH_UNIT)
+def test_half_sine_is_read_in_every_unit(name: str, rate: float, tmp_path: Path) -> None:
+    exact = half_sine(rate)
+    for unit, (per_newton, given) in UNITS.items():
+        WITH_UNIT[name](tmp_path / name, exact * per_newton, rate, unit)
+        signal, force = read_all(tmp_path / name, **given)
+        # Universal files hold the sampling interval to six digits.
+        assert signal.sample_rate == pytest.approx(rate, rel=5e-6 if name.endswith("uff") else 1e-7)
+        np.testing.assert_allclose(force, exact, atol=1e-9 * PEAK)
+        levels = force_exposure_levels(force, signal.sample_rate)
+        np.testing.assert_allclose(levels, sampled_levels(rate), atol=1e-3)
+        assert signal.n_sample == exact.size
+        assert signal.full_scale is None
+        assert unit in signal.calibration
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("name", SOUND)
+def test_half_sine_is_read_from_sound_files(name: str, rate: float, tmp_path: Path) -> None:
+    exact = half_sine(rate)
+    is_integer = name.startswith("pcm")
+    SOUND[name](tmp_path / name, exact / FULL_SCALE if is_integer else exact, rate, "")
+    given = {"calibration": f"10 V/FS, {10 / FULL_SCALE!r} V/N"} if is_integer else {"unit": "N"}
+    signal, force = read_all(tmp_path / name, **given)
+    assert signal.sample_rate == rate
+    assert signal.full_scale == (pytest.approx(FULL_SCALE) if is_integer else None)
+    digit = LSB.get(name.partition(".")[0], 0.0) * (FULL_SCALE if is_integer else PEAK)
+    error = force - exact
+    # Rounded or cut off to the last digit.
+    assert abs(error).max() <= digit * 1.001
+    levels = force_exposure_levels(force, rate)
+    rounding = (
+        20 * np.log10(1 + 10 ** ((force_exposure_levels(error, rate) - levels) / 20))
+        if error.any()
+        else 0.0
+    )
+    assert (abs(levels - sampled_levels(rate)) <= 1e-3 + rounding).all()
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_pieces_are_those_of_the_whole(name: str, tmp_path: Path) -> None:
+    exact = half_sine(8000.0)
+    integer = name.startswith("pcm")
+    WRITERS[name](tmp_path / name, exact / FULL_SCALE if integer else exact, 8000.0, "N")
+    signal, force = read_all(tmp_path / name, calibration=FULL_SCALE if integer else None)
+    for start, stop in ((0, 1), (3, 3), (17, 130), (signal.n_sample - 1, signal.n_sample)):
+        np.testing.assert_array_equal(signal.read(start, stop), force[start:stop])
+    with pytest.raises(InputError, match="samples 0 to 321; allowed: samples 0 to 320"):
+        signal.read(0, 321)
+    assert len(signal.checksum) == 64
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_signals_go_to_other_processes(name: str, tmp_path: Path) -> None:
+    exact = half_sine(8000.0)
+    integer = name.startswith("pcm")
+    WRITERS[name](tmp_path / name, exact / FULL_SCALE if integer else exact, 8000.0, "N")
+    signal, force = read_all(tmp_path / name, calibration=FULL_SCALE if integer else None)
+    copy = pickle.loads(pickle.dumps(signal))  # noqa: S301 - its own
+    np.testing.assert_array_equal(copy.read(0, copy.n_sample), force)
+
+
+@pytest.mark.parametrize("name", ["comma.csv", "plate.h5", "text.uff", "plate.tdms", "packed.mat"])
+def test_negative_compression_is_found_and_told(name: str, tmp_path: Path) -> None:
+    exact = half_sine(8000.0)
+    WRITERS[name](tmp_path / name, -exact, 8000.0, "N")
+    signal, force = read_all(tmp_path / name)
+    np.testing.assert_allclose(force, exact, atol=1e-6)
+    assert "The sign was changed: the largest excursion, -1500 N, is negative." in signal.steps
+    _, given = read_all(tmp_path / name, polarity="negative")
+    np.testing.assert_array_equal(given, force)
+    with pytest.raises(InputError, match="the peak is 0 N"):
+        open_signals(tmp_path / name, polarity="positive")
+
+
+def write_sound(path: Path, values: NDArray[np.float64], rate: float = 8000.0) -> Path:
+    soundfile.write(path, values, round(rate), "DOUBLE")
+    return path
+
+
+@pytest.mark.parametrize("cut", [0.0, 0.3])
+def test_polarity_of_a_record_without_quiet(cut: float, tmp_path: Path) -> None:
+    pulse = half_sine(8000.0, 0.0, 0.0)
+    pulse = pulse[: round(len(pulse) * (1 - cut))]
+    for sign in (1, -1):
+        signal, force = read_all(write_sound(tmp_path / "bare.wav", sign * pulse + 3.0))
+        assert force.max() > 1490
+        assert bool(signal.steps[1:]) == (sign < 0)
+
+
+def test_unclear_polarity_is_refused(tmp_path: Path) -> None:
+    noise = np.random.default_rng(1).normal(0, 300, 4000)
+    path = write_sound(tmp_path / "noise.wav", noise)
+    with pytest.raises(InputError, match=r"the sign is not clear, the force goes .* polarity = "):
+        open_signals(path)
+    assert open_signals(path, polarity="positive")
+
+
+def test_wrong_polarity_is_doubted(tmp_path: Path) -> None:
+    force = np.concatenate([half_sine(8000.0), -0.25 * half_sine(8000.0)])
+    path = write_sound(tmp_path / "plate.wav", force)
+    (signal,) = open_signals(path, unit="N", polarity="negative")
+    assert signal.remarks[-1].endswith("the polarity may be wrong.")
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit", "words"),
+    [
+        (1e-3, "N", r"the peak is 1\.5 N; the unit is probably wrong, kN for N"),
+        (1e3, "N", r"the peak is 1\.5e\+06 N; the unit is probably wrong, mN for N"),
+        (1.0, "kN", r"the peak is 1\.5e\+06 N; the unit is probably wrong, mN for N"),
+        (1e-6, "N", r"the peak is 0\.0015 N; unit or calibration are wrong"),
+        (1e-3, None, r"the values are without a unit and reach 1\.5"),
+        (0.1, None, r"the values are without a unit and reach 150"),
+    ],
+)
+def test_wrong_units_are_told(factor: float, unit: str | None, words: str, tmp_path: Path) -> None:
+    path = write_sound(tmp_path / "plate.wav", factor * half_sine(8000.0))
+    with pytest.raises(InputError, match=rf"plate\.wav: {words}; allowed: 300 to 15000 N"):
+        open_signals(path, unit=unit)
+
+
+def test_small_peaks_are_remarked(tmp_path: Path) -> None:
+    path = write_sound(tmp_path / "plate.wav", 0.1 * half_sine(8000.0))
+    (signal,) = open_signals(path, unit="N")
+    assert signal.remarks == (
+        "The peak is 150 N; usual are 300 to 15000 N for heavy/soft sources.",
+    )
+
+
+def test_units_and_rates_that_are_replaced_are_told(tmp_path: Path) -> None:
+    WRITERS["plate.h5"](tmp_path / "plate.h5", half_sine(8000.0) / 1e3, 8000.0, "N")
+    signal, force = read_all(tmp_path / "plate.h5", unit="kN", sample_rate=8001.0)
+    assert force.max() == pytest.approx(1500)
+    assert signal.sample_rate == 8001
+    assert signal.steps == (
+        "The rate of the file, 8000 Hz, was replaced by 8001 Hz as given.",
+        "The unit of the file, N, was replaced by kN as given.",
+    )
+    assert signal.date == "2024-05-06"
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"unit": "V"}, "integers, not values in V; allowed: calibration per full scale"),
+        ({}, "the values are in FS and no calibration is given"),
+        ({"calibration": "250 N/V"}, "'250 N/V' does not lead from FS to N by all its factors"),
+        ({"calibration": "10 V/FS"}, "does not lead from FS to N"),
+        ({"calibration": "10 X/FS"}, "unit = 'X' is not known"),
+        ({"calibration": "V/FS"}, "'V/FS' is not a number with units"),
+        ({"calibration": 0.0}, "calibration = 0.0 is not allowed"),
+        ({"calibration": math.nan}, "calibration = nan is not allowed"),
+        ({"calibration": True}, "calibration"),
+        ({"calibration": 5e3, "channel": 3}, "channel = 3 fits 0 channels; allowed: one of 1, 2"),
+        ({"calibration": 5e3}, "has 2 channels, none of them in a unit of force"),
+        ({"calibration": 5e3, "channel": 1, "polarity": "up"}, "polarity = 'up' is not known"),
+        ({"calibration": 5e3, "channel": 1, "unit": "dB"}, "unit = 'dB' is not known"),
+        ({"calibration": 5e3, "channel": 1, "sample_rate": 2000.0}, "the sample rate is 2000 Hz"),
+        ({"calibration": 5e3, "channel": 1, "sample_rate": math.nan}, "sample_rate = nan"),
+        ({"calibration": 5e3, "channel": 1, "sample_rate": "8 kHz"}, "sample_rate = '8 kHz'"),
+    ],
+)
+def test_what_does_not_fit_is_told(given: dict[str, Any], words: str, tmp_path: Path) -> None:
+    force = half_sine(8000.0) / 5000
+    channels = 1 if "channel" not in given and "calibration" not in given else 2
+    if isinstance(given.get("calibration"), str) or given.get("calibration") in {0.0, True}:
+        channels = 1
+    if isinstance(given.get("calibration"), float) and math.isnan(given["calibration"]):
+        channels = 1
+    soundfile.write(tmp_path / "plate.wav", np.column_stack([force] * channels), 8000, "PCM_24")
+    with pytest.raises(InputError, match="; allowed: ") as caught:
+        open_signals(tmp_path / "plate.wav", **given)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("calibration", "unit", "newtons"),
+    [
+        ("5000 N/FS", None, 5000.0),
+        ("10 V/FS, 2 mV/N", None, 5000.0),
+        ("2 mV/N; 10 V/FS", "FS", 5000.0),
+        ("10 V/FS, 1 mV/pC, 4 pC/N", None, 2500.0),
+        ("10 V/FS, 5 V/V, 1 mV/N", None, 2000.0),
+        ("0.5 N/counts", None, 0.5 * 2**23),
+        ("0.5 N/counts", "counts", 0.5 * 2**23),
+        ("1e3 counts/kN", None, 2.0**23),
+        ("-5 kN/FS", None, 5000.0),
+        (5000, None, 5000.0),
+        (np.float32(5000), None, 5000.0),
+        (Calibration("5 kN/FS", 0.01, "certificate 7"), None, 5000.0),
+    ],
+)
+def test_calibrations_lead_to_newtons(
+    calibration: float | str | Calibration, unit: str | None, newtons: float, tmp_path: Path
+) -> None:
+    soundfile.write(tmp_path / "plate.wav", half_sine(8000.0) / newtons, 8000, "PCM_24")
+    signal, force = read_all(tmp_path / "plate.wav", calibration=calibration, unit=unit)
+    # Two digits: of the largest and of the smallest full scale.
+    assert force.max() == pytest.approx(1500, rel=1e-6, abs=newtons * 2.0**-22)
+    assert signal.full_scale == pytest.approx(newtons)
+    known = calibration.uncertainty if isinstance(calibration, Calibration) else None
+    assert signal.calibration_uncertainty == known
+
+
+def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    rows = "".join(f"{i / 8000:.6f};{-v:g};{v:g};{i}\n" for i, v in enumerate(force))
+    (tmp_path / "t.csv").write_text("Time [s];Fx [N];Fz [N];Trigger [V]\n" + rows)
+    both = open_signals(tmp_path / "t.csv")
+    assert [one.name for one in both] == ["t.csv, Fx", "t.csv, Fz"]
+    for channel in (3, "3", "Fz", "fz"):
+        (signal,) = open_signals(tmp_path / "t.csv", channel=channel)
+        assert signal.name == "t.csv, Fz"
+        assert signal.steps == ()
+    with pytest.raises(InputError, match="'Fy' fits 0 channels; allowed: one of 2 'Fx', 3 'Fz', 4"):
+        open_signals(tmp_path / "t.csv", channel="Fy")
+    with pytest.raises(InputError, match="the values are in V and no calibration is given"):
+        open_signals(tmp_path / "t.csv", channel=4)
+
+
+@pytest.mark.parametrize(
+    ("head", "row"),
+    [
+        ("Sample rate;8 kHz\nUnit;kN\nForce\n", "{v};"),
+        ("Sampling Frequency (Hz): 8000\nForce (kN)\n", "{v}"),
+        ("// dt [us]: 125\n// unit: kN\n", "{v}"),
+        ("; Abtastrate = 8,0 kHz\n; Einheit = kN\n", "{k};"),
+        ("fs\t8000\nForce\n[kN]\n", "{k}\t"),
+        ("t_ms F_kN\n", "{ms} {v}"),
+        ("Sample rate in Hz\t8000\nKraft in kN\n", "{v}"),
+        ("Zeit / s;Kraft / kN\n", "{t};{k}"),
+        ("Messung Nr. 3\nDatum;06.05.2024\n\nZeit;Kraft\ns;kN\n", "{t};{k}"),
+        ("time (s)\tforce / kN\tstate\n", "{t}\t{v}\tok"),
+        ('"time","Force, kN"\n', "{t},{v}"),
+    ],
+)
+@pytest.mark.parametrize("coding", ["utf-8", "utf-8-sig", "utf-16", "latin-1"])
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_headers_of_loggers(head: str, row: str, coding: str, end: str, tmp_path: Path) -> None:
+    lines = [
+        row.format(v=v, k=str(v).replace(".", ","), t=i / 8000, ms=i / 8).strip()
+        if "k}" not in row or "{t}" not in row
+        else row.format(k=f"{v:.6f}".replace(".", ","), t=f"{i / 8000:.6f}".replace(".", ","))
+        for i, v in enumerate((half_sine(8000.0) / 1e3).round(6).tolist())
+    ]
+    path = tmp_path / "plate.txt"
+    path.write_bytes((head + "\n".join(lines) + "\n").replace("\n", end).encode(coding))
+    signal, force = read_all(path)
+    assert signal.sample_rate == pytest.approx(8000, rel=1e-9)
+    np.testing.assert_allclose(force, half_sine(8000.0), atol=1e-3)
+    assert signal.calibration == "values in kN"
+
+
+def test_rate_of_header_and_times_must_agree(tmp_path: Path) -> None:
+    rows = "".join(f"{i / 8000:.6f},{v:g}\n" for i, v in enumerate(half_sine(8000.0)))
+    (tmp_path / "t.csv").write_text("fs: 4000\ntime_s,force_N\n" + rows)
+    with pytest.raises(InputError, match="4000 Hz by its header and 8000 Hz by its times"):
+        open_signals(tmp_path / "t.csv")
+
+
+def test_rounded_times_are_told(tmp_path: Path) -> None:
+    rows = "".join(f"{i / 44100:.6f},{v:g}\n" for i, v in enumerate(half_sine(44100.0)))
+    (tmp_path / "t.csv").write_text("time_s,force_N\n" + rows)
+    (signal,) = open_signals(tmp_path / "t.csv")
+    # Of 1764 times rounded to 1 us the slope is off by 1e-6 sqrt(1 / 1764**3) steps and more.
+    assert signal.sample_rate == pytest.approx(44100, rel=4e-6)
+    (step,) = signal.steps
+    assert step.startswith("The times, rounded to 1e-06 s, were replaced by an even grid of 44")
+
+
+def test_date_of_a_broadcast_file(tmp_path: Path) -> None:
+    path = tmp_path / "plate.wav"
+    soundfile.write(path, half_sine(8000.0) / 5000, 8000, "PCM_24")
+    data = path.read_bytes()
+    extra = broadcast_chunk("2024-05-06", "10:11:12")
+    total = struct.pack("<I", len(data) - 8 + len(extra))
+    path.write_bytes(data[:4] + total + data[8:12] + extra + data[12:])
+    (signal,) = open_signals(path, calibration="5000 N/FS")
+    assert signal.date == "2024-05-06 10:11:12"
+
+
+def test_damage_behind_the_samples_is_no_matter(tmp_path: Path) -> None:
+    path = tmp_path / "plate.wav"
+    soundfile.write(path, half_sine(8000.0) / 5000, 8000, "PCM_24")
+    path.write_bytes(path.read_bytes() + b"LIST" + struct.pack("<I", 10**6) + b"abc")
+    assert read_all(path, calibration=5000)[1].max() == pytest.approx(1500, rel=1e-6)
+
+
+def test_netcdf_is_scaled_by_its_attributes(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "p.nc", "w") as file:
+        file["force"] = np.rint(half_sine(8000.0) * 4 + 100).astype("i2")
+        for key, value in (("scale_factor", 0.25), ("add_offset", -25.0), ("units", "N")):
+            file["force"].attrs[key] = value
+        file.attrs["sample_rate"] = 8000.0
+    _, force = read_all(tmp_path / "p.nc")
+    np.testing.assert_allclose(force, half_sine(8000.0), atol=0.125)
+
+
+@pytest.mark.parametrize("shape", [(-1, 1), (1, -1), (-1, 2), (2, -1)])
+@pytest.mark.parametrize("kind", ["h5", "mat"])
+def test_columns_of_a_matrix(shape: tuple[int, int], kind: str, tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    count = max(shape)
+    matrix = np.stack([force] * count, axis=1 if shape[0] < 0 else 0) * np.arange(
+        1, count + 1
+    ).reshape((1, -1) if shape[0] < 0 else (-1, 1))
+    path = tmp_path / f"plate.{kind}"
+    if kind == "mat":
+        scipy.io.savemat(path, {"F": matrix, "dt": 1 / 8000})
+    else:
+        with h5py.File(path, "w") as file:
+            file["F"], file["dt"] = matrix, 1 / 8000
+    signal, found = read_all(path, channel=count)
+    np.testing.assert_array_equal(found, force * count)
+    assert signal.sample_rate == 8000
+    assert signal.name == (f"plate.{kind}, F[2]" if count > 1 else f"plate.{kind}")
+
+
+# --- files that are refused
+
+
+def write_pulse(path: Path, name: str, values: NDArray[np.float64] | None = None) -> Path:
+    values = half_sine(8000.0) if values is None else values
+    target = path / name
+    WRITERS[name](target, values / 5000 if name.startswith("pcm") else values, 8000.0, "N")
+    return target
+
+
+def refusal(path: Path, **given: Any) -> str:  # noqa: ANN401
+    """Return the sentence by which a file is refused."""
+    if path.name.startswith("pcm"):
+        given = {"calibration": 5000.0, **given}
+    begin = time.monotonic()
+    with pytest.raises(InputError) as caught:
+        open_signals(path, **given)
+    assert time.monotonic() - begin < 5
+    text = str(caught.value)
+    assert "; allowed: " in text
+    assert text.isprintable()
+    return text
+
+
+@pytest.mark.parametrize("name", WRITERS)
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.7, 0.999])
+def test_cut_off_files_are_refused(name: str, share: float, tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, name)
+    data = path.read_bytes()
+    path.write_bytes(data[: int(share * len(data))])
+    if WITH_UNIT.get(name) and path.suffix in {".csv", ".tsv", ".txt", ".lvm"}:
+        # A table that ends early is one: it may be refused for what is left, or read.
+        try:
+            open_signals(path)
+        except InputError as error:
+            assert "; allowed: " in str(error)
+        return
+    if name == "packed.mat" and share > 0.9:
+        assert "cut off" in refusal(path)
+    refusal(path)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("name", [name for name in WRITERS if not name.startswith("pcm")])
+def test_values_that_are_not_finite_are_refused(name: str, value: float, tmp_path: Path) -> None:
+    force = half_sine(8000.0)
+    force[100] = value
+    if name in {"text.uff", "binary.uff"}:
+        path = write_pulse(tmp_path, name)
+        data = path.read_bytes()
+        exact = half_sine(8000.0)[100]
+        old, new = (
+            (struct.pack("<d", exact), struct.pack("<d", value))
+            if name == "binary.uff"
+            else (f"{exact:20.11e}".encode(), f"{value:20.11e}".encode())
+        )
+        assert old in data
+        path.write_bytes(data.replace(old, new))
+    else:
+        path = write_pulse(tmp_path, name, force)
+    assert "sample 101 is not finite" in refusal(path)
+
+
+def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.wav")
+    (tmp_path / "loop.wav").symlink_to(tmp_path / "loop.wav")
+    (tmp_path / "empty.wav").touch()
+    assert "is a directory" in refusal(tmp_path)
+    assert "is no regular file" in refusal(tmp_path / "pipe.wav")
+    assert "is no regular file" in refusal(tmp_path.joinpath("/dev/zero"))
+    assert "symbolic links" in refusal(tmp_path / "loop.wav")
+    assert "No such file" in refusal(tmp_path / "none.wav")
+    assert "is empty" in refusal(tmp_path / "empty.wav")
+    assert "cannot be read" in refusal(tmp_path / "a\0b.wav")
+    assert "cannot be read" in refusal(tmp_path / ("a" * 5000))
+    with pytest.raises(InputError, match="recording = 7 is not allowed; allowed: an object of str"):
+        open_signals(7)  # type: ignore[arg-type]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root reads every file")
+def test_unreadable_files_are_refused(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "float.wav")
+    path.chmod(0)
+    assert "Permission denied" in refusal(path)
+
+
+def test_names_that_are_no_text(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plate.h5")
+    odd = path.with_name(os.fsdecode(b"pl\xe4tte.h5"))
+    path.rename(odd)
+    (signal,) = open_signals(odd)
+    assert signal.name == "pl\N{REPLACEMENT CHARACTER}tte.h5"
+    assert len(signal.checksum) == 64
+    for name in ("pcm24.wav", "plate.tdms", "plain.mat", "text.uff", "comma.csv"):
+        path = write_pulse(tmp_path, name)
+        odd = path.with_name(os.fsdecode(b"\xff") + name)
+        path.rename(odd)
+        assert read_all(odd, calibration=5000.0 if "pcm" in name else None)[1].max() > 1490
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_files_of_holes_are_refused_at_once(name: str, tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, name)
+    os.truncate(path, 2**32)
+    assert "4096 MiB of which 0.0 MiB are stored" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"\0" * 10000, "is no WAV file by its first bytes"),
+        (b"time,force\n1,2\n", "is no WAV file by its first bytes"),
+        (b"CDF\x01" + bytes(100), "NetCDF 4"),
+        (b"PK\x03\x04" + bytes(100), "saved as CSV"),
+        (b"RIFF\xff\xff\xff\xffWAVE", "has no samples that can be found"),
+        (b"fLaC" + bytes(100), "cannot be read as"),
+        (b"TDSm" + bytes(100), "is cut off in the segment"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read as HDF5"),
+        (b"MATLAB 5.0".ljust(124) + b"\0\1IM", "MATLAB|no vector"),
+        (b"    -1\n    58\n    -1\n", "cannot be read as universal|no time history"),
+    ],
+)
+def test_contents_are_told(content: bytes, words: str, tmp_path: Path) -> None:
+    (tmp_path / "x.wav").write_bytes(content)
+    found = refusal(tmp_path / "x.wav")
+    assert any(word in found for word in words.split("|")), found
+
+
+def test_formats_are_found_by_content(tmp_path: Path) -> None:
+    for name in WRITERS:
+        path = write_pulse(tmp_path, name)
+        path = path.rename(path.with_suffix(".bin"))
+        assert read_all(path, calibration=5e3 if "pcm" in name else None)[1].max() > 1490
+
+
+@pytest.mark.parametrize("kind", ["ULAW", "ALAW", "IMA_ADPCM", "MS_ADPCM"])
+def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
+    soundfile.write(tmp_path / "pcm.wav", half_sine(8000.0) / 5000, 8000, kind)
+    assert f"samples of the kind {kind}" in refusal(tmp_path / "pcm.wav")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("a,b\nc,d\n", "no numbers"),
+        ("time;force\n0;0\n1;2 N\n", "line 3: '2 N' is not a number"),
+        ("0,001,5,2\n0,002,5\n", "line 2: 3 columns, 4 above it"),
+        ("1,0\n2,\n", "line 2: '' is not a number"),
+        ("0,1\n1,2\n", "2 rows of 2 numbers"),
+        ("".join(f"{i**2},1\n" for i in range(9)), "not evenly spaced"),
+        ("".join(f"{-i},1\n" for i in range(9)), "times rise by -1 s"),
+        ("".join("0,1\n" for _ in range(9)), "times rise by 0 s"),
+        ("".join(f"{i},1\n" for i in range(9)), "the sample rate is 1 Hz"),
+        ("".join(f"{i / 8000},7\n" for i in range(9)), "all samples are 7"),
+        ("F_N\n" + "".join(f"{i}\n" for i in range(9)), "the sample rate is not known"),
+        ("x" * 100_000, "longer than 65536 characters"),
+        ("head\n" * 3000 + "1,2\n", "no numbers"),
+        (",".join("1" * 400) + "\n", "400 columns"),
+        ("1,2\n\0\n", "is no text file"),
+        ("1e999,2\n" * 9, "not finite"),
+    ],
+)
+def test_useless_tables_are_told(text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / "plate.csv").write_text(text)
+    assert words in refusal(tmp_path / "plate.csv")
+
+
+def test_long_tables_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_pulse(tmp_path, "comma.csv")
+    monkeypatch.setattr("thud.recordings.formats.text.MOST_NUMBERS", 600)
+    assert "million numbers as text" in refusal(path)
+    path.write_bytes(b"1,2\n" * 2**20 * 65)
+    assert "260 MiB of text, which is read as a whole" in refusal(path)
+
+
+def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
+    """A quarter of a gibibyte of zeros in a quarter of a mebibyte."""
+    path = write_pulse(tmp_path, "packed.mat")
+    packer = zlib.compressobj(9)
+    begin = struct.pack("<IIIIIIIIIIII", 14, 2**28 + 56, 6, 8, 6, 0, 5, 8, 1, 2**25, 1, 2**16 + 70)
+    packed = packer.compress(begin) + b"".join(packer.compress(bytes(2**20)) for _ in range(256))
+    packed += packer.flush()
+    path.write_bytes(path.read_bytes()[:128] + struct.pack("<II", 15, len(packed)) + packed)
+    tracemalloc.start()
+    assert "unpack to more than 128 MiB" in refusal(path)
+    assert tracemalloc.get_traced_memory()[1] < 160e6
+    tracemalloc.stop()
+
+
+def test_matlab_variables_that_claim_too_much_are_refused(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plain.mat")
+    data = bytearray(path.read_bytes())
+    data[132:136] = struct.pack("<I", 2**31)
+    path.write_bytes(data)
+    assert "a variable claims 2147483648 bytes" in refusal(path)
+
+
+def test_hdf5_that_claims_too_much_is_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "bomb.h5", "w") as file:
+        file.attrs["fs"] = 8000.0
+        file.create_dataset("force", (2**40,), "f4", chunks=(2**10,), compression="gzip")[:1024] = (
+            1.0
+        )
+    assert "claims 4398046511104 bytes and holds" in refusal(tmp_path / "bomb.h5")
+    with h5py.File(tmp_path / "chunk.h5", "w") as file:
+        file.create_dataset("force", (2**25,), "f4", chunks=(2**25,), compression="gzip")[:] = 1.0
+    assert "chunks of 128 MiB" in refusal(tmp_path / "chunk.h5")
+
+
+def test_hdf5_links_are_not_followed_far(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plate.h5")
+    with h5py.File(path, "a") as file:
+        file["plate/self"] = file["plate"]
+        file["loop"] = h5py.SoftLink("/loop")
+    assert read_all(path)[1].max() > 1490
+    with h5py.File(path, "a") as file:
+        file["/".join(["deep"] * 40)] = np.arange(9.0)
+    assert "groups more than 32 deep" in refusal(path)
+    with h5py.File(tmp_path / "link.h5", "w") as file:
+        file["force"] = h5py.ExternalLink("/etc/passwd", "/")
+    assert "is a link to another file" in refusal(tmp_path / "link.h5")
+    with h5py.File(tmp_path / "outside.h5", "w") as file:
+        file.create_dataset("force", (10,), "u1", external=[("/etc/passwd", 0, 10)])
+    assert "lies in another file" in refusal(tmp_path / "outside.h5")
+    layout = h5py.VirtualLayout((10,), "f8")
+    layout[:] = h5py.VirtualSource("other.h5", "x", (10,))
+    with h5py.File(tmp_path / "virtual.h5", "w") as file:
+        file.create_virtual_dataset("force", layout)
+    assert "lies in another file" in refusal(tmp_path / "virtual.h5")
+
+
+@pytest.mark.parametrize("at", [12, 20])
+@pytest.mark.parametrize("claimed", [2**40, 2**63, 2**64 - 1])
+def test_absurd_lengths_of_tdms_are_refused(at: int, claimed: int, tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plate.tdms")
+    data = bytearray(path.read_bytes())
+    data[at : at + 8] = struct.pack("<Q", claimed)
+    path.write_bytes(data)
+    refusal(path)
+
+
+def test_absurd_counts_of_tdms_are_refused(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plate.tdms")
+    data = path.read_bytes()
+    count = struct.pack("<Q", 107)
+    assert count in data
+    path.write_bytes(data.replace(count, struct.pack("<Q", 2**60)))
+    refusal(path)
+
+
+def test_long_recordings_are_read_in_bounded_memory(tmp_path: Path) -> None:
+    """Five minutes at 51.2 kHz, 123 MB as numbers."""
+    path = tmp_path / "long.wav"
+    noise = np.random.default_rng(1).normal(0, 1e-4, 51200)
+    noise[1000:2024] += half_sine(51200.0, 0.0, 0.0) / 5000
+    with soundfile.SoundFile(path, "w", 51200, 1, "PCM_16") as file:
+        for _ in range(300):
+            file.write(noise)
+    tracemalloc.start()
+    (signal,) = open_signals(path, calibration="5000 N/FS")
+    for start in range(0, signal.n_sample, 2**18):
+        signal.read(start, min(signal.n_sample, start + 2**18))
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert signal.n_sample == 300 * 51200
+    # Three blocks of 2**18 samples: of the library, of the column, in newtons.
+    assert most < 3 * 2**21 + 3e6
+
+
+def test_files_that_change_are_told(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "float.wav")
+    (signal,) = open_signals(path)
+    write_pulse(tmp_path, "float.wav", half_sine(8000.0)[:-50])
+    with pytest.raises(InputError, match=r"float\.wav: .*; allowed: "):
+        signal.read(200, 320)
+
+
+def test_missing_packages_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_pulse(tmp_path, "plate.tdms")
+    monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
+    assert "TDMS files need the package nptdms, which is not installed" in refusal(path)
+
+
+# --- the examples
+
+
+def test_examples_hold_their_truth() -> None:
+    """Peaks of the recorded force are those of the truth but for plate, hum, drift and noise."""
+    folder = REPOSITORY / "inputs/recordings"
+    config = read_config(folder / "lab.toml")
+    truth = tomllib.loads((folder / "truth.toml").read_text())
+    assert len(truth["drop"]) == 8
+    for drop in truth["drop"]:
+        (signal,) = open_signals(
+            folder / drop["file"], calibration=config.calibration, polarity=config.polarity
+        )
+        for one in [drop, *drop.get("bounces", [])]:
+            begin = round(one["onset"] * signal.sample_rate)
+            # The plate rings on after the contact, to 1 % in Q ln(100) / (pi f0) = 33 ms.
+            end = round((one["onset"] + one["contact_time"] + 0.033) * signal.sample_rate)
+            force = signal.read(begin - 200, end) - signal.read(begin - 1200, begin - 200).mean()
+            assert abs(force[:190]).max() < 20
+            # Hum of 3 N and drift of 1 N over the contact.
+            assert force[200:].sum() / signal.sample_rate == pytest.approx(one["impulse"], abs=0.2)
+
+
+def test_tables_of_the_examples_are_those_of_the_sounds() -> None:
+    folder = REPOSITORY / "inputs/recordings"
+    for number in range(1, 6):
+        _, table = read_all(folder / f"drop_{number}.csv")
+        sound, force = read_all(folder / f"drop_{number}.wav", calibration=5000.0)
+        begin = round(0.11 * sound.sample_rate)
+        np.testing.assert_allclose(table, force[begin : begin + table.size], atol=0.006)
+
+
+# --- arrays, calibration records, configuration
+
+
+def test_arrays_are_signals() -> None:
+    signal = Signal.from_array([0.0, 1.0, 2.0], 8000, name="model")
+    np.testing.assert_array_equal(signal.read(1, 3), [1.0, 2.0])
+    assert (signal.name, signal.n_sample, signal.full_scale) == ("model", 3, None)
+    assert signal.checksum == Signal.from_array([0, 1, 2], 8000).checksum
+    for force, rate in (([[1.0]], 8000), ([np.nan], 8000), ([1.0], 0), ([1.0], np.inf), (["a"], 1)):
+        with pytest.raises(InputError, match="; allowed: "):
+            Signal.from_array(force, rate)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_calibration_record_gives_newtons_per_unit(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rate, count = 5000.0, 60_000
+    volts = rng.normal(0, 0.02, count) + np.linspace(0, 0.03, count) + 0.7
+    on = int(rng.integers(12_000, 20_000))
+    volts[on : on + 20_000] += 5.02 * 9.81 / 250.0
+    found = calibrate(Signal.from_array(volts, rate), mass=5.02, unit="V", uncertainty=1e-4)
+    value = float(found.chain.partition(" ")[0])
+    # Four standard deviations; one in 16 000 lies outside.
+    assert abs(value / 250.0 - 1) < 4.5 * found.uncertainty + 1e-4
+    assert 1e-4 < found.uncertainty < 0.02
+    assert found.origin == "2 steps of 5.02 kg in recording"
+
+
+def test_calibration_record_of_a_file(tmp_path: Path) -> None:
+    level = np.zeros(20_000)
+    level[8000:] = 0.1
+    level += np.random.default_rng(3).normal(0, 1e-4, level.size)
+    soundfile.write(tmp_path / "c.wav", level, 8000, "PCM_24")
+    found = calibrate(tmp_path / "c.wav", force=500.0)
+    assert float(found.chain.split()[0]) == pytest.approx(5000, rel=1e-3)
+    assert found.chain.endswith(" N/FS")
+    soundfile.write(tmp_path / "plate.wav", half_sine(8000.0) / 5000, 8000, "PCM_24")
+    (signal,) = open_signals(tmp_path / "plate.wav", calibration=found)
+    assert signal.calibration_uncertainty == found.uncertainty
+    assert "1 step of 500 N in " in signal.calibration
+
+
+@pytest.mark.parametrize(
+    ("values", "given", "words"),
+    [
+        (np.zeros(1000), {"force": 10.0, "unit": "V"}, "has no clear step"),
+        (np.arange(1000.0), {"force": 10.0, "mass": 1.0, "unit": "V"}, "one of force and mass"),
+        (np.arange(1000.0), {"unit": "V"}, "one of force and mass"),
+        (np.arange(1000.0), {"force": -1.0, "unit": "V"}, "-1 N"),
+        (np.arange(1000.0), {"force": math.nan, "unit": "V"}, "nan"),
+        (np.arange(1000.0), {"force": 1.0}, "the unit is not given"),
+        (np.arange(3.0), {"force": 1.0, "unit": "V"}, "has no clear step"),
+        (np.random.default_rng(1).normal(size=9000), {"force": 1.0, "unit": "V"}, "step"),
+    ],
+)
+def test_useless_calibration_records(
+    values: NDArray[np.float64], given: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(InputError, match="; allowed: ") as caught:
+        calibrate(Signal.from_array(values, 5000.0), **given)
+    assert words in str(caught.value)
+
+
+LAB = """
+laboratory = "Acoustics laboratory"
+ball = "rubber ball"
+serial = "RB-07"
+temperature = 21.5
+instruments = ["force plate 9281", "charge amplifier 5015"]
+channel = 1
+unit = "V"
+calibration = "4.1 pC/N, 10 mV/pC"
+calibration_uncertainty = 0.005
+polarity = "negative"
+mass = 2.5
+height = 1.0
+[plate]
+f0 = 950.0
+Q = 30.0
+f0_uncertainty = 0.01
+[limits]
+octave_500 = [10.0, 15.0]
+"""
+
+
+def test_configuration_is_read(tmp_path: Path) -> None:
+    (tmp_path / "lab.toml").write_text(LAB)
+    found = read_config(tmp_path / "lab.toml")
+    assert found.calibration == "4.1 pC/N, 10 mV/pC"
+    assert found.calibration_uncertainty == 0.005
+    assert found.instruments == ("force plate 9281", "charge amplifier 5015")
+    assert found.plate == PlateConfig(950.0, 30.0, 0.01)
+    assert found.limits == {"octave_500": (10.0, 15.0)}
+    assert (found.channel, found.unit, found.polarity) == (1, "V", "negative")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("laboratory", "labratory", "'labratory' is not known, did you mean laboratory?"),
+        ("f0 = 950.0", "fo = 950.0", "plate: 'fo' is not known, did you mean f0?"),
+        ("Q = 30.0", "", "plate: Q is missing"),
+        ("octave_500", "octave_50", "did you mean octave_500?"),
+        ("[10.0, 15.0]", "[15.0, 10.0]", "minimum < maximum"),
+        ("[10.0, 15.0]", "12.0", "[minimum, maximum]"),
+        ("21.5", '"warm"', "temperature = 'warm' is not allowed"),
+        ("21.5", "nan", "temperature = nan is not allowed"),
+        ("0.005", "-0.1", "calibration_uncertainty = -0.1 is not allowed"),
+        ('"V"', '"W"', "unit = 'W' is not known"),
+        ('"4.1 pC/N, 10 mV/pC"', '"4.1 pC"', "is not a number with units"),
+        ('"4.1 pC/N, 10 mV/pC"', "true", "calibration = True is not allowed"),
+        ('"negative"', '"down"', "polarity = 'down' is not known"),
+        ("channel = 1", "channel = 0", "channel = 0 is not allowed"),
+        ("channel = 1", "channel = 1.5", "channel = 1.5 is not allowed"),
+        ('"RB-07"', "7", "serial = 7 is not allowed"),
+        ("= 2.5", "= ", "is no TOML"),
+        (
+            "[plate]\nf0 = 950.0\nQ = 30.0\nf0_uncertainty = 0.01",
+            "plate = 3",
+            "plate = 3 is not allowed",
+        ),
+    ],
+)
+def test_configurations_that_are_wrong_are_told(
+    old: str, new: str, words: str, tmp_path: Path
+) -> None:
+    assert old in LAB
+    (tmp_path / "lab.toml").write_text(LAB.replace(old, new, 1))
+    with pytest.raises(InputError, match=r"(?s)lab\.toml: .*; allowed: |calibration") as caught:
+        read_config(tmp_path / "lab.toml")
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,506 @@
+"""The calibration report: one page, all numbers of the table, any names, any number of drops."""
+
+from __future__ import annotations
+
+import base64
+import functools
+import html
+import io
+import itertools
+import json
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from fontTools.ttLib import TTFont
+from synthetic import make_recording
+from test_figure_look import assert_clean
+
+import thud
+import thud.recordings.recording as module
+from thud.errors import ReportWarning
+from thud.levels import record_force
+from thud.plot.recording import recording_forces, recording_levels
+from thud.recordings.config import Config, PlateConfig
+from thud.recordings.estimates import Drop, Estimate
+from thud.recordings.recording import Recording, read_recording
+from thud.report.data import level_budgets, read_date, report_data
+from thud.report.fonts import clip, count_lines, missing_characters
+from thud.report.notes import fit_lines, group_sentences
+from thud.report.write import write_report
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+UNKNOWN = Estimate(float("nan"), float("nan"))
+LAB = Config(
+    laboratory="Prüfstelle Ωmega, Институт акустики",
+    ball="Rubber ball µ ± 1 ≤ 2",
+    serial="RB-0042",
+    temperature=-1.25,
+    instruments=("Force plate, no. 1", "Amplifier, no. 2"),
+    mass=2.51,
+    height=1.0,
+)
+HOSTILE = '<script>alert("a&b")</script>\u202e\x07\udcff$x^{$'
+# Size of the unit and decimals after the octaves, as in the table of a run.
+STYLES = ((1e-3, 2), (1.0, 3), (1.0, 0), (1.0, 3), (1.0, 3))
+
+
+@pytest.fixture(scope="module")
+def one(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Return a recording of one drop of known mass and height, with noise and an offset."""
+    impact = thud.solve()
+    force = impact.floor_force[: int(np.flatnonzero(impact.floor_force > 0)[-1]) + 2]
+    rate = impact.sample_rate
+    recorded, _ = make_recording(force, rate, noise_db=50, offset=12, before=0.05, after=0.05)
+    path = tmp_path_factory.mktemp("report") / "drop.csv"
+    time = np.arange(len(recorded)) / rate
+    np.savetxt(path, np.column_stack([time, recorded]), "%.9g", ",", header="time_s,force_N")
+    return read_recording(path, config=LAB)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _known_levels() -> Any:  # noqa: ANN401 - a fixture
+    """Measure the levels of equal forces once: 500 drops take a second."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("measure_levels", "compare_methods"):
+            patch.setattr(module, name, remembered(getattr(module, name)))
+        yield
+
+
+def remembered(measure: Any) -> Any:  # noqa: ANN401 - a function
+    known: dict[Any, Any] = {}
+
+    @functools.wraps(measure)
+    def measured(drop: Drop, *arguments: str) -> Any:  # noqa: ANN401
+        key = (drop.force.tobytes(), *arguments)
+        if key not in known:
+            known[key] = measure(drop, *arguments)
+        found = known[key]
+        return found if isinstance(found, dict) else replace(found, name=drop.name)
+
+    return measured
+
+
+def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN401
+    """Return a recording of drops that differ by a few percent, an outlier among them."""
+    (drop,) = one.drops
+    factors = np.resize([1.0, 0.98, 1.01, 1.02, 0.99], count)
+    if count > 5:
+        factors[5] = 1.4
+    drops = [
+        replace(
+            drop,
+            name=f"drop_{i}.csv",
+            force=factor * drop.force,
+            contact_time=Estimate(drop.contact_time.value + 1e-4 * factor, 1e-5),
+        )
+        for i, factor in enumerate(factors)
+    ]
+    origins = [
+        replace(one.origins[0], name=drop.name, date=f"2024-05-{3 + i % 2:02}")
+        for i, drop in enumerate(drops)
+    ]
+    return Recording("many", tuple(drops), tuple(origins), replace(LAB, **config), 0.01)
+
+
+def crowded(one: Recording) -> Recording:
+    """Return a recording whose names, lists and sentences are as long as they can be."""
+    base = many(one, 500, laboratory="W" * 500, ball="ball " * 100, serial="1 x" * 160,
+                instruments=tuple(f"Instrument {i} " + "y" * 300 for i in range(40)))  # fmt: skip
+    drops = [
+        replace(
+            drop,
+            name=f"a_long_name_of_a_file_{i}" + "z" * 200,
+            steps=tuple(f"step {chr(97 + k)}: {i} N were " + "moved " * 30 for k in range(9)),
+            remarks=tuple(
+                f"doubt {chr(97 + k)} of {i} N, " + "a long one " * 20 for k in range(20)
+            ),
+        )
+        for i, drop in enumerate(base.drops)
+    ]
+    origins = [
+        replace(o, name=d.name, calibration="c" * 300, date=f"some day no. {i}")
+        for i, (o, d) in enumerate(zip(base.origins, drops, strict=True))
+    ]
+    return replace(base, drops=tuple(drops), origins=tuple(origins))
+
+
+def unknown(one: Recording) -> Recording:
+    """Return a recording of which nothing is known but the force."""
+    drop = replace(one.drops[0], restitution=UNKNOWN, restitution_by="", restitutions={})
+    return Recording("unknown", (drop,), one.origins)
+
+
+KINDS = {
+    "one": lambda one: one,
+    "five": lambda one: many(one, 5),
+    "500": lambda one: many(one, 500),
+    "crowded": crowded,
+    "unknown": unknown,
+    "failing": lambda one: many(one, 3, mass=2.8, height=0.9, serial="x" * 500),
+}
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def written(
+    request: pytest.FixtureRequest, one: Recording, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Recording, Path]:
+    """Write the report of a recording of each kind."""
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+    recording = KINDS[request.param](one)
+    folder = tmp_path_factory.mktemp("written")
+    paths = write_report(recording, folder)
+    assert [path.name for path in paths] == ["report.json", "report.html", "report.pdf"]
+    return recording, folder
+
+
+def open_pdf(path: Path) -> Any:  # noqa: ANN401 - of pypdfium2
+    pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
+    return pdfium.PdfDocument(path)
+
+
+def text_of(path: Path) -> str:
+    """Return the text of the only page of a PDF."""
+    document = open_pdf(path)
+    assert len(document) == 1
+    return " ".join(document[0].get_textpage().get_text_bounded().split())
+
+
+def print_page(folder: Path) -> Path:
+    """Print the HTML as PDF by a browser."""
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("there is no chromium")
+    target = folder / "printed.pdf"
+    if target.exists():
+        return target
+    subprocess.run(
+        [
+            browser, "--headless", "--no-sandbox", "--disable-gpu", "--no-pdf-header-footer",
+            f"--user-data-dir={folder}/browser", f"--print-to-pdf={target}",
+            (folder / "report.html").as_uri(),
+        ],
+        check=True, capture_output=True, timeout=120,
+    )  # fmt: skip
+    return target
+
+
+def numbers(recording: Recording) -> list[list[str]]:
+    """Return value, expanded uncertainty, limits, margin and verdict of each criterion."""
+    rows = []
+    for decision, (unit, places) in zip(
+        recording.conformity().decisions, [(1.0, 2)] * 5 + list(STYLES), strict=True
+    ):
+        value = decision.value / unit
+        is_bound, is_count = decision.quantity.upper_bound, decision.name == "peak_count"
+        limits = [f"{end / unit:g}" for end in (decision.lower, decision.upper)]
+        cells = ["not known" if np.isnan(value) else f"{value:.{places}f}"]
+        if decision.quantity.contributions and not np.isnan(value):
+            cells.append(f"{decision.quantity.expanded / unit:.{places + 1}f}")
+        cells.append(" to ".join(dict.fromkeys(limits)))
+        if not (is_bound or is_count or np.isnan(value)):
+            cells.append(f"{decision.margin / unit:.{places}f}")
+        rows.append([*cells, decision.verdict])
+    return rows
+
+
+def test_page_is_one_and_holds_the_numbers_of_the_table(written: tuple[Recording, Path]) -> None:
+    recording, folder = written
+    page = (folder / "report.html").read_text()
+    found = [
+        [html.unescape(re.sub(r"<svg.*?</svg>|<[^>]*>", "", cell)) for cell in row.split("</td>")]
+        for row in re.findall(r'<tr class="[a-z-]+">(.*?)</tr>', page)
+    ]
+    printed = text_of(folder / "report.pdf").replace("−", "-")
+    assert len(found) == 10
+    for cells, row in zip(numbers(recording), found, strict=True):
+        values = [cell.replace("−", "-") for cell in row]
+        places = [values.index(cell) for cell in cells]
+        assert places == sorted(places)
+        line = " ".join(value for value in values if value)
+        assert line in printed
+    assert recording.conformity().verdict in printed.lower()
+    assert recording.origins[0].checksum in printed
+    assert thud.__version__ in printed
+    for words in ("Signature", "Place and date", "report.json", "Force on the floor", "31.5"):
+        assert words in printed
+
+
+def test_browser_prints_the_same_page(written: tuple[Recording, Path]) -> None:
+    _, folder = written
+    words = [
+        re.sub(r"\s", "", text_of(path)) for path in (folder / "report.pdf", print_page(folder))
+    ]
+    # Figures are laid out letter by letter; the order of their words may differ.
+    assert sorted(words[0]) == sorted(words[1])
+
+
+def test_texts_do_not_overlap_and_stay_on_the_page(written: tuple[Recording, Path]) -> None:
+    page = open_pdf(written[1] / "report.pdf")[0]
+    text = page.get_textpage()
+    width, height = page.get_size()
+    boxes = [text.get_rect(i) for i in range(text.count_rects())]
+    assert len(boxes) > 60
+    for left, bottom, right, top in boxes:
+        assert 20 < left < right < width - 20
+        assert 15 < bottom < top < height - 15
+    for one, other in itertools.combinations(boxes, 2):
+        across = min(one[2], other[2]) - max(one[0], other[0])
+        up = min(one[3], other[3]) - max(one[1], other[1])
+        # Boxes are those of the letters; descenders may touch the line below.
+        assert across < 1 or up < 1.5
+
+
+def test_pictures_have_ink_in_every_part(written: tuple[Recording, Path]) -> None:
+    _, folder = written
+    pictures = []
+    for path in (folder / "report.pdf", print_page(folder)):
+        image = open_pdf(path)[0].render(scale=1).to_pil().convert("L")
+        image.save(folder / f"{path.stem}.png")
+        pictures.append(np.asarray(image) < 128)
+    for ink in pictures:
+        height, width = ink.shape
+        assert (width, height) == pytest.approx((595, 842), abs=2)
+        used = np.flatnonzero(ink.any(axis=1))
+        assert used[0] > 15
+        assert height - used[-1] > 15
+        # No gap but those above the signature and below the text is larger than 12 mm.
+        assert np.diff(used).max() < 12 * 72 / 25.4 + 20
+    # Both engines draw the same: the same share of ink, within their smoothing of letters.
+    assert pictures[0].mean() == pytest.approx(pictures[1].mean(), rel=0.25)
+
+
+def test_page_refers_to_nothing_outside(written: tuple[Recording, Path]) -> None:
+    page = (written[1] / "report.html").read_text()
+    assert "http" not in page
+    assert "@import" not in page
+    assert "<link" not in page
+    assert "<script" not in page
+    assert "<img" not in page
+    assert not re.search(r"\bsrc\s*=", page)
+    assert set(re.findall(r'href="(.)', page)) <= {"#"}
+    assert set(re.findall(r"url\((.{5})", page)) <= {"data:", "#f0-p", "#f0-m", "#f1-p", "#f1-m"}
+    names = re.findall(r'\bid="([^"]*)"', page)
+    assert len(set(names)) == len(names)
+    assert {name[1:] for name in re.findall(r'(?:href="|url\()(#[^")]*)', page)} <= set(names)
+
+
+def test_fonts_hold_every_letter(written: tuple[Recording, Path]) -> None:
+    page = (written[1] / "report.html").read_text()
+    fonts = re.findall(r"data:font/woff;base64,([^)]*)\)", page)
+    body = html.unescape(re.sub(r"<[^>]*>", "", page[page.index("<body") :]))
+    assert len(fonts) == 2
+    for font in fonts:
+        with TTFont(io.BytesIO(base64.b64decode(font))) as found:
+            assert {c for c in body if not c.isspace()} <= set(map(chr, found.getBestCmap()))
+    assert len(page) < 400_000
+
+
+def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> None:
+    recording, folder = written
+
+    def refuse(word: str) -> None:
+        pytest.fail(f"{word} is no JSON")
+
+    data = json.loads((folder / "report.json").read_text(), parse_constant=refuse)
+    verdict = recording.conformity()
+    assert data["verdict"] == verdict.verdict
+    for row, decision in zip(data["criteria"], verdict.decisions, strict=True):
+        known = not np.isnan(decision.value)
+        assert row["value"] == (decision.value if known else None)
+        stated = bool(decision.quantity.contributions)
+        assert row["expanded_uncertainty"] == (decision.quantity.expanded if stated else None)
+        assert (row["lower"], row["upper"]) == (decision.lower, decision.upper)
+        assert row["verdict"] == decision.verdict
+        assert row["limits_of_standard"]
+    assert len(data["drops"]) == len(recording.drops)
+    assert [one["sha256"] for one in data["files"]] == [o.checksum for o in recording.origins]
+    np.testing.assert_array_equal(data["levels"]["third"]["level"], recording.levels("third"))
+
+
+def test_date_is_that_of_the_files(one: Recording) -> None:
+    assert report_data(many(one, 3))["date"] == "2024-05-03 to 2024-05-04"
+    assert report_data(one)["date"] == ""
+    assert report_data(many(one, 3, date="7.6.2024"))["date"] == "2024-06-07"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "2024-05-03",
+        "2024-05-03T10:11:12.123456Z",
+        "03.05.2024 10:11",
+        "2024/05/03",
+        "03-MAY-24   10:11:12",
+    ],
+)
+def test_dates_of_many_kinds_are_read(text: str) -> None:
+    found = read_date(text)
+    assert found is not None
+    assert found.date().isoformat() == "2024-05-03"
+    assert read_date("3/5/24") is None
+
+
+def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+    texts = dict.fromkeys(("laboratory", "ball", "serial"), HOSTILE)
+    recording = many(one, 2, **texts, instruments=(HOSTILE, HOSTILE))
+    drops = tuple(replace(d, name=HOSTILE + d.name, remarks=(HOSTILE,)) for d in recording.drops)
+    origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in recording.origins)
+    write_report(replace(recording, drops=drops, origins=origins), tmp_path)
+    page = (tmp_path / "report.html").read_text()
+    assert "<script" not in page
+    assert page.count("&lt;script&gt;alert(&quot;a&amp;b&quot;)&lt;/script&gt;���$x^{$") > 6
+    assert '<script>alert("a&b")</script>' in text_of(tmp_path / "report.pdf")
+    assert json.loads((tmp_path / "report.json").read_text())["serial"] == HOSTILE
+
+
+def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+    write_report(unknown(one), tmp_path)
+    words = text_of(tmp_path / "report.pdf")
+    for name in (
+        "Laboratory",
+        "Ball",
+        "Serial number",
+        "Measured on",
+        "Temperature",
+        "Instruments",
+    ):
+        assert f"{name} not known" in words
+    for name in ("Restitution", "Mass, kg", "Drop height, m"):
+        assert f"{name} not known – " in words
+    assert "uncertainty not given" in words
+    assert not re.search(r"\bnan\b|\bNone\b|\binf\b", words)
+
+
+@pytest.mark.parametrize("library", [None, "print('no'); raise OSError('no libpango')"])
+def test_without_weasyprint_there_is_a_page_and_a_sentence(
+    one: Recording,
+    tmp_path: Path,
+    library: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "report.pdf").write_bytes(b"of an earlier report")
+    if library is None:
+        monkeypatch.setitem(sys.modules, "weasyprint", None)
+    else:
+        # As WeasyPrint itself where a library of Debian is missing.
+        (tmp_path / "weasyprint.py").write_text(library)
+        for name in [name for name in sys.modules if name.split(".")[0] == "weasyprint"]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.syspath_prepend(tmp_path)
+    with pytest.warns(ReportWarning, match=r"report\.pdf is not written .*; allowed: pip install"):
+        paths = write_report(one, folder)
+    assert [path.name for path in paths] == ["report.json", "report.html"]
+    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "report.json"]
+    assert not capsys.readouterr().out
+
+
+def test_missing_font_is_told(
+    one: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+    monkeypatch.setattr("matplotlib.font_manager.findSystemFonts", list)
+    recording = replace(one, config=replace(LAB, laboratory="建材 lab"))
+    with pytest.warns(ReportWarning, match="no installed font has 建材, .*; allowed: a font"):
+        write_report(recording, tmp_path)
+    assert not missing_characters("µ − ± ≤ Ω ° … Институт Ελλάς Šč")
+
+
+def test_equal_recordings_give_equal_pages(one: Recording, tmp_path: Path) -> None:
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+    for name in "ab":
+        write_report(one, tmp_path / name)
+    for name in ("report.json", "report.html"):
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+@pytest.mark.parametrize("count", [1, 3, 60])
+def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, count: int) -> None:
+    recording = many(one, count)
+    for bands in ("octave", "third"):
+        assert_clean(recording_levels(recording, bands))
+    figure = recording_forces(recording)
+    assert_clean(figure)
+    (axes,) = figure.axes
+    drops = [line for line in axes.lines if line.get_linewidth() == 0.5]
+    assert len(drops) == (count if count <= 40 else 0)
+    if count == 3:
+        drop = recording.drops[1]
+        recorded = record_force(drop.force, drop.sample_rate)
+        assert np.max(drops[1].get_ydata()) == pytest.approx(1e-3 * recorded.max(), rel=1e-3)
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels[0] == "allowed release, 18 to 22 ms"
+    assert ("average" in labels) == (count > 1)
+    assert ("outlier" in labels) == ("range of 60 drops" in labels) == (count == 60)
+    for bands in ("octave", "third"):
+        axes = recording_levels(recording, bands).axes[0]
+        bars = axes.containers[0]
+        np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels(bands))
+        half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]
+        np.testing.assert_allclose(half, [one.expanded for one in level_budgets(recording, bands)])
+
+
+def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
+    plate = PlateConfig(f0=1600.0, Q=20.0)
+    for recording in (one, many(one, 5), many(one, 5, plate=plate)):
+        data = report_data(recording)
+        found = data["levels"]["octave"]
+        for i, decision in enumerate(recording.conformity().decisions[:5]):
+            assert found["uncertainty"][i] == decision.quantity.uncertainty
+            assert found["expanded_uncertainty"][i] == decision.quantity.expanded
+    octaves, thirds = (level_budgets(recording, bands) for bands in ("octave", "third"))
+    for budgets in (octaves, thirds):
+        names = [part.name for part in budgets[-1].contributions]
+        assert names[-2:] == ["calibration", "plate"]
+    # Of the 500 Hz octave and the 630 Hz third, which have one upper edge.
+    assert thirds[-1].contributions[-1] == octaves[-1].contributions[-1]
+
+
+def test_sentences_that_differ_in_numbers_are_one() -> None:
+    said = [
+        ("a", "12 N at 50 Hz (IEC 61260-1)"),
+        ("b", "-3.5 N at 50 Hz (IEC 61260-1)"),
+        ("b", "x"),
+    ]
+    assert group_sentences(said, 9, "drops") == [
+        "-3.5 to 12 N at 50 Hz (IEC 61260-1) (2 of 9 drops)",
+        "x (b)",
+    ]
+
+
+def test_long_lists_are_shortened_with_their_count() -> None:
+    items = [f"{i}" for i in range(9)]
+    assert fit_lines(items, 9, lambda _: 1) == items
+    assert fit_lines(items, 4, lambda _: 1) == ["0", "1", "2", "and 6 more, in report.json"]
+    assert fit_lines(items, 4, lambda _: 2) == ["0", "and 8 more, in report.json"]
+
+
+def test_text_is_clipped_to_its_lines() -> None:
+    for text in ("W" * 300, "many short words " * 30, "ein langes Wort " + "x" * 200, "建" * 99):
+        for lines in (1, 2, 3):
+            short = clip(text, 7, 60, lines)
+            assert short.endswith("…")
+            assert count_lines(short, 7, 60) == lines
+    assert clip("short", 7, 60) == "short"

@@ -1,0 +1,303 @@
+"""Errors of drops in random recordings against the bounds that noise sets.
+
+    python tests/validation/recording_bounds.py [realisations [first seed]]
+
+prints tables by level and colour of the noise; the bounds are derived in
+docs/recordings_theory.md, section 6.
+"""
+
+from __future__ import annotations
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import thud
+from thud.errors import InputError
+from thud.recordings import contact as contact_module
+from thud.recordings.contact import Contact, Estimate
+from thud.recordings.drops import find_windows
+from thud.recordings.estimates import Drop, measure_drop
+from thud.recordings.noise import MAINS, Background
+from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
+from synthetic import HARMONICS, coloured_noise, noise_density
+
+NOISES = (60, 50, 40, 30, 20)
+COLOURS = ("white", "pink", "brown")
+RATES = (8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3)
+SHAPES = ("half sine", "shell", "modal", "finite elements")
+FINE = 192_000.0
+HEIGHT, MASS, GRAVITY = 1.0, 2.5, 9.81
+BANDS = thud.get_bands()
+QUANTITIES = (*(f"{band:g} Hz" for band in BANDS.nominal), "e", "t_c", "t_c smooth")
+
+
+@cache
+def pulse(shape: str) -> tuple[np.ndarray, float]:
+    """Return the samples of a pulse at FINE from first touch on, N, and its contact time, s."""
+    if shape == "half sine":
+        time = np.arange(int(0.02 * FINE) + 1) / FINE
+        return 1500 * np.sin(np.pi * time / 0.02), 0.02
+    file = {"shell": "100cm", "modal": "modal", "finite elements": "fe"}[shape]
+    case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"rubber_ball_{file}.nml")
+    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.05)))
+    last = int(np.ceil(impact.exact_contact_time * FINE)) + 1
+    return impact.floor_force[:last], impact.exact_contact_time
+
+
+@dataclass
+class Draw:
+    """One random recording."""
+
+    seed: int
+    shape: str
+    noise: int
+    colour: str
+    rate: float
+    before: float
+    after: float
+    offset: float
+    drift: float
+    mains: float
+    hum: float
+
+    @classmethod
+    def random(cls, seed: int) -> Draw:
+        """Return the draw of a seed."""
+        rng = np.random.default_rng(seed)
+        return cls(
+            seed,
+            SHAPES[rng.choice(4, p=(0.5, 0.2, 0.15, 0.15))],
+            NOISES[seed % 5],
+            COLOURS[seed // 5 % 3],
+            RATES[rng.integers(len(RATES))] * rng.uniform(1, 1.0001),
+            *np.exp(rng.uniform(np.log(0.005), 0, 2)),
+            rng.uniform(-0.05, 0.05),
+            rng.uniform(-0.05, 0.05),
+            MAINS[rng.integers(2)],
+            10 ** rng.uniform(-4, -2),
+        )
+
+
+@dataclass
+class Result:
+    """Errors, stated deviations and bounds: energies of five octaves, restitution, contact time.
+
+    The contact time stands twice, for its two bounds.
+    """
+
+    error: np.ndarray
+    stated: np.ndarray
+    bound: np.ndarray
+    decibels: np.ndarray
+
+
+def realise(seed: int) -> tuple[Draw, Result | str]:
+    """Return the errors of one random recording, or why it was refused."""
+    draw = Draw.random(seed)
+    rng = np.random.default_rng(10_000_000 + seed)
+    force, contact_time = pulse(draw.shape)
+    peak = float(force.max())
+    rate = draw.rate
+    n = int((draw.before + contact_time + draw.after) * rate)
+    onset = draw.before + rng.uniform() / rate
+    time = np.arange(n) / rate - onset
+    clean = np.interp(time, np.arange(len(force)) / FINE, force, left=0, right=0)
+    deviation = peak * 10 ** (-draw.noise / 20)
+    record = clean + peak * (draw.offset + draw.drift * time)
+    for k, part in enumerate(HARMONICS, start=1):
+        wave = np.sin(2 * np.pi * k * draw.mains * time + rng.uniform(0, 2 * np.pi))
+        record += draw.hum * peak * part * wave
+    record += coloured_noise(n, rate, deviation, draw.colour, rng)
+    try:
+        window = find_windows(Signal.from_array(record, rate))[0]
+        drop = measure_drop(window, height=HEIGHT, mass=MASS)
+    except InputError as error:
+        return draw, str(error)
+    oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
+    energy, bounds, stated, error = [], [], [], []
+    for lower, upper in zip(BANDS.lower, BANDS.upper, strict=True):
+        truth, _, bound = oracle.band_energy(lower, upper, exact=True)
+        value, _, spread = drop.band_energy(lower, upper)
+        energy.append(truth)
+        bounds.append(bound)
+        stated.append(spread)
+        error.append(value - truth)
+    decibels = 10 * np.log10(np.maximum(1 + np.array(error) / energy, 1e-9))
+    late = drop.contact_time.value - contact_time
+    error += [drop.restitution.value - restitution.value, late, late]
+    stated += [drop.restitution.uncertainty, *[drop.contact_time.uncertainty] * 2]
+    flanks = flank_bounds(draw, oracle, record, drop)
+    gravity = GRAVITY * flanks[0] / np.sqrt(2 * GRAVITY * HEIGHT)
+    bounds += [float(np.hypot(restitution.uncertainty, gravity)), *flanks]
+    return draw, Result(np.array(error), np.array(stated), np.array(bounds), decibels)
+
+
+def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
+    draw: Draw,
+    clean: np.ndarray,
+    onset: float,
+    contact_time: float,
+    deviation: float,
+    drop: Drop,
+) -> tuple[Drop, Estimate]:
+    """Return the drop of the best linear estimate: noise and contact are known; no error."""
+    rate = draw.rate
+    first, last = int(np.ceil(onset * rate)), int((onset + contact_time) * rate) + 1
+    variances = np.zeros(5)
+    density = noise_density(rate, deviation, draw.colour)
+    variances[COLOURS.index(draw.colour)] = density
+    variances[0] = max(variances[0], 1e-12 * float(clean.max()) ** 2)
+    peak = float(clean.max())
+    variances[3 + MAINS.index(draw.mains)] = (draw.hum * peak) ** 2 / 2
+    middle = (first + last) / 2 / rate
+    saved = contact_module.QUIET_CELLS
+    contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
+    try:
+        quiet, mean = contact_module.quiet_means(clean, first, last, rate, middle)
+    finally:
+        contact_module.QUIET_CELLS = saved
+    background = Background(quiet, mean, variances, peak)
+    edges = contact_module.even_edges(first, last, rate)
+    _, covariance = background.predict(contact_module.cells_between(edges, rate, middle))
+    contact = Contact(
+        Estimate(onset, 0),
+        Estimate(onset + contact_time, 0),
+        peak,
+        (first, last),
+        clean[first:last],
+        np.zeros(last - first),
+        (first, last),
+        covariance,
+        (1.0, 1.0),
+        background,
+        rate,
+    )
+    speed = np.sqrt(2 * GRAVITY * HEIGHT)
+    ones = np.full((1, last - first), 1 / rate)
+    spread = float(np.sqrt(contact.covariance_of(ones)[0, 0])) / (MASS * speed)
+    truth = clean.sum() / rate / (MASS * speed) - 1 - GRAVITY * contact_time / speed
+    time = np.arange(first, last) / rate - onset
+    oracle = replace(
+        drop, time=time, force=clean[first:last], gate=(0, last - first), contact=contact
+    )
+    return oracle, Estimate(float(truth), spread)
+
+
+def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop) -> tuple[float, float]:
+    """Return bounds of the contact time, s: of any flank, and of one that is known to be smooth.
+
+    The first is the deviation of this method where the noise is known; the second is the
+    Cramer-Rao bound for flanks of unknown slope and curvature, for the half sine.
+    """
+    rate, contact = draw.rate, oracle.contact
+    touch, release = contact.touch.value, contact.release.value
+    middle = sum(contact.span) / 2 / rate
+    offset = float(np.median(record))
+    saved = contact_module.QUIET_CELLS
+    contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
+    left, right = int((touch - 2e-4) * rate) - 2, int((release + 2e-4) * rate) + 3
+    quiet, mean = contact_module.quiet_means(record - offset, left, right, rate, middle)
+    contact_module.QUIET_CELLS = saved
+    background = Background(quiet, mean, contact.background.variances, contact.peak)
+    room = 6 * max(drop.contact_time.uncertainty, 2e-5) + 3 / rate
+    spread = 0.0
+    for sign, near, at in ((1, left, touch), (-1, right, release)):
+        bounds = (
+            (max(at - room, left / rate), at + room)
+            if sign > 0
+            else (at - room, min(at + room, right / rate))
+        )
+        ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
+        edges = sign * contact_module.flank_edges(sign * near, ahead, rate, fine=True)
+        _, one = contact_module.find_edge(
+            record - offset, edges, bounds, background, rate, middle, 3
+        )
+        spread = float(np.hypot(spread, one))
+    if draw.shape != "half sine":
+        return spread, np.nan
+    count = max(4, int(contact_module.FLANK * min(rate, 2e4)))
+    edges = np.linspace(0, contact_module.FLANK, count + 1)
+    tau = (edges[1:] + edges[:-1]) / 2
+    slope = np.pi * contact.peak / (release - touch)
+    shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
+    begin = touch - middle
+    _, covariance = contact.background.predict((begin + edges[:-1], begin + edges[1:]))
+    covariance += np.eye(count) * contact.background.variances[0] / 2 / (edges[1] - edges[0])
+    normal = shapes @ np.linalg.solve(covariance, shapes.T)
+    unit = 1 / np.sqrt(np.diagonal(normal))
+    inverse = np.linalg.inv(normal * unit[:, None] * unit) * unit[:, None] * unit
+    return spread, float(np.sqrt(2 * inverse[0, 0]))
+
+
+def realise_all(count: int, first: int = 0) -> list[tuple[Draw, Result | str]]:
+    """Return a number of realisations."""
+    for shape in SHAPES:
+        pulse(shape)
+    with ProcessPoolExecutor(2) as pool:
+        return list(pool.map(realise, range(first, first + count), chunksize=10))
+
+
+def columns(results: list[Result]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return errors, stated deviations and bounds: [n, n_quantity] each."""
+    error, stated, bound = (
+        np.array([getattr(r, name) for r in results]) for name in ("error", "stated", "bound")
+    )
+    return error, stated, bound
+
+
+def table(results: list[tuple[Draw, Result | str]]) -> Iterator[str]:
+    """Yield the lines of the report."""
+    yield "root mean square of error/bound, and part within 1.96 stated deviations"
+    yield " " * 21 + "".join(f"{name:>14s}" for name in QUANTITIES)
+    groups = [(c, n) for c in (*COLOURS, "all") for n in NOISES] + [("all", 0)]
+    for colour, noise in groups:
+        some = [
+            r
+            for d, r in results
+            if isinstance(r, Result) and noise in {0, d.noise} and colour in {"all", d.colour}
+        ]
+        if not some:
+            continue
+        error, stated, bound = columns(some)
+        rms = np.sqrt(np.nanmean((error / bound) ** 2, axis=0))
+        cover = np.mean(np.abs(error) <= 1.96 * stated, axis=0)
+        row = "".join(f"{a:7.2f} {100 * b:4.0f} %" for a, b in zip(rms, cover, strict=True))
+        yield f"{noise or '':>3} dB {colour:6s} {len(some):4d} |{row}"
+    for noise in NOISES:
+        some = [r for d, r in results if isinstance(r, Result) and d.noise == noise]
+        if not some:
+            continue
+        error, stated, bound = columns(some)
+        worst = np.max([np.abs(r.decibels) for r in some], axis=0)
+        within = np.mean([np.abs(r.decibels) < 0.1 for r in some], axis=0)
+        late, bounce = 1e3 * np.abs(error[:, 6]), np.abs(error[:, 5])
+        yield (
+            f"{noise} dB: largest errors: levels {' '.join(f'{w:.3f}' for w in worst)} dB, within "
+            f"0.1 dB {' '.join(f'{100 * w:.0f}' for w in within)} %"
+        )
+        yield (
+            f"       contact time {late.max():.3f} ms, rms {np.sqrt(np.mean(late**2)):.3f}, "
+            f"within 0.1 ms {100 * np.mean(late < 0.1):.0f} %, bound rms "
+            f"{1e3 * np.sqrt(np.mean(bound[:, 6] ** 2)):.3f}; restitution {bounce.max():.4f}, "
+            f"within 0.01 {100 * np.mean(bounce < 0.01):.0f} %; largest error over stated "
+            f"deviation {np.max(np.abs(error / stated)):.1f}"
+        )
+    for draw, text in results:
+        if isinstance(text, str):
+            yield f"refused: {draw}: {text}"
+
+
+if __name__ == "__main__":
+    found = realise_all(*map(int, sys.argv[1:] or ["1000"]))
+    sys.stdout.write("\n".join(table(found)) + "\n")
