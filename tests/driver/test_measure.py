@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import json
+import subprocess
+import sys
 import tomllib
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -269,3 +271,19 @@ def test_drops_without_a_restitution_are_told() -> None:
     files = [FOLDER / "drop_1.wav", FOLDER / "three_drops.flac"]
     recording = thud.read_recording(files, config=config)
     assert "the restitution is known of 3 of 4 drops" in recording.remarks
+
+
+def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "thud", "measure", str(FOLDER / DROPS[0]["file"])]
+    with open("/dev/full", "w") as full:  # noqa: PTH123 - a device
+        done = subprocess.run(
+            [*command, "--config", str(FOLDER / "lab.toml"), "-o", "out"],
+            cwd=tmp_path,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 1
+    assert done.stderr.count("standard output: ") == 1
+    assert (tmp_path / "out/report.json").exists()

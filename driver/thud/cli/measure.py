@@ -38,6 +38,10 @@ def measure(options: argparse.Namespace) -> int:
         progress=not options.quiet and sys.stderr.isatty(),
     )
     verdict = recording.conformity()
+    folder = Path(options.output or Path("outputs", recording.name))
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always", ReportWarning)
+        results.save(recording, folder, figures=not options.no_figures)
     if not options.quiet:
         print(format_rows(results.drop_table(recording)))
         print()
@@ -48,10 +52,6 @@ def measure(options: argparse.Namespace) -> int:
         print(f"  {results.verdict_sentence(recording)}")
     for remark in recording.remarks:
         print(f"thud-driver: {remark}", file=sys.stderr)
-    folder = Path(options.output or Path("outputs", recording.name))
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always", ReportWarning)
-        results.save(recording, folder, figures=not options.no_figures)
     for warning in found:
         print(f"thud-driver: {warning.message}", file=sys.stderr)
     if not options.quiet:
