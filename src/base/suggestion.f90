@@ -37,16 +37,18 @@ contains
       integer :: distance
       ! Distances of the beginnings: row i belongs to the first i letters of `one`.
       integer :: row(0:len(other), 0:len(one))
-      integer :: i, j
+      integer :: i, j, p, q
+      logical :: swapped
 
       row(:, 0) = [(j, j=0, len(other))]
       do i = 1, len(one)
          row(0, i) = i
          do j = 1, len(other)
             row(j, i) = min(row(j, i - 1) + 1, row(j - 1, i) + 1, row(j - 1, i - 1) + merge(0, 1, one(i:i) == other(j:j)))
-            if (i == 1 .or. j == 1) cycle
-            if (one(i:i) == other(j - 1:j - 1) .and. one(i - 1:i - 1) == other(j:j)) row(j, i) = min(row(j, i), &
-               row(j - 2, i - 2) + 1)
+            p = max(i - 1, 1)
+            q = max(j - 1, 1)
+            swapped = min(i, j) > 1 .and. one(i:i) == other(q:q) .and. one(p:p) == other(j:j)
+            if (swapped) row(j, i) = min(row(j, i), row(q - 1, p - 1) + 1)
          end do
       end do
       distance = row(len(other), len(one))
