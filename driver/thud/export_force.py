@@ -18,6 +18,7 @@ from thud.case import case_text
 from thud.checks import refuse, refuse_value, require_kind, require_number, require_whole
 from thud.files import replace_file
 from thud.impact import Impact
+from thud.levels import RECORDED_BAND
 from thud.recordings.channel import library
 from thud.recordings.recording import Recording
 
@@ -39,8 +40,6 @@ CONVENTION = (
 RATES = (2500.0, 1e6)
 LARGEST_RATIO = 1000
 REACH = 10
-# Upper limit of the band of a force plate, Hz (paper, section 3).
-RECORDED_BAND = 1250.0
 # Length of the lines of a universal file and of its names.
 UFF_LINE = 80
 UFF_NAME = 10

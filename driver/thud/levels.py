@@ -33,6 +33,8 @@ _sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
 BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
 SOURCES = cast("tuple[LimitsSource, ...]", _sources)
 _MAX_PEAKS = 2**31
+# Upper limit of the band of a force plate, Hz (paper, section 3).
+RECORDED_BAND = 1250.0
 
 
 @dataclass(frozen=True, repr=False)

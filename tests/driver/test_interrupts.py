@@ -143,9 +143,10 @@ def test_ignored_interrupt_is_ignored() -> None:
     usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with sender(0.1):
-            thud.solve(sample_rate=1e6, substeps=40)
+            found = thud.solve(sample_rate=1e6, substeps=40)
     finally:
         signal.signal(signal.SIGINT, usual)
+    assert found.contact_time == pytest.approx(thud.solve().contact_time, rel=1e-6)
 
 
 def test_forked_process_does_not_wait_for_calls_of_its_parent() -> None:

@@ -13,9 +13,10 @@ from scipy.signal import lsim, lti
 from scipy.stats import binom
 
 import thud
+from thud.levels import RECORDED_BAND
 from thud.recordings.background import noise_energies
 from thud.recordings.levels import METHODS, average_levels, compare_methods, measure_levels
-from thud.recordings.low_pass import BAND_EDGE, attenuation, low_pass_force
+from thud.recordings.low_pass import attenuation, low_pass_force
 from thud.recordings.outliers import find_outliers
 from thud.recordings.plate import Plate, check_plate, correct_plate
 from thud.recordings.verdict import (
@@ -185,11 +186,13 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
             np.testing.assert_allclose(low.level, raw.level, rtol=0, atol=2e-3)
             assert "1.25 kHz" in low.steps[0]
             assert low.contributions["filter"].max() < 0.003
-    sine = np.sin(2 * np.pi * BAND_EDGE * np.arange(4000) / 25600)
+    sine = np.sin(2 * np.pi * RECORDED_BAND * np.arange(4000) / 25600)
     passed, _ = low_pass_force(sine, 25600.0)
     # Zero phase, half the energy, at the band edge; 19 dB at 1.6 kHz, the paper's force plate.
     np.testing.assert_allclose(passed[1000:3000], sine[1000:3000] / math.sqrt(2), atol=1e-6)
-    assert attenuation(np.array([BAND_EDGE, 1600.0]), 1e6) == pytest.approx([3.01, 19.10], abs=0.01)
+    assert attenuation(np.array([RECORDED_BAND, 1600.0]), 1e6) == pytest.approx(
+        [3.01, 19.10], abs=0.01
+    )
     short, sentence = low_pass_force(sine, 2500.0)
     assert short is sine
     assert "2500 Hz" in sentence

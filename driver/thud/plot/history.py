@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
     from thud.report.history import History, Trend
 
-# Marker and its filling by verdict: told apart in grey as well.
+# Marker and its filling by verdict: distinct in grey as well.
 MARKS = {
     "conforms": ("o", COLOURS[0]),
     "cannot be decided": ("s", "white"),
     "does not conform": ("X", COLOURS[1]),
 }
 # Room beyond the first and the last report, as part of the time between them, and at least.
-ROOM, LEAST_ROOM = 0.06, timedelta(days=15)
+ROOM, MIN_ROOM = 0.06, timedelta(days=15)
 
 
 def draw_history(history: History) -> Figure:
@@ -43,7 +43,7 @@ def draw_history(history: History) -> Figure:
     for axes in panels[len(criteria) :]:
         axes.remove()
     figure.align_ylabels()
-    room = max(ROOM * (history.dates[-1] - history.dates[0]), LEAST_ROOM)
+    room = max(ROOM * (history.dates[-1] - history.dates[0]), MIN_ROOM)
     first = panels[0]
     first.set_xlim(history.dates[0] - room, history.dates[-1] + room)
     locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
@@ -64,7 +64,7 @@ def _draw_criterion(
     is_count = bounds[0, 0] == bounds[0, 1]
     bounds += is_count * np.array([-0.4, 0.4])
     # Beyond both ends of the axis.
-    span = history.dates[-1] - history.dates[0] + LEAST_ROOM
+    span = history.dates[-1] - history.dates[0] + MIN_ROOM
     edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
     lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
     axes.fill_between(edges, lower, upper, step="mid", color=GREY, linewidth=0)

@@ -77,7 +77,7 @@ def draw_levels(
 ) -> None:
     """Draw levels in the axes of their bands; those of the octaves have the tolerance band."""
     draw_tolerance(panels["octave"], *octave_limits(source), source.replace("_", " "))
-    # Side by side, equal levels can be told apart.
+    # Side by side, equal levels can be distinguished.
     step = min(0.1, 0.6 / len(impacts))
     for bands, axes in panels.items():
         dress(axes)

@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 # contact, s. Farther quiet lowers the noise of the offset by less than 5 %.
 QUIET = 0.1
 QUIET_CELLS = ((5e-4, 5e-3), (2e-3, 25e-3), (3e-3, QUIET))
-# Least quiet on a side that counts, s.
-LEAST_QUIET = 1e-3
 # Length of a flank in the search for the touch, s, and room before it.
 FLANK = 3e-3
 ROOM = 2e-3

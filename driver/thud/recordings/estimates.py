@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial.legendre import leggauss
 
 from thud.checks import refuse
-from thud.levels import record_force
+from thud.levels import RECORDED_BAND, record_force
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
@@ -27,8 +27,6 @@ __all__ = ["Drop", "Estimate", "measure_drop"]
 
 # Bounces that are measured.
 MAX_BOUNCES = 2
-# Edge of the low-pass of the peak force, Hz (paper, section 3).
-RECORDED_BAND = 1250.0
 # Quiet below which it is told, s.
 SHORT_QUIET = 0.005
 # Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the

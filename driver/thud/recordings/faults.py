@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from thud.recordings.drops import Window
 
 # Least quiet on each side, s, and samples of it.
-LEAST_QUIET = 1e-3
+MIN_QUIET = 1e-3
 LEAST_SAMPLES = 4
 # Samples of one value at the top that are clipped, where the force beside them falls by more than
 # FALL steps of the digits: a smooth top of this length falls by 4.
@@ -59,7 +59,7 @@ def repair(window: Window) -> tuple[NDArray[np.float64], tuple[str, ...], tuple[
 
 def least_quiet(rate: float) -> int:
     """Return the samples of quiet that each side of a contact needs."""
-    return max(math.ceil(LEAST_QUIET * rate), LEAST_SAMPLES)
+    return max(math.ceil(MIN_QUIET * rate), LEAST_SAMPLES)
 
 
 def _runs(force: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -99,7 +99,7 @@ def _fill(
     """Return the force with dropouts filled from both sides, what was done, and doubts."""
     first, stop = window.contact
     rate = window.sample_rate
-    guard = int(LEAST_QUIET * rate)
+    guard = int(MIN_QUIET * rate)
     first, stop = first + guard, stop - guard
     level = force - np.median(
         np.concatenate([force[: window.contact[0]], force[window.contact[1] :]])

@@ -33,7 +33,7 @@ MARGIN = 3e-3
 # Gates are rounded up to this, s, so that drops share the quadrature.
 STEP = 1e-3
 # dB per relative change of an energy.
-DECIBEL = 10 / math.log(10)
+ENERGY_DECIBEL = 10 / math.log(10)
 # Contributions that differ from drop to drop, so that the scatter of drops shows them.
 WITHIN_REPEATABILITY = ("noise", "window")
 
@@ -151,8 +151,8 @@ def measure_levels(
     level, flag, left = _corrected(measured, background)
     energy = 10 ** (level / 10)
     contributions = {
-        "noise": DECIBEL * spread / energy,
-        "window": DECIBEL * shift / energy,
+        "noise": ENERGY_DECIBEL * spread / energy,
+        "window": ENERGY_DECIBEL * shift / energy,
         "method": np.abs(measured - exact) / math.sqrt(3),
         "filter": attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
         "background": left,
@@ -204,7 +204,7 @@ def average_levels(estimates: Sequence[LevelEstimate]) -> AverageLevels:
     error = unknown
     if count > 1:
         deviation = energies.std(axis=0, ddof=1) / math.sqrt(count)
-        error = DECIBEL * deviation / 10 ** (level / 10)
+        error = ENERGY_DECIBEL * deviation / 10 ** (level / 10)
         contributions = {"repeatability": error, **contributions}
     counted = {
         n: c for n, c in contributions.items() if count == 1 or n not in WITHIN_REPEATABILITY

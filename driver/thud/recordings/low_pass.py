@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from thud.levels import RECORDED_BAND
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Band edge, Hz, and the order of the Butterworth filter, which runs forwards and backwards.
-BAND_EDGE = 1250.0
+# Order of the Butterworth filter, which runs forwards and backwards.
 ORDER = 6
 # Energy that each run takes at the band edge, over what it leaves: both leave a half.
 SHARE = math.sqrt(2) - 1
@@ -26,14 +27,14 @@ def low_pass_force(
     A Butterworth filter of order 6 runs forwards and backwards; together they are 3.01 dB down at
     1.25 kHz. Where the sample rate, Hz, is too low to hold such frequencies, nothing is done.
     """
-    if sample_rate <= 2 * BAND_EDGE:
+    if sample_rate <= 2 * RECORDED_BAND:
         return force, f"no low-pass at 1.25 kHz: the sample rate, {sample_rate:g} Hz, is one"
     # Both runs attenuate by (1 + (t/t_corner)**12)**2 in energy, t = tan(pi f / rate): 2 at the
     # band edge.
-    edge = math.tan(math.pi * BAND_EDGE / sample_rate)
+    edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
     corner = sample_rate / math.pi * math.atan(edge / SHARE ** (1 / (2 * ORDER)))
     sections = butter(ORDER, corner, fs=sample_rate, output="sos")
-    room = min(len(force) - 1, math.ceil(10 * sample_rate / BAND_EDGE))
+    room = min(len(force) - 1, math.ceil(10 * sample_rate / RECORDED_BAND))
     filtered: NDArray[np.float64] = sosfiltfilt(sections, force, padlen=max(room, 0))
     return filtered, (
         f"low-pass, -3 dB at 1.25 kHz: Butterworth of order {ORDER}, forwards and backwards "
@@ -43,8 +44,8 @@ def low_pass_force(
 
 def attenuation(frequency: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
     """Return the attenuation of the low-pass, dB; zero where it is not applied."""
-    if sample_rate <= 2 * BAND_EDGE:
+    if sample_rate <= 2 * RECORDED_BAND:
         return np.zeros(frequency.shape)
-    edge = math.tan(math.pi * BAND_EDGE / sample_rate)
+    edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
     ratio = np.tan(np.pi * np.minimum(frequency / sample_rate, 0.5)) / edge
     return np.asarray(20 * np.log10(1 + SHARE * ratio ** (2 * ORDER)))

@@ -163,11 +163,6 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
     return found
 
 
-def _names(one: Channel) -> tuple[str, str]:
-    """Return the full name of a channel and that within its group."""
-    return one.name, one.name.rpartition("/")[2]
-
-
 @dataclass(frozen=True)
 class _Given:
     """What the user says about the values of a file."""

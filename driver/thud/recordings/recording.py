@@ -14,10 +14,10 @@ from threadpoolctl import threadpool_limits
 
 from thud.checks import refuse, require_number
 from thud.display import MAKERS, Displayed
-from thud.levels import peak_count
+from thud.levels import RECORDED_BAND, peak_count
 from thud.recordings.config import Config, check_key, read_config
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import RECORDED_BAND, Estimate, measure_drop
+from thud.recordings.estimates import Estimate, measure_drop
 from thud.recordings.excursion import doubt, scan
 from thud.recordings.faults import repair
 from thud.recordings.levels import (

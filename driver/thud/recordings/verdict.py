@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 CONFIDENCE = 0.95
 VERDICTS = ("conforms", "does not conform", "cannot be decided")
 # dB per relative change of a force.
-DECIBEL = 20 / math.log(10)
+AMPLITUDE_DECIBEL = 20 / math.log(10)
 
 
 @dataclass(frozen=True)
@@ -287,7 +287,7 @@ def level_quantities(
     count = len(levels.names)
     shared: dict[str, NDArray[np.float64]] = {}
     if calibration is not None:
-        shared["calibration"] = np.full(len(levels.level), DECIBEL * calibration)
+        shared["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
     if plate is not None:
         shared["plate"] = plate
     return tuple(

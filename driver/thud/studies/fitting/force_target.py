@@ -11,6 +11,7 @@ from scipy.signal import ZoomFFT
 
 from thud.checks import refuse, refuse_value, require_choice, require_whole
 from thud.impact import FORCES, Impact
+from thud.levels import RECORDED_BAND
 from thud.record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
 from thud.studies.fitting.misfit import Misfit, require_positive
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from thud._schema import LevelsForce
     from thud.recordings.estimates import Drop
 
-# Upper limit of the band of a force plate, Hz (paper, section 3).
-BELOW = 1250.0
 # Part of that frequency that rounded times leave open.
 SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
@@ -71,7 +70,7 @@ class ForceTarget:
     noise: float | None = None
     force: LevelsForce | None = None
     time_shift: bool | None = None
-    below: float = BELOW
+    below: float = RECORDED_BAND
     window: tuple[float, float] | None = None
     drop: int = 1
 
