@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.floors.prediction import RoomPrediction as RoomPrediction
+    from thud.floors.prediction import predict_level as predict_level
     from thud.floors.rating import Rating as Rating
     from thud.floors.rating import rating as rating
     from thud.floors.rating import standardised_level as standardised_level
@@ -77,6 +79,8 @@ _LATE = {
     "Rating": "floors.rating",
     "Recording": "recordings.recording",
     "RoomLevels": "floors.survey",
+    "RoomPrediction": "floors.prediction",
+    "predict_level": "floors.prediction",
     "quantity": "units",
     "rating": "floors.rating",
     "read_recording": "recordings.recording",
@@ -147,6 +151,7 @@ MAKERS.update(
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    prediction=_maker("plot.prediction", "draw_prediction"),
     room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),
 )
