@@ -39,6 +39,13 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.floors.prediction import RoomPrediction as RoomPrediction
+    from thud.floors.prediction import predict_level as predict_level
+    from thud.floors.rating import Rating as Rating
+    from thud.floors.rating import rating as rating
+    from thud.floors.rating import standardised_level as standardised_level
+    from thud.floors.survey import RoomLevels as RoomLevels
+    from thud.floors.survey import read_room_levels as read_room_levels
     from thud.recordings.recording import Recording as Recording
     from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
@@ -69,9 +76,16 @@ _LATE = {
     "Comparison": "comparison",
     "compare": "comparison",
     "read_all": "comparison",
+    "Rating": "floors.rating",
     "Recording": "recordings.recording",
+    "RoomLevels": "floors.survey",
+    "RoomPrediction": "floors.prediction",
+    "predict_level": "floors.prediction",
     "quantity": "units",
+    "rating": "floors.rating",
     "read_recording": "recordings.recording",
+    "read_room_levels": "floors.survey",
+    "standardised_level": "floors.rating",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
@@ -137,5 +151,7 @@ MAKERS.update(
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    prediction=_maker("plot.prediction", "draw_prediction"),
+    room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),
 )

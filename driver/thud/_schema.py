@@ -15,6 +15,7 @@ __all__ = [
     "Ball",
     "Drop",
     "FiniteElement",
+    "Floor",
     "HollowSphere",
     "HuntCrossley",
     "Levels",
@@ -24,6 +25,7 @@ __all__ = [
     "ModelName",
     "ModelOptions",
     "Modes",
+    "Room",
     "Sampling",
 ]
 
@@ -44,6 +46,7 @@ LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
 LevelsForce = Literal["floor", "elastic"]
 LimitsSource = Literal["rubber_ball", "tyre"]
+FloorEdges = Literal["laboratory", "absorption"]
 BandSet = Literal["octave", "third"]
 
 
@@ -176,6 +179,66 @@ class Modes(Group):
     count: int = 6
     radial_elements: int = field(default=8, metadata={"group": "mesh"})
     polar_elements: int = field(default=64, metadata={"group": "mesh"})
+
+
+@dataclass(frozen=True)
+class Floor(Group):
+    """Floor over the room below: a homogeneous plate.
+
+    Attributes
+    ----------
+    length : float
+        Length of the floor, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor, m; 0.5 <= width <= 100.
+    thickness : float
+        Thickness of the floor, m; 0.001 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    loss_factor : float
+        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+    edges : str
+        Losses at the edges of the floor; "laboratory", "absorption".
+    edge_absorption : float
+        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
+        edge_absorption <= 1000.
+    """
+
+    length: float = 5.0
+    width: float = 4.0
+    thickness: float = 0.18
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    loss_factor: float = 0.005
+    edges: FloorEdges = "laboratory"
+    edge_absorption: float = 0.0
+
+
+@dataclass(frozen=True)
+class Room(Group):
+    """Room below the floor.
+
+    Attributes
+    ----------
+    volume : float
+        Volume of the room, m3; 1 <= volume <= 100000.
+    reverberation_time : float
+        Reverberation time of the room, s; 0.05 <= reverberation_time <= 20.
+    reverberation_times : sequence of float
+        The same for each third from 50 to 630 Hz, s; 0.05 <= reverberation_times <= 20.
+    air_density : float
+        Density of the air, kg/m3; 0.5 <= air_density <= 2.
+    sound_speed : float
+        Speed of sound in the air, m/s; 200 <= sound_speed <= 500.
+    """
+
+    volume: float = 50.0
+    reverberation_time: float = 0.5
+    reverberation_times: Sequence[float] = ()
+    air_density: float = 1.2
+    sound_speed: float = 343.0
 
 
 @dataclass(frozen=True)
@@ -447,4 +510,17 @@ KEYS = (
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
     Key("", "levels", "force", "choice", "", "force whose levels, peak and verdict count", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
+    Key("floor", "floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
+    Key("floor", "floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("floor", "floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
+    Key("floor", "floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("floor", "floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("floor", "floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
+    Key("floor", "floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("floor", "floor", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
+    Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
+    Key("room", "room", "reverberation_times", "list", "s", "the same for each third from 50 to 630 Hz", (), 0.05, 20.0),
+    Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
+    Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
 )

@@ -16,11 +16,13 @@ from thud._schema import (
     MODELS,
     Ball,
     Drop,
+    Floor,
     HollowSphere,
     Levels,
     Limits,
     ModelOptions,
     Modes,
+    Room,
     Sampling,
 )
 from thud.checks import LARGEST, refuse, require_choice, require_kind, shown
@@ -38,6 +40,9 @@ if TYPE_CHECKING:
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
+# Groups of the level in the room below, and all that a case may ask for.
+BELOW: dict[str, type[Group]] = {"floor": Floor, "room": Room}
+OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **BELOW}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
@@ -72,6 +77,8 @@ class Case(Group, Displayed):
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
+    floor, room : Floor and Room, or None
+        Floor and room below; None: no level in a room.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -84,12 +91,15 @@ class Case(Group, Displayed):
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
     modes: Modes | None = None
+    floor: Floor | None = None
+    room: Room | None = None
 
     def __repr__(self) -> str:
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
-        return f"<Case {self.name}: {', '.join(filter(None, (model, modes)))}>"
+        room = "room below" if self.room else ""
+        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, room)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -113,7 +123,8 @@ class Case(Group, Displayed):
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
-        require_kind("modes", self.modes, Modes | None)
+        for group, optional in OPTIONAL.items():
+            require_kind(group, getattr(self, group), optional | None)
         groups: dict[str, dict[str, object]] = {
             "case": {"name": self.name},
             "ball": vars(self.ball),
@@ -134,6 +145,7 @@ class Case(Group, Displayed):
                     )
                     raise InputError(message)
                 values[option.name] = value
+        groups |= {group: vars(given) for group in BELOW if (given := getattr(self, group))}
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
@@ -162,13 +174,23 @@ class Case(Group, Displayed):
             for option in fields(MODELS[name]):
                 given = content.get(group_of(name, option), {})
                 if option.name in given:
-                    entries = given[option.name]
-                    if option.name in LISTS:
-                        entries = tuple(entries) if isinstance(entries, list) else (entries,)
-                    options[option.name] = entries
-            model = MODELS[name](**options)
+                    options[option.name] = given[option.name]
+            model = MODELS[name](**_with_lists(options))
+        below: dict[str, Any] = {
+            group: kind(**_with_lists(content[group]))
+            for group, kind in BELOW.items()
+            if group in content
+        }
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, **groups)
+        return cls(name=title, model=model, modes=modes, **groups, **below)
+
+
+def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of keys as `f90nml` reads them, lists of one entry as lists."""
+    return {
+        key: (tuple(value) if isinstance(value, list) else (value,)) if key in LISTS else value
+        for key, value in values.items()
+    }
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:

@@ -8,7 +8,9 @@ module thud_case
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_new_field, only: choice_field, in_group, owned_by, text_field
+   use thud_plate, only: get_plate_fields, plate_type
    use thud_registry, only: model_names, model_slot_type, new_models
+   use thud_room, only: check_room, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
    use thud_text, only: quoted, to_text
@@ -27,6 +29,8 @@ module thud_case
       logical :: has_impact = .true.
       !> Free modes are asked for, by the group `&modes`.
       logical :: has_modes = .false.
+      !> The level in the room below is asked for, by the groups `&floor` and `&room`.
+      logical :: has_room = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
       type(ball_type) :: ball
@@ -44,6 +48,9 @@ module thud_case
       character(len=name_length) :: level_force = 'floor'
       !> Source whose limits apply.
       character(len=name_length) :: source = 'rubber_ball'
+      !> Floor and room below.
+      type(plate_type) :: floor
+      type(room_type) :: room
    end type case_type
 
 contains
@@ -88,10 +95,12 @@ contains
          choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
          choice_field('force', case%level_force, 'force whose levels, peak and verdict count', &
          [character(len=8) :: 'floor', 'elastic'])]), &
-         in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)])]
+         in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
+         owned_by('floor', in_group('floor', get_plate_fields(case%floor))), &
+         owned_by('room', in_group('room', get_room_fields(case%room)))]
    end function get_fields
 
-   !> Whether a key does something: for the impact, its model, or the free modes.
+   !> Whether a key does something: for the impact, its model, the free modes, or the room below.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -99,6 +108,8 @@ contains
 
       if (field%owner == 'modes') then
          used = case%has_modes
+      else if (field%owner == 'floor' .or. field%owner == 'room') then
+         used = case%has_impact .and. case%has_room
       else if (case%has_impact) then
          used = field%owner == '' .or. field%owner == case%model
       else
@@ -130,6 +141,8 @@ contains
       if (allocated(error)) return
       if (case%has_modes) call check_modes(case%modes, error)
       if (allocated(error) .or. .not. case%has_impact) return
+      if (case%has_room) call check_room(case%room, error)
+      if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
          call model%check(case%ball, case%sampling, error)
       end associate

@@ -36,8 +36,13 @@ contains
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
+      case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
+      if (.not. allocated(error) .and. (case%has_room .neqv. any([(groups(i)%name == 'floor', i=1, size(groups))]))) then
+        error = input_error('&floor and &room: one of them is given without the other; allowed: both, for the level in ' &
+         //'the room below')
+      end if
       do i = 1, merge(size(main_groups), 1, case%has_impact)
          if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
          case%left_out = trim(case%left_out)//' &'//main_groups(i)

@@ -16,6 +16,7 @@ from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
+from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
 from thud.errors import InputError, ThudError
@@ -91,6 +92,7 @@ COMMANDS = {
         ),
         run_history,
     ),
+    "rate": RATE,
     **study_commands(),
     "figures": Command(
         "draw the figures of the paper and of the documentation",
