@@ -155,14 +155,14 @@ contains
       logical :: usable
       integer :: i
 
-      usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/') == 0 &
+      usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/\') == 0 &
          .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
             //' characters, without it the name of the file')
       else if (.not. usable) then
          error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory, ' &
-            //"without '/', of up to "//to_text(name_length)//' characters')
+            //"without '/' and '\', of up to "//to_text(name_length)//' characters')
       end if
    end subroutine check_name
 

@@ -5,7 +5,7 @@ module thud_case_text
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, newline, quoted, to_text
+   use thud_text, only: join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
    private
 
@@ -99,7 +99,7 @@ contains
       do i = 1, size(groups)
          if (.not. any(fields%group == groups(i)%name)) then
             call get_suggestion(groups(i)%name, fields%group, suggestion)
-            error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
+            error = input_error('&'//shortened(groups(i)%name)//' in line '//to_text(groups(i)%line) &
                //' is not a known group'//suggestion//'; allowed: '//join_quoted(distinct(fields%group)))
             return
          end if
@@ -128,7 +128,7 @@ contains
             is_meant = fields%group == group%name .and. fields%key == given%key
             if (.not. any(is_meant)) then
                call get_suggestion(given%key, pack(fields%key, fields%group == group%name), suggestion)
-               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+               error = input_error('&'//group%name//': '//shortened(given%key)//' in line '//to_text(given%line) &
                   //' is not a known key'//suggestion//'; allowed: ' &
                   //join_quoted(distinct(pack(fields%key, fields%group == group%name))))
             else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then

@@ -56,7 +56,7 @@ def test_energy_is_that_of_an_infinite_plate(impact: thud.Impact) -> None:
 
 
 def test_standardisation_takes_room_and_reverberation_out(impact: thud.Impact) -> None:
-    """Of the reference room nothing is left; twice the volume halves the energy, but for flow back."""
+    """Of the reference room nothing is left; twice the volume halves the energy of sound."""
     reference = thud.predict_level(impact, thud.Floor(), thud.Room())
     assert reference.standardised == pytest.approx(reference.level)
     larger = thud.predict_level(impact, thud.Floor(), thud.Room(volume=100.0))

@@ -43,6 +43,11 @@ cases = thud.read_all([folder / "mine.nml"])
 for figure in (flagship.plot(), record.plot("force"), thud.plot.levels(impacts), page.figure()):
     thud.plot.save(figure, folder / "figure.png")
 tables = flagship.to_dataframe().describe(), flagship.to_xarray().sizes, many.to_xarray().sizes
+floor, room = thud.Floor(thickness=0.2), thud.Room(volume=40.0)
+below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
+(folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
+site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
+rating: thud.Rating = thud.rating(thud.standardised_level(site.level, 0.6, 40.0))
 height = {"height": thud.Parameter(values=[0.5, 1.0])}
 mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
 modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
@@ -70,5 +75,8 @@ results = [
     chart,
     spread,
     shares,
+    below,
+    site,
+    rating,
 ]
 print(*results, *missed, sep="\n")
