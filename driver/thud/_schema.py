@@ -38,7 +38,7 @@ ModelName = Literal[
 HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
 ModalBallDampingLaw = Literal["constant", "rising"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
-FiniteElementViscosity = Literal["none", "kelvin_voigt", "constant_loss", "prony"]
+FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
 FiniteElementTreatment = Literal["penalty", "impulse"]
 LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
@@ -258,12 +258,16 @@ class FiniteElement(Group):
         Maximum bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <=
         bulk_ratio <= 100000; group ``&material``.
     viscosity : str
-        Law of viscosity; "none", "kelvin_voigt", "constant_loss", "prony"; group ``&material``.
+        Law of viscosity; "none", "kelvin_voigt", "fractional", "constant_loss", "prony"; group
+        ``&material``.
     loss_factor : float
-        Loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss; 0 <
-        loss_factor <= 1; group ``&material``.
+        Loss factor at loss_frequency, of kelvin_voigt and fractional; over 10 to 1000 Hz, of
+        constant_l; 0 < loss_factor <= 1; group ``&material``.
     loss_frequency : float
         Where the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <= 10000; group
+        ``&material``.
+    fractional_order : float
+        Order of the derivative, of fractional; 1: kelvin_voigt; 0 < fractional_order <= 1; group
         ``&material``.
     prony_share : sequence of float
         Moduli over the long-term modulus, of prony; 0 <= prony_share <= 1000; group ``&material``.
@@ -292,6 +296,7 @@ class FiniteElement(Group):
     viscosity: FiniteElementViscosity = field(default="kelvin_voigt", metadata={"group": "material"})
     loss_factor: float = field(default=0.2, metadata={"group": "material"})
     loss_frequency: float = field(default=74.0, metadata={"group": "material"})
+    fractional_order: float = field(default=0.3, metadata={"group": "material"})
     prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
     prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
     treatment: FiniteElementTreatment = field(default="impulse", metadata={"group": "contact"})
@@ -423,9 +428,10 @@ KEYS = (
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
     Key("finite_element", "material", "mooney_share", "real", "", "part of the shear modulus with the second invariant, of mooney_rivlin", (), 0.0, 1.0),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
-    Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'constant_loss', 'prony')),
-    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
+    Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony')),
+    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt and fractional; over 10 to 1000 Hz, of constant_l", (), 0.0, 1.0),
     Key("finite_element", "material", "loss_frequency", "real", "Hz", "where the ball's modulus is the storage modulus", (), 1.0, 10000.0),
+    Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, of fractional; 1: kelvin_voigt", (), 0.0, 1.0),
     Key("finite_element", "material", "prony_share", "list", "", "moduli over the long-term modulus, of prony", (), 0.0, 1000.0),
     Key("finite_element", "material", "prony_time", "list", "s", "relaxation times, of prony", (), 0.0, 1000.0),
     Key("finite_element", "contact", "treatment", "choice", "", "how the floor holds the ball", ('penalty', 'impulse')),

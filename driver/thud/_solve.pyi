@@ -51,6 +51,7 @@ class FiniteElementOptions(SamplingOptions, total=False):
     viscosity: FiniteElementViscosity
     loss_factor: float
     loss_frequency: float
+    fractional_order: float
     prony_share: Sequence[float]
     prony_time: Sequence[float]
     treatment: FiniteElementTreatment
