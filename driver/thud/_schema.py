@@ -206,7 +206,8 @@ class ModalBall(Group):
     static_harmonics : int
         Highest harmonic whose static flexibility counts; 4 <= static_harmonics <= 400.
     rings : int
-        Rings of the lower half of the surface; 2 <= rings <= static_harmonics/2.
+        Rings of the surface, from the lowest point to 60 degrees; 2 <= rings <=
+        static_harmonics/3.
     damping_law : str
         Loss factor against frequency; "constant", "rising".
     loss_factor : float
@@ -215,19 +216,22 @@ class ModalBall(Group):
         Frequency of a rising loss factor, Hz; 0.1 <= loss_frequency <= 100000.
     cavity_gas : bool
         The gas in the cavity resists changes of its volume.
+    contact_gravity : bool
+        Gravity acts during the contact too.
     static_families : sequence of int
         Harmonics that answer statically; 0 <= static_families <= harmonics.
     """
 
     name: ClassVar[ModelName] = "modal_ball"
-    harmonics: int = 32
+    harmonics: int = 48
     radial_modes: int = 5
-    static_harmonics: int = 96
-    rings: int = 44
+    static_harmonics: int = 180
+    rings: int = 60
     damping_law: ModalBallDampingLaw = "constant"
     loss_factor: float = 0.1
     loss_frequency: float = 74.0
     cavity_gas: bool = True
+    contact_gravity: bool = False
     static_families: Sequence[int] = ()
 
 
@@ -413,11 +417,12 @@ KEYS = (
     Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic whose modes oscillate", (), 2.0, 200.0, True),
     Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "modes of each harmonic that oscillate", (), 1.0, 20.0, True),
     Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility counts", (), 4.0, 400.0, True),
-    Key("modal_ball", "modal_ball", "rings", "whole", "", "rings of the lower half of the surface", (), 2.0, "static_harmonics/2", True),
+    Key("modal_ball", "modal_ball", "rings", "whole", "", "rings of the surface, from the lowest point to 60 degrees", (), 2.0, "static_harmonics/3", True),
     Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
     Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a rising loss factor", (), 0.1, 100000.0),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
+    Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics", True),
     Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0, True),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),

@@ -36,6 +36,7 @@ class ModalBallOptions(SamplingOptions, total=False):
     loss_factor: float
     loss_frequency: float
     cavity_gas: bool
+    contact_gravity: bool
     static_families: Sequence[int]
 
 class FiniteElementOptions(SamplingOptions, total=False):

@@ -16,13 +16,13 @@ module thud_modal_ball_options
    !> Options of the model.
    type, abstract, extends(source_model_type) :: modal_ball_options_type
       !> Highest harmonic n whose modes oscillate.
-      integer :: harmonics = 32
+      integer :: harmonics = 48
       !> Modes of each harmonic that oscillate.
       integer :: radial_modes = 5
       !> Highest harmonic whose static flexibility counts.
-      integer :: static_harmonics = 96
-      !> Rings of the lower half of the surface.
-      integer :: rings = 44
+      integer :: static_harmonics = 180
+      !> Rings of the surface that take the pressure.
+      integer :: rings = 60
       !> Loss factor: `constant`, or `rising` in proportion to frequency.
       character(len=name_length) :: damping_law = 'constant'
       !> Loss factor, twice the damping ratio.
@@ -31,6 +31,8 @@ module thud_modal_ball_options
       real(wp) :: loss_frequency = 74.0_wp
       !> The gas in the cavity resists changes of its volume.
       logical :: cavity_gas = .true.
+      !> Gravity acts during the contact too.
+      logical :: contact_gravity = .false.
       !> Harmonics that answer statically instead of oscillating.
       type(list_type) :: static_families
    contains
@@ -44,7 +46,7 @@ contains
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(modal_ball_options_type), intent(in), target :: options
-      !> One field per component: [9].
+      !> One field per component: [10].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -52,7 +54,8 @@ contains
          integer_field('radial_modes', options%radial_modes, 'modes of each harmonic that oscillate', '[1, 20]'), &
          integer_field('static_harmonics', options%static_harmonics, &
          'highest harmonic whose static flexibility counts', '[4, 400]'), &
-         integer_field('rings', options%rings, 'rings of the lower half of the surface', '[2, static_harmonics/2]'), &
+         integer_field('rings', options%rings, 'rings of the surface, from the lowest point to 60 degrees', &
+         '[2, static_harmonics/3]'), &
          choice_field('damping_law', options%damping_law, 'loss factor against frequency', &
          [character(len=8) :: 'constant', 'rising']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
@@ -60,6 +63,7 @@ contains
          real_field('loss_frequency', options%loss_frequency, 'Hz', 'frequency of a rising loss factor', &
          '[0.1, 100000]'), &
          logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
+         logical_field('contact_gravity', options%contact_gravity, 'gravity acts during the contact too'), &
          list_field('static_families', options%static_families, '', 'harmonics that answer statically', &
          '[0, harmonics]', whole=.true.)]
    end function get_fields
@@ -72,9 +76,9 @@ contains
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
 
-      if (2*options%rings < options%harmonics) error = input_error('&modal_ball: harmonics = ' &
+      if (3*options%rings < options%harmonics) error = input_error('&modal_ball: harmonics = ' &
          //to_text(options%harmonics)//' is too high for rings = '//to_text(options%rings) &
-         //'; allowed: up to twice the rings')
+         //'; allowed: up to three times the rings')
    end subroutine check
 
 end module thud_modal_ball_options
