@@ -36,7 +36,7 @@ ModelName = Literal[
     "hunt_crossley",
 ]
 HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
-ModalBallDampingLaw = Literal["constant", "rising"]
+ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
 FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
 FiniteElementTreatment = Literal["penalty", "impulse"]
@@ -209,11 +209,14 @@ class ModalBall(Group):
         Rings of the surface, from the lowest point to 60 degrees; 2 <= rings <=
         static_harmonics/3.
     damping_law : str
-        Loss factor against frequency; "constant", "rising".
+        Loss factor against frequency; "constant", "rising", "fractional".
     loss_factor : float
         Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9.
     loss_frequency : float
-        Frequency of a rising loss factor, Hz; 0.1 <= loss_frequency <= 100000.
+        Frequency of a loss factor that is not constant; of fractional also of the modulus, Hz; 0.1
+        <= loss_frequency <= 100000.
+    fractional_order : float
+        Order of the derivative, of fractional; 1: rising; 0 < fractional_order <= 1.
     cavity_gas : bool
         The gas in the cavity resists changes of its volume.
     contact_gravity : bool
@@ -230,6 +233,7 @@ class ModalBall(Group):
     damping_law: ModalBallDampingLaw = "constant"
     loss_factor: float = 0.1
     loss_frequency: float = 74.0
+    fractional_order: float = 0.3
     cavity_gas: bool = True
     contact_gravity: bool = False
     static_families: Sequence[int] = ()
@@ -418,9 +422,10 @@ KEYS = (
     Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "modes of each harmonic that oscillate", (), 1.0, 20.0, True),
     Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility counts", (), 4.0, 400.0, True),
     Key("modal_ball", "modal_ball", "rings", "whole", "", "rings of the surface, from the lowest point to 60 degrees", (), 2.0, "static_harmonics/3", True),
-    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising')),
+    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising', 'fractional')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
-    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a rising loss factor", (), 0.1, 100000.0),
+    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a loss factor that is not constant; of fractional also of the modulus", (), 0.1, 100000.0),
+    Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, of fractional; 1: rising", (), 0.0, 1.0),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics", True),

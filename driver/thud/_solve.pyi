@@ -35,6 +35,7 @@ class ModalBallOptions(SamplingOptions, total=False):
     damping_law: ModalBallDampingLaw
     loss_factor: float
     loss_frequency: float
+    fractional_order: float
     cavity_gas: bool
     contact_gravity: bool
     static_families: Sequence[int]

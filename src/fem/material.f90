@@ -5,11 +5,10 @@ module thud_material
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
-   use thud_fractional_loss, only: check_fractional_loss, new_fractional_loss
+   use thud_fractional_loss, only: new_fractional_loss
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
-   use thud_prony, only: fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio, series_from, &
-      series_to
+   use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -104,11 +103,6 @@ contains
       else if (options%viscosity /= 'prony' .and. n_share + n_time > 0) then
          error = input_error("&material: prony_share and prony_time do nothing with viscosity = '" &
             //trim(options%viscosity)//"'; allowed: viscosity = 'prony'")
-      else if (options%viscosity == 'fractional' .and. (options%loss_frequency < series_from &
-         .or. options%loss_frequency > series_to)) then
-         error = input_error('&material: loss_frequency = '//to_text(options%loss_frequency) &
-            //" Hz is outside the series of viscosity = 'fractional'; allowed: "//to_text(series_from)//' to ' &
-            //to_text(series_to)//' Hz')
       else if (ball%gauge_pressure > 0.0_wp) then
          error = input_error('&ball: gauge_pressure = '//to_text(ball%gauge_pressure) &
             //' Pa is not allowed with finite_element, whose wall starts without stress; allowed: 0')
@@ -116,7 +110,8 @@ contains
          error = input_error('&ball: poisson_ratio = '//to_text(ball%poisson_ratio) &
             //' is not allowed with finite_element; allowed: 0 to 0.5')
       else if (options%viscosity == 'fractional') then
-         call check_fractional_loss('material', options%fractional_order, options%loss_factor, error)
+         call check_fractional_loss('material', options%fractional_order, options%loss_factor, &
+            options%loss_frequency, error)
       end if
    end subroutine check_material
 
@@ -130,6 +125,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: storage_modulus, poisson_ratio, omega, viscosity
       real(wp), allocatable :: share(:)
+      logical :: failed
 
       omega = 2*pi*options%loss_frequency
       material%density = get_density(ball)
@@ -147,8 +143,12 @@ contains
          call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
             options%loss_frequency), share, material%branch_time, viscosity)
       case ('constant_loss')
-         call fit_constant_loss(options%loss_factor, share, material%branch_time, error)
-         if (allocated(error)) return
+         call fit_constant_loss(options%loss_factor, share, material%branch_time, failed)
+         if (failed) then
+            error = input_error('&material: no Prony series has loss_factor = '//to_text(options%loss_factor) &
+               //' from 10 to 1000 Hz; allowed: up to about 0.9')
+            return
+         end if
       case ('prony')
          share = options%prony_share%values(:options%prony_share%count)
          material%branch_time = options%prony_time%values(:options%prony_time%count)

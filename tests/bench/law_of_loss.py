@@ -47,7 +47,7 @@ def row(radial_elements: int, modulus: float, order: float) -> None:
         before, found = found, drop(here)
     levels = " | ".join(f"{level:.2f}" for level in found.levels())
     print(
-        f"| {radial_elements} × {8 * radial_elements} | {modulus / 1e6:g} | {order:g} | {here:.4f} "
+        f"| {radial_elements}, {8 * radial_elements} | {modulus / 1e6:g} | {order:g} | {here:.4f} "
         f"| {1e3 * found.contact_time:.2f} | {levels} |",
         flush=True,
     )

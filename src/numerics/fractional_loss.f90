@@ -3,13 +3,11 @@
 !> Order 1 is the viscosity of Kelvin and Voigt; near 0 the loss factor hardly depends on frequency.
 module thud_fractional_loss
    use thud_constants, only: pi
-   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
-   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_fractional_loss, fractional_loss_type, get_modulus, new_fractional_loss
+   public :: fractional_loss_type, get_modulus, new_fractional_loss
 
    !> The law; moduli over the storage modulus at the frequency of the loss factor.
    type :: fractional_loss_type
@@ -24,19 +22,6 @@ module thud_fractional_loss
    end type fractional_loss_type
 
 contains
-
-   !> Refuses a loss factor that the spring-pot alone does not reach: the spring would have to be negative.
-   subroutine check_fractional_loss(group, order, loss_factor, error)
-      !> Group of the keys, for the message.
-      character(len=*), intent(in) :: group
-      real(wp), intent(in) :: order, loss_factor
-      type(error_type), allocatable, intent(out) :: error
-
-      ! The tangent of order 1 is infinite, in floating point too large.
-      if (loss_factor >= tan(pi/2*order)) error = input_error('&'//group//': loss_factor = '//to_text(loss_factor) &
-         //' is more than a material of fractional_order = '//to_text(order)//' can have; allowed: below ' &
-         //to_text(tan(pi/2*order)))
-   end subroutine check_fractional_loss
 
    !> The law that has a loss factor at a frequency.
    pure function new_fractional_loss(order, loss_factor, frequency) result(law)

@@ -10,10 +10,10 @@ module thud_prony
    implicit none (type, external)
    private
 
-   public :: fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio, series_from, series_to
+   public :: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
 
    !> Band of the series of a fractional law, Hz.
-   real(wp), parameter :: series_from = 5.0_wp, series_to = 3000.0_wp
+   real(wp), parameter, public :: series_from = 5.0_wp, series_to = 3000.0_wp
 
    !> Branches of a fractional law, and how far the outer ones stand outside the band: the nearest spacing
    !> that spreads the error evenly. Beside a spring and a viscosity, which stand for all times beyond, they
@@ -63,14 +63,14 @@ contains
    !>
    !> Loss modulus = loss factor times storage modulus is linear in the moduli of the branches: least
    !> squares over frequencies at equal steps of their logarithm.
-   subroutine fit_constant_loss(loss_factor, share, time, error)
+   subroutine fit_constant_loss(loss_factor, share, time, failed)
       real(wp), intent(in) :: loss_factor
       !> Moduli of the branches over the long-term modulus: [n_branch].
       real(wp), allocatable, intent(out) :: share(:)
       !> Their relaxation times, s: [n_branch].
       real(wp), allocatable, intent(out) :: time(:)
-      !> A modulus would have to be negative.
-      type(error_type), allocatable, intent(out) :: error
+      !> A modulus would have to be negative: the loss factor is above about 0.9.
+      logical, intent(out) :: failed
       real(wp) :: omega
       real(wp) :: matrix(n_frequency, n_branch), right(n_frequency), work(64*n_branch), turn(n_branch)
       integer :: i, info
@@ -88,10 +88,28 @@ contains
       end do
       call dgels('N', n_frequency, n_branch, 1, matrix, n_frequency, right, n_frequency, work, size(work), info)
       share = right(:n_branch)
-      if (info /= 0 .or. minval(share) < 0.0_wp) error = input_error('&material: no Prony series with ' &
-         //to_text(n_branch)//' terms has loss_factor = '//to_text(loss_factor)//' from '//to_text(lowest)//' to ' &
-         //to_text(highest)//' Hz; allowed: up to about 0.9')
+      failed = info /= 0 .or. minval(share) < 0.0_wp
    end subroutine fit_constant_loss
+
+   !> Refuses a fractional law without a series: a loss factor that the spring-pot alone does not reach (the
+   !> spring would have to be negative), or one outside the band.
+   subroutine check_fractional_loss(group, order, loss_factor, frequency, error)
+      !> Group of the keys, for the message.
+      character(len=*), intent(in) :: group
+      real(wp), intent(in) :: order, loss_factor
+      !> Frequency of the loss factor, Hz.
+      real(wp), intent(in) :: frequency
+      type(error_type), allocatable, intent(out) :: error
+
+      if (frequency < series_from .or. frequency > series_to) then
+         error = input_error('&'//group//': loss_frequency = '//to_text(frequency) &
+            //' Hz is not allowed with a fractional law; allowed: '//to_text(series_from)//' to '//to_text(series_to))
+      else if (loss_factor >= tan(pi/2*order)) then
+         ! The tangent of order 1 is infinite, in floating point too large.
+         error = input_error('&'//group//': loss_factor = '//to_text(loss_factor)//' is more than a material of ' &
+            //'fractional_order = '//to_text(order)//' can have; allowed: below '//to_text(tan(pi/2*order)))
+      end if
+   end subroutine check_fractional_loss
 
    !> Series of a fractional law from 5 to 3000 Hz: a spring, branches and a viscosity in parallel.
    !>
@@ -109,7 +127,7 @@ contains
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), parameter :: span = series_to/series_from*outside**2
       real(wp) :: omega, last, spring
-      complex(wp) :: term(n_term), power
+      complex(wp) :: term(n_fractional + 2), power
       real(wp) :: matrix(2*n_frequency, n_term), right(2*n_frequency), work(64*n_term)
       integer :: i, info
 
