@@ -127,7 +127,8 @@ contains
       real(wp), parameter :: rounding = 1.0e-12_wp
       real(wp), parameter :: span = series_to/series_from*outside**2
       real(wp) :: omega, last, spring
-      complex(wp) :: term(n_fractional + 2), power
+      complex(wp) :: power
+      complex(wp) :: term(n_term)
       real(wp) :: matrix(2*n_frequency, n_term), right(2*n_frequency), work(64*n_term)
       integer :: i, info
 
