@@ -28,9 +28,9 @@ module thud_material
       !> Maximum bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
       real(wp) :: bulk_ratio = 200.0_wp
       !> Law of viscosity: `none`, `kelvin_voigt`, `fractional`, `constant_loss` or `prony`.
-      character(len=name_length) :: viscosity = 'kelvin_voigt'
+      character(len=name_length) :: viscosity = 'fractional'
       !> Loss factor at `loss_frequency`.
-      real(wp) :: loss_factor = 0.2_wp
+      real(wp) :: loss_factor = 0.142_wp
       !> Frequency of the loss factor, Hz; there the ball's modulus of elasticity is the storage modulus.
       real(wp) :: loss_frequency = 74.0_wp
       !> Order of the derivative of a fractional law.
