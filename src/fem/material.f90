@@ -30,7 +30,7 @@ module thud_material
       !> Law of viscosity: `none`, `kelvin_voigt`, `fractional`, `constant_loss` or `prony`.
       character(len=name_length) :: viscosity = 'fractional'
       !> Loss factor at `loss_frequency`.
-      real(wp) :: loss_factor = 0.142_wp
+      real(wp) :: loss_factor = 0.143_wp
       !> Frequency of the loss factor, Hz; there the ball's modulus of elasticity is the storage modulus.
       real(wp) :: loss_frequency = 74.0_wp
       !> Order of the derivative of a fractional law.
