@@ -25,7 +25,7 @@ SPEED = np.sqrt(2 * 9.81)
 @pytest.fixture(scope="module")
 def finite_elements() -> thud.Impact:
     """Return a drop of the ball by finite elements: 1.6 kN, 19.3 ms."""
-    case = thud.read_case("inputs/rubber_ball_fe.nml")
+    case = thud.read_case("inputs/rubber_ball_fe_viscous.nml")
     return thud.solve_case(case)
 
 
