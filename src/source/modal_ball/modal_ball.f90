@@ -16,6 +16,7 @@ module thud_modal_ball
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm, dgemv
    use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_compression, only: compress_modal_ball
    use thud_mode_step, only: get_energy, mode_step_type, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
@@ -40,6 +41,7 @@ module thud_modal_ball
    type, extends(modal_ball_options_type) :: modal_ball_type
    contains
       procedure, pass(options) :: solve
+      procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
@@ -83,6 +85,22 @@ contains
 
       modulus = 1.6e6_wp
    end function get_paper_modulus
+
+   !> Force on each of two plates that press the ball slowly.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> Harmonics and rings.
+      class(modal_ball_type), intent(in) :: options
+      !> Approach of the plates, ascending, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The rings cannot be distinguished, or the ball lies on the outermost one.
+      type(error_type), allocatable, intent(out) :: error
+
+      call compress_modal_ball(ball, options, deflection, force, error)
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
