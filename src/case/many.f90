@@ -25,7 +25,7 @@ module thud_many
    public :: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
 
    !> Groups in whose keys drops may not differ: names, and what a run writes.
-   character(len=key_length), parameter :: common_groups(5) = [character(len=key_length) :: &
+   character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
       'case', 'model', 'modes', 'compression', 'output']
 
    !> Approximate time of one drop in a batch, s.

@@ -109,13 +109,28 @@ contains
          else
             halvings = halvings + 1
          end if
-         if (halvings > max_halvings) then
+         if (has_met(pressed)) then
+            error = numerical_error('&compression: max_deflection: at '//to_text(pressed%deflection) &
+               //' m the walls of the cavity meet; allowed: less')
+            return
+         else if (halvings > max_halvings) then
             error = numerical_error('&compression: max_deflection: no state of rest was found beyond ' &
                //to_text(pressed%deflection)//' m; allowed: less, or more polar_elements')
             return
          end if
       end do
    end subroutine press
+
+   !> Whether the cavity has closed somewhere between the plates.
+   pure function has_met(pressed) result(met)
+      type(pressed_ball_type), intent(in) :: pressed
+      !> A node of its lower half has come to the middle.
+      logical :: met
+
+      associate (middle => (pressed%diameter - pressed%deflection)/2)
+         met = any(pressed%body%mesh%z(:, 0) < -pressed%thickness .and. pressed%position(:, 0, 2) >= middle)
+      end associate
+   end function has_met
 
    !> Newton's method at one approach of the plates.
    subroutine find_rest(pressed, converged, error)
@@ -269,8 +284,7 @@ contains
 
    !> Derivatives of the forces, negative, with the gas at its pressure.
    subroutine get_tangent(pressed, fixed, width, band, failed)
-      !> The ball; it stays as it is.
-      type(pressed_ball_type), intent(inout) :: pressed
+      type(pressed_ball_type), intent(in) :: pressed
       !> Coordinates that are given; their rows become those of the unit matrix.
       logical, intent(in) :: fixed(0:, 0:, :)
       !> Diagonals on each side.
@@ -281,17 +295,15 @@ contains
       logical, intent(out) :: failed
       real(wp), dimension(0:ubound(fixed, 1), 0:ubound(fixed, 2), 2) :: here, there, moved
       type(pressed_ball_type) :: held
-      real(wp) :: pressure, step
+      real(wp) :: step
       integer :: i, j, k, first, second
 
       band = 0.0_wp
       step = trial*pressed%thickness
       held = pressed
-      pressure = get_gas_pressure(pressed%cavity, get_volume(pressed%position(:, 0, 1), pressed%position(:, 0, 2)))
       ! A gas whose pressure does not depend on its volume.
-      held%cavity%pressure = pressure
-      held%cavity%ambient = 0.0_wp
-      held%cavity%exponent = 0.0_wp
+      held%cavity = cavity_type(volume=1.0_wp, exponent=0.0_wp, pressure=get_gas_pressure(pressed%cavity, &
+         get_volume(pressed%position(:, 0, 1), pressed%position(:, 0, 2))))
       call get_forces(held, held%position, here, failed)
       do k = 1, 2
          do first = 0, 2

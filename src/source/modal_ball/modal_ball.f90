@@ -241,8 +241,7 @@ contains
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
       state%gravity = gravity
-      ! The ball has left for good when nothing touched for half a period of its slowest mode: its
-      ! surface may touch again while it swings back.
+      ! The surface may touch again while the slowest mode swings back, half a period later.
       quiet = 0.0_wp
       if (size(step%omega) > 0) quiet = pi/minval(step%omega)
       last = 0
