@@ -38,9 +38,9 @@ ModelName = Literal[
     "hunt_crossley",
 ]
 HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
-ModalBallDampingLaw = Literal["constant", "rising"]
+ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
-FiniteElementViscosity = Literal["none", "kelvin_voigt", "constant_loss", "prony"]
+FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
 FiniteElementTreatment = Literal["penalty", "impulse"]
 LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
@@ -230,11 +230,14 @@ class ModalBall(Group):
         Rings of the surface, from the lowest point to 60 degrees; 2 <= rings <=
         static_harmonics/3.
     damping_law : str
-        Loss factor against frequency; "constant", "rising".
+        Loss factor against frequency; "constant", "rising", "fractional".
     loss_factor : float
         Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9.
     loss_frequency : float
-        Frequency of a rising loss factor, Hz; 0.1 <= loss_frequency <= 100000.
+        Frequency of a loss factor that is not constant; of fractional also of the modulus, Hz; 0.1
+        <= loss_frequency <= 100000.
+    fractional_order : float
+        Order of the derivative, of fractional; 1: rising; 0 < fractional_order <= 1.
     cavity_gas : bool
         The gas in the cavity resists changes of its volume.
     contact_gravity : bool
@@ -251,6 +254,7 @@ class ModalBall(Group):
     damping_law: ModalBallDampingLaw = "constant"
     loss_factor: float = 0.1
     loss_frequency: float = 74.0
+    fractional_order: float = 0.3
     cavity_gas: bool = True
     contact_gravity: bool = False
     static_families: Sequence[int] = ()
@@ -283,12 +287,16 @@ class FiniteElement(Group):
         Maximum bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <=
         bulk_ratio <= 100000; group ``&material``.
     viscosity : str
-        Law of viscosity; "none", "kelvin_voigt", "constant_loss", "prony"; group ``&material``.
+        Law of viscosity; "none", "kelvin_voigt", "fractional", "constant_loss", "prony"; group
+        ``&material``.
     loss_factor : float
-        Loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss; 0 <
-        loss_factor <= 1; group ``&material``.
+        Loss factor at loss_frequency, of kelvin_voigt and fractional; over 10 to 1000 Hz, of
+        constant_l; 0 < loss_factor <= 1; group ``&material``.
     loss_frequency : float
         Where the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <= 10000; group
+        ``&material``.
+    fractional_order : float
+        Order of the derivative, of fractional; 1: kelvin_voigt; 0 < fractional_order <= 1; group
         ``&material``.
     prony_share : sequence of float
         Moduli over the long-term modulus, of prony; 0 <= prony_share <= 1000; group ``&material``.
@@ -317,6 +325,7 @@ class FiniteElement(Group):
     viscosity: FiniteElementViscosity = field(default="kelvin_voigt", metadata={"group": "material"})
     loss_factor: float = field(default=0.2, metadata={"group": "material"})
     loss_frequency: float = field(default=74.0, metadata={"group": "material"})
+    fractional_order: float = field(default=0.3, metadata={"group": "material"})
     prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
     prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
     treatment: FiniteElementTreatment = field(default="impulse", metadata={"group": "contact"})
@@ -437,9 +446,10 @@ KEYS = (
     Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "modes of each harmonic that oscillate", (), 1.0, 20.0, True),
     Key("modal_ball", "modal_ball", "static_harmonics", "whole", "", "highest harmonic whose static flexibility counts", (), 4.0, 400.0, True),
     Key("modal_ball", "modal_ball", "rings", "whole", "", "rings of the surface, from the lowest point to 60 degrees", (), 2.0, "static_harmonics/3", True),
-    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising')),
+    Key("modal_ball", "modal_ball", "damping_law", "choice", "", "loss factor against frequency", ('constant', 'rising', 'fractional')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9),
-    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a rising loss factor", (), 0.1, 100000.0),
+    Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency of a loss factor that is not constant; of fractional also of the modulus", (), 0.1, 100000.0),
+    Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, of fractional; 1: rising", (), 0.0, 1.0),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics", True),
@@ -452,9 +462,10 @@ KEYS = (
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
     Key("finite_element", "material", "mooney_share", "real", "", "part of the shear modulus with the second invariant, of mooney_rivlin", (), 0.0, 1.0),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
-    Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'constant_loss', 'prony')),
-    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
+    Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony')),
+    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt and fractional; over 10 to 1000 Hz, of constant_l", (), 0.0, 1.0),
     Key("finite_element", "material", "loss_frequency", "real", "Hz", "where the ball's modulus is the storage modulus", (), 1.0, 10000.0),
+    Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, of fractional; 1: kelvin_voigt", (), 0.0, 1.0),
     Key("finite_element", "material", "prony_share", "list", "", "moduli over the long-term modulus, of prony", (), 0.0, 1000.0),
     Key("finite_element", "material", "prony_time", "list", "s", "relaxation times, of prony", (), 0.0, 1000.0),
     Key("finite_element", "contact", "treatment", "choice", "", "how the floor holds the ball", ('penalty', 'impulse')),

@@ -35,6 +35,7 @@ class ModalBallOptions(SamplingOptions, total=False):
     damping_law: ModalBallDampingLaw
     loss_factor: float
     loss_frequency: float
+    fractional_order: float
     cavity_gas: bool
     contact_gravity: bool
     static_families: Sequence[int]
@@ -52,6 +53,7 @@ class FiniteElementOptions(SamplingOptions, total=False):
     viscosity: FiniteElementViscosity
     loss_factor: float
     loss_frequency: float
+    fractional_order: float
     prony_share: Sequence[float]
     prony_time: Sequence[float]
     treatment: FiniteElementTreatment

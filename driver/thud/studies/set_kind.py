@@ -23,8 +23,9 @@ from thud.studies.directory import FORMATS
 from thud.studies.evaluation import Block
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
-from thud.studies.sets import SetStudy, read_temperature
+from thud.studies.sets import SetStudy
 from thud.studies.study import table_of
+from thud.studies.temperature import read_temperature
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class SetKind(Kind[SetStudy, R]):
         written = given.get("format", _FILE_FORMATS[0])
         require_choice("format", written, _FILE_FORMATS)
         law = table_of(given, "temperature") if "temperature" in given else None
-        temperature = read_temperature(law, study.parameters)
+        temperature = read_temperature(law, study.case, study.parameters)
         design = read_design(table_of(given, "design"), self.designs, study.parameters)
         # Sets need neither snapshots nor free modes nor a compression.
         case = replace(study.case, modes=None, compression=None)

@@ -17,7 +17,8 @@ module thud_modal_ball
    use thud_lapack, only: dgemm, dgemv
    use thud_modal_ball_options, only: modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
-   use thud_mode_step, only: get_energy, mode_step_type, set_factors
+   use thud_modal_damping, only: set_damping
+   use thud_mode_step, only: advance, get_energies, mode_step_type, place_q, place_v, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
@@ -48,10 +49,8 @@ module thud_modal_ball
 
    !> Motion of the ball.
    type :: state_type
-      !> Amplitudes of the modes, m sqrt(kg): [n_mode].
-      real(wp), allocatable :: q(:)
-      !> Their rates: [n_mode].
-      real(wp), allocatable :: v(:)
+      !> Amplitudes of the modes, m sqrt(kg), their rates and strains of their branches: [n_mode, 2 + n_branch].
+      real(wp), allocatable :: motion(:, :)
       !> Height of the centre of mass, m.
       real(wp) :: height
       !> Its velocity upwards, m/s.
@@ -60,8 +59,8 @@ module thud_modal_ball
       real(wp) :: gravity = 0.0_wp
       !> Energy that damping has taken, J.
       real(wp) :: loss = 0.0_wp
-      !> Workspace of a step: motion at its beginning, push of the floor on the modes: [n_mode].
-      real(wp), allocatable, dimension(:) :: old_q, old_v, push
+      !> Workspace of a step: motion at its beginning; push of the floor on the modes: [n_mode].
+      real(wp), allocatable :: before(:, :), push(:)
       !> Gaps between rings and floor, m: [n_ring].
       real(wp), allocatable :: gap(:)
    end type state_type
@@ -154,10 +153,11 @@ contains
       response = interval/ball%mass
       call add_modes(ball, options, rings, interval, step, response, error)
       if (allocated(error)) return
-      allocate (zeta(size(step%omega)), source=options%loss_factor/2)
-      if (options%damping_law == 'rising') zeta = zeta*step%omega/(2*pi*options%loss_frequency)
+      allocate (zeta, mold=step%omega)
+      call set_damping(options, step, zeta)
       call set_factors(step, zeta, interval)
-      response = response + matmul(transpose(step%fall), spread(step%qv, 2, options%rings)*step%fall)
+      response = response + matmul(transpose(step%fall), spread(step%factor(:, place_q, place_v), 2, &
+         options%rings)*step%fall)
       call new_ring_contact(response, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
@@ -236,14 +236,16 @@ contains
 
       height = ball%outer_radius*rings%height
       radius = ball%outer_radius*rings%radius
-      allocate (state%q, state%v, state%old_q, state%old_v, state%push, source=0*step%omega)
+      allocate (state%motion(size(step%omega), 2 + size(step%time)), state%before(size(step%omega), 2 + size(step%time)), &
+         source=0.0_wp)
+      allocate (state%push, mold=step%omega)
       allocate (state%gap, mold=height)
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
       state%gravity = gravity
       ! The surface may touch again while the slowest mode swings back, half a period later.
       quiet = 0.0_wp
-      if (size(step%omega) > 0) quiet = pi/minval(step%omega)
+      if (size(step%omega) > 0) quiet = pi/(sqrt(step%spring)*minval(step%omega))
       last = 0
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
@@ -292,34 +294,33 @@ contains
       real(wp), intent(out) :: impulse
       !> The contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
-      integer :: n_mode
+      integer :: i, n_mode
 
       n_mode = size(step%omega)
-      associate (q => state%q, v => state%v, old_q => state%old_q, old_v => state%old_v, push => state%push, &
-         gap => state%gap)
-         old_q = q
-         old_v = v
-         q = step%qq*old_q + step%qv*old_v
-         v = step%vq*old_q + step%vv*old_v
+      associate (motion => state%motion, before => state%before, push => state%push, gap => state%gap)
+         before = motion
+         call advance(step, before, motion)
          push = 0.0_wp
          impulse = 0.0_wp
          state%height = state%height + interval*(state%speed - interval*state%gravity/2)
          state%speed = state%speed - interval*state%gravity
          gap = state%height - height
-         if (n_mode > 0) call dgemv('T', n_mode, size(height), -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
+         if (n_mode > 0) call dgemv('T', n_mode, size(height), -1.0_wp, step%fall, n_mode, motion, 1, 1.0_wp, gap, 1)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
          if (contact%last > 0) then
             impulse = sum(contact%impulse(:contact%last))
             if (n_mode > 0) call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
                0.0_wp, push, 1)
-            q = q - step%qv*push
-            v = v - step%vv*push
+            do i = 1, size(motion, 2)
+               motion(:, i) = motion(:, i) - step%factor(:, i, place_v)*push
+            end do
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
          end if
          ! The loss by damping lies between the impulse at the beginning and the end of the step.
-         state%loss = state%loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
+         before(:, place_v) = before(:, place_v) - push
+         state%loss = state%loss + sum(get_energies(step, before) - get_energies(step, motion))
       end associate
    end subroutine take_step
 
@@ -348,7 +349,7 @@ contains
       history%impulse_residual = abs(history%impulse - gain)/gain
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
-         + get_energy(step, state%q, state%v) + state%loss
+         + sum(get_energies(step, state%motion)) + state%loss
       history%energy_residual = abs(energy - initial)/initial
       if (.not. history%energy_residual <= max_energy_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
@@ -365,14 +366,16 @@ contains
       !> Number of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
+      real(wp) :: energy(size(step%omega))
       integer :: k, place
 
+      energy = get_energies(step, state%motion)
       history%deflection(i) = ball%outer_radius - state%height
       history%velocity(i) = -state%speed
       history%max_deflection = max(history%max_deflection, history%deflection(i))
-      do k = 1, size(state%q)
+      do k = 1, size(energy)
          place = 2 + min(step%harmonic(k), n_family)
-         history%channel(i, place) = history%channel(i, place) + (state%v(k)**2 + (step%omega(k)*state%q(k))**2)/2
+         history%channel(i, place) = history%channel(i, place) + energy(k)
       end do
    end subroutine record_motion
 

@@ -1,10 +1,13 @@
-!> Slow compression of the modal ball: the static flexibility of every harmonic under unilateral contact with two plates.
+!> Slow compression of the modal ball: the static flexibility of every harmonic, at the long-term modulus, under
+!> unilateral contact with two plates.
 module thud_modal_compression
    use thud_ball, only: ball_type
    use thud_error, only: error_type, numerical_error
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_damping, only: set_damping
+   use thud_mode_step, only: mode_step_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
    use thud_sphere_modes, only: basis_type, family_type, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
@@ -62,10 +65,17 @@ contains
       type(basis_type) :: basis
       type(family_type) :: family
       real(wp) :: response(options%rings, options%rings)
+      type(ball_type) :: relaxed
+      type(mode_step_type) :: no_modes
+      real(wp) :: no_damping(0)
       logical :: failed
       integer :: n
 
-      basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
+      allocate (no_modes%omega(0))
+      call set_damping(options, no_modes, no_damping)
+      relaxed = ball
+      relaxed%youngs_modulus = no_modes%spring*ball%youngs_modulus
+      basis = new_basis(relaxed, options%static_harmonics, options%cavity_gas)
       response = 0.0_wp
       ! Both poles are pressed alike: even harmonics move by twice the force, odd ones stay.
       do n = 0, options%static_harmonics, 2
