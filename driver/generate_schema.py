@@ -68,12 +68,13 @@ EXTRAS = {"ball": STANDARD_BALL}
 # Groups that a case may ask for.
 OPTIONAL = {
     "modes": "Free modes that are asked for.",
+    "compression": "Slow compression that is asked for.",
     "floor": "Floor over the room below: a homogeneous plate.",
     "room": "Room below the floor.",
 }
 # What uses the keys of such an owner.
-USERS = {"modes": "free modes", "floor": "the level in the room below"}
-USERS["room"] = USERS["floor"]
+USERS = {"modes": "free modes", "compression": "a slow compression"}
+USERS["floor"] = USERS["room"] = "the level in the room below"
 INDENT = " " * 8
 LONGEST = 100
 PAGE = """# Keys of an input file

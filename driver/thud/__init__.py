@@ -16,6 +16,7 @@ from thud._schema import *  # noqa: F403 - the groups and models that the librar
 from thud._schema import __all__ as _groups
 from thud.case import Case, read_case, write_case
 from thud.checks import suggestion
+from thud.compression import CompressionCurve, compress
 from thud.criteria import Conformity, Criterion
 from thud.display import MAKERS
 from thud.ensemble import solve_many
@@ -93,6 +94,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     *kinds.PUBLIC,
     "Bands",
     "Case",
+    "CompressionCurve",
     "Conformity",
     "Criterion",
     "Ensemble",
@@ -104,6 +106,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "NumericalError",
     "PlausibilityWarning",
     "ThudError",
+    "compress",
     "force_exposure_levels",
     "free_modes",
     "get_bands",
@@ -148,6 +151,8 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
+    compression=_maker("plot.compression", "compression"),
+    compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),

@@ -13,6 +13,7 @@ from thud.key import Group, Key
 
 __all__ = [
     "Ball",
+    "Compression",
     "Drop",
     "FiniteElement",
     "Floor",
@@ -30,6 +31,7 @@ __all__ = [
 ]
 
 # Choices of keys.
+CompressionGas = Literal["vented", "isothermal", "adiabatic"]
 ModelName = Literal[
     "hollow_sphere",
     "modal_ball",
@@ -239,6 +241,22 @@ class Room(Group):
     reverberation_times: Sequence[float] = ()
     air_density: float = 1.2
     sound_speed: float = 343.0
+class Compression(Group):
+    """Slow compression that is asked for.
+
+    Attributes
+    ----------
+    max_deflection : float
+        Maximum approach of the plates, m; 0 < max_deflection <= 10.
+    points : int
+        Points of the curve, the undeformed ball included; 2 <= points <= 10000.
+    gas : str
+        Gas in the ball: leaves by the hole, or is sealed in; "vented", "isothermal", "adiabatic".
+    """
+
+    max_deflection: float = 0.04
+    points: int = 41
+    gas: CompressionGas = "vented"
 
 
 @dataclass(frozen=True)
@@ -477,6 +495,9 @@ KEYS = (
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
     Key("modes", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0, True),
     Key("modes", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
+    Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 0.0, 10.0),
+    Key("compression", "compression", "points", "whole", "", "points of the curve, the undeformed ball included", (), 2.0, 10000.0, True),
+    Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves by the hole, or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 0.0, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 0.0, 1000.0),
     Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley')),

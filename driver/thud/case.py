@@ -15,6 +15,7 @@ from thud._schema import (
     KEYS,
     MODELS,
     Ball,
+    Compression,
     Drop,
     Floor,
     HollowSphere,
@@ -42,7 +43,7 @@ Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 LISTS = {key.name for key in KEYS if key.kind == "list"}
 # Groups of the level in the room below, and all that a case may ask for.
 BELOW: dict[str, type[Group]] = {"floor": Floor, "room": Room}
-OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **BELOW}
+OPTIONAL: dict[str, type[Group]] = {"modes": Modes, "compression": Compression, **BELOW}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
@@ -79,6 +80,8 @@ class Case(Group, Displayed):
         Options of the free modes; None: no free modes.
     floor, room : Floor and Room, or None
         Floor and room below; None: no level in a room.
+    compression : Compression or None
+        Options of the slow compression by the source model; None: no compression.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -93,13 +96,15 @@ class Case(Group, Displayed):
     modes: Modes | None = None
     floor: Floor | None = None
     room: Room | None = None
+    compression: Compression | None = None
 
     def __repr__(self) -> str:
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
         room = "room below" if self.room else ""
-        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, room)))}>"
+        press = "slow compression" if self.compression else ""
+        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, room, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -132,6 +137,8 @@ class Case(Group, Displayed):
         if self.modes:
             groups["modes"] = {"count": self.modes.count}
             groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
+        if self.compression:
+            groups["compression"] = vars(self.compression)
         if self.model:
             groups["model"] = {"name": self.model.name}
             groups |= {group: vars(getattr(self, group)) for group in GROUPS}
@@ -165,9 +172,11 @@ class Case(Group, Displayed):
         groups = {
             group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
         }
-        model = modes = None
+        model = modes = compression = None
         if "modes" in content:
             modes = Modes(**content["modes"], **content.get("mesh", {}))
+        if "compression" in content:
+            compression = Compression(**content["compression"])
         if "model" in content or not modes:
             name = content.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
@@ -182,7 +191,7 @@ class Case(Group, Displayed):
             if group in content
         }
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, **groups, **below)
+        return cls(name=title, model=model, modes=modes, compression=compression, **groups, **below)
 
 
 def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -37,6 +37,7 @@ contains
       allocate (fields, source=get_fields(case))
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
       case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
+      case%has_compression = any([(groups(i)%name == 'compression', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
       if (.not. allocated(error) .and. (case%has_room .neqv. any([(groups(i)%name == 'floor', i=1, size(groups))]))) then

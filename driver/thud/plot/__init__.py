@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from thud.free_modes import FreeModes
 from thud.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
+from thud.plot.compression import compression as compression
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
 from thud.plot.force_history import force_history as force_history

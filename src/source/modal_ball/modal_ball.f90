@@ -16,6 +16,7 @@ module thud_modal_ball
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm, dgemv
    use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: advance, get_energies, mode_step_type, place_q, place_v, set_factors
    use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
@@ -41,6 +42,7 @@ module thud_modal_ball
    type, extends(modal_ball_options_type) :: modal_ball_type
    contains
       procedure, pass(options) :: solve
+      procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
@@ -82,6 +84,22 @@ contains
 
       modulus = 1.6e6_wp
    end function get_paper_modulus
+
+   !> Force on each of two plates that press the ball slowly.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> Harmonics and rings.
+      class(modal_ball_type), intent(in) :: options
+      !> Approach of the plates, ascending, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The rings cannot be distinguished, or the ball lies on the outermost one.
+      type(error_type), allocatable, intent(out) :: error
+
+      call compress_modal_ball(ball, options, deflection, force, error)
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
@@ -225,8 +243,7 @@ contains
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
       state%gravity = gravity
-      ! The ball has left for good when nothing touched for half a period of its slowest mode: its
-      ! surface may touch again while it swings back.
+      ! The surface may touch again while the slowest mode swings back, half a period later.
       quiet = 0.0_wp
       if (size(step%omega) > 0) quiet = pi/(sqrt(step%spring)*minval(step%omega))
       last = 0
