@@ -363,7 +363,7 @@ class TwoMass(Group):
     area_growth : float
         Contact area over deflection of the patch, m; 0 <= area_growth <= 100.
     carcass_stiffness : float
-        Stiffness of the carcass, N/m^carcass_exponent; 0 <= carcass_stiffness <= 1e+15.
+        Force of the carcass over its deflection at 20 mm, N/m; 0 <= carcass_stiffness <= 1e+12.
     carcass_exponent : float
         Exponent of the deflection of the carcass; 1.5 <= carcass_exponent <= 5.
     contact_damping : float
@@ -380,11 +380,11 @@ class TwoMass(Group):
     belt_mass: float = 2.0
     inflation_pressure: float = 240000.0
     area_growth: float = 0.4
-    carcass_stiffness: float = 3000000.0
-    carcass_exponent: float = 2.0
-    contact_damping: float = 0.05
-    belt_frequency: float = 90.0
-    belt_damping: float = 0.1
+    carcass_stiffness: float = 90000.0
+    carcass_exponent: float = 2.5
+    contact_damping: float = 0.06
+    belt_frequency: float = 85.0
+    belt_damping: float = 0.2
 
 
 ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley | TwoMass
@@ -483,7 +483,7 @@ KEYS = (
     Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0),
     Key("two_mass", "two_mass", "inflation_pressure", "real", "Pa", "inflation pressure", (), 0.0, 100000000.0),
     Key("two_mass", "two_mass", "area_growth", "real", "m", "contact area over deflection of the patch", (), 0.0, 100.0),
-    Key("two_mass", "two_mass", "carcass_stiffness", "real", "", "stiffness of the carcass, N/m^carcass_exponent", (), 0.0, 1000000000000000.0),
+    Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass over its deflection at 20 mm", (), 0.0, 1000000000000.0),
     Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection of the carcass", (), 1.5, 5.0),
     Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping of the contact over its elastic force and velocity", (), 0.0, 100.0),
     Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall, the rim held", (), 0.0, 1000000.0),

@@ -68,7 +68,7 @@ class Case(Group, Displayed):
     ----------
     name : str
         Name of the case, also of its output directory.
-    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley or None
+    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.

@@ -1,6 +1,6 @@
 !> A tyre as two masses: the belt on its contact patch, and the rim on the belt. The patch carries inflation pressure
-!> times contact area and the carcass, F = (p w d + c d^n)(1 + a d'), never pulled; rim and belt are joined by the
-!> sidewall, a linear spring with viscous damping (the residual stiffness and rigid ring of tyre dynamics).
+!> times contact area and the carcass, F = (p w d + c d (d/d0)^(n - 1))(1 + a d'), and is never pulled; rim and belt are
+!> joined by the sidewall, a linear spring with viscous damping (residual stiffness and rigid ring of tyre dynamics).
 module thud_two_mass
    use thud_ball, only: ball_type
    use thud_constants, only: pi
@@ -32,6 +32,9 @@ module thud_two_mass
    !> Steps of one record; more would run for minutes.
    real(wp), parameter :: max_steps = 1.0e8_wp
 
+   !> Deflection d0 at which the stiffness of the carcass is given, m.
+   real(wp), parameter :: carcass_deflection = 0.02_wp
+
    !> Options of the model; the defaults are the standards' tyre, see docs/lumped_models.md.
    type, extends(source_model_type) :: two_mass_type
       !> Mass of belt and tread, kg; the rest of the mass is the rim.
@@ -40,16 +43,16 @@ module thud_two_mass
       real(wp) :: inflation_pressure = 2.4e5_wp
       !> Contact area over deflection w, m.
       real(wp) :: area_growth = 0.40_wp
-      !> Stiffness c of the carcass, N/m^carcass_exponent.
-      real(wp) :: carcass_stiffness = 3.0e6_wp
+      !> Stiffness c of the carcass, force over deflection at `carcass_deflection`, N/m.
+      real(wp) :: carcass_stiffness = 9.0e4_wp
       !> Exponent n of the carcass.
-      real(wp) :: carcass_exponent = 2.0_wp
+      real(wp) :: carcass_exponent = 2.5_wp
       !> Damping a of the contact, s/m.
-      real(wp) :: contact_damping = 0.05_wp
+      real(wp) :: contact_damping = 0.06_wp
       !> Natural frequency of the belt on the sidewall, the rim held, Hz.
-      real(wp) :: belt_frequency = 90.0_wp
+      real(wp) :: belt_frequency = 85.0_wp
       !> Damping ratio of the same motion.
-      real(wp) :: belt_damping = 0.1_wp
+      real(wp) :: belt_damping = 0.2_wp
    contains
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
@@ -62,8 +65,8 @@ module thud_two_mass
       real(wp) :: belt_mass, rim_mass
       !> Stiffness of the inflated patch p w, N/m.
       real(wp) :: patch_stiffness
-      !> Stiffness of the carcass, N/m^exponent, and its exponent.
-      real(wp) :: carcass_stiffness, carcass_exponent
+      !> Factor of the carcass, N/m^exponent, and its exponent.
+      real(wp) :: carcass_factor, carcass_exponent
       !> Damping of the contact, s/m.
       real(wp) :: contact_damping
       !> Stiffness, N/m, and damping, N s/m, of the sidewall.
@@ -88,8 +91,8 @@ contains
          '(0, 1000000)'), &
          real_field('inflation_pressure', options%inflation_pressure, 'Pa', 'inflation pressure', '[0, 1e8]'), &
          real_field('area_growth', options%area_growth, 'm', 'contact area over deflection of the patch', '[0, 100]'), &
-         real_field('carcass_stiffness', options%carcass_stiffness, '', &
-         'stiffness of the carcass, N/m^carcass_exponent', '[0, 1e15]'), &
+         real_field('carcass_stiffness', options%carcass_stiffness, 'N/m', &
+         'force of the carcass over its deflection at 20 mm', '[0, 1e12]'), &
          real_field('carcass_exponent', options%carcass_exponent, '', 'exponent of the deflection of the carcass', &
          '[1.5, 5]'), &
          real_field('contact_damping', options%contact_damping, 's/m', &
@@ -113,7 +116,7 @@ contains
             //'&ball mass = '//to_text(ball%mass)//' kg')
       else if (.not. options%inflation_pressure*options%area_growth + options%carcass_stiffness > 0.0_wp) then
          error = input_error('&two_mass: carcass_stiffness = '//to_text(options%carcass_stiffness) &
-            //' with inflation_pressure = '//to_text(options%inflation_pressure)//' Pa and area_growth = ' &
+            //' N/m with inflation_pressure = '//to_text(options%inflation_pressure)//' Pa and area_growth = ' &
             //to_text(options%area_growth)//' m bears no load; allowed: a carcass or an inflated patch')
       end if
    end subroutine check
@@ -185,8 +188,9 @@ contains
       omega = 2*pi*options%belt_frequency
       tyre = tyre_type(belt_mass=options%belt_mass, rim_mass=mass - options%belt_mass, &
          patch_stiffness=options%inflation_pressure*options%area_growth, &
-         carcass_stiffness=options%carcass_stiffness, carcass_exponent=options%carcass_exponent, &
-         contact_damping=options%contact_damping, sidewall_stiffness=options%belt_mass*omega**2, &
+         carcass_factor=options%carcass_stiffness/carcass_deflection**(options%carcass_exponent - 1), &
+         carcass_exponent=options%carcass_exponent, contact_damping=options%contact_damping, &
+         sidewall_stiffness=options%belt_mass*omega**2, &
          sidewall_damping=2*options%belt_damping*options%belt_mass*omega)
    end function new_tyre
 
@@ -199,7 +203,7 @@ contains
       real(wp) :: rate
       real(wp) :: energy, deflection, power
 
-      associate (n => tyre%carcass_exponent, c => tyre%carcass_stiffness, k => tyre%patch_stiffness)
+      associate (n => tyre%carcass_exponent, c => tyre%carcass_factor, k => tyre%patch_stiffness)
          ! The patch can at most store all of the energy.
          energy = (tyre%belt_mass + tyre%rim_mass)/2*impact_velocity**2
          deflection = huge(1.0_wp)
@@ -253,7 +257,7 @@ contains
       if (.not. tyre%touching) return
       associate (d => state(at_belt))
          parts(1) = tyre%patch_stiffness*d
-         parts(2) = tyre%carcass_stiffness*sign(abs(d)**tyre%carcass_exponent, d)
+         parts(2) = tyre%carcass_factor*sign(abs(d)**tyre%carcass_exponent, d)
          ! The floor does not pull.
          parts(3) = max(-1.0_wp, tyre%contact_damping*state(at_belt_velocity))*sum(parts(1:2))
       end associate
