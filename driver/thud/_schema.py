@@ -28,6 +28,7 @@ __all__ = [
     "Modes",
     "Room",
     "Sampling",
+    "TwoMass",
 ]
 
 # Choices of keys.
@@ -38,6 +39,7 @@ ModelName = Literal[
     "finite_element",
     "measured_modes",
     "hunt_crossley",
+    "two_mass",
 ]
 HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
 ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
@@ -442,7 +444,44 @@ class HuntCrossley(Group):
     restitution: float = 0.0
 
 
-ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley
+@dataclass(frozen=True)
+class TwoMass(Group):
+    """Options of the source model ``two_mass``.
+
+    Attributes
+    ----------
+    belt_mass : float
+        Mass of belt and tread, less than the mass of the source, kg; 0 < belt_mass < 1e+06.
+    inflation_pressure : float
+        Inflation pressure, Pa; 0 <= inflation_pressure <= 1e+08.
+    area_growth : float
+        Contact area over deflection of the patch, m; 0 <= area_growth <= 100.
+    carcass_stiffness : float
+        Force of the carcass over its deflection at 20 mm, N/m; 0 <= carcass_stiffness <= 1e+12.
+    carcass_exponent : float
+        Exponent of the deflection of the carcass; 1.5 <= carcass_exponent <= 5.
+    contact_damping : float
+        Damping of the contact over its elastic force and velocity, s/m; 0 <= contact_damping <=
+        100.
+    belt_frequency : float
+        Natural frequency of the belt on the sidewall, the rim held, Hz; 0 < belt_frequency <=
+        1e+06.
+    belt_damping : float
+        Damping ratio of the same motion; 0 <= belt_damping <= 10.
+    """
+
+    name: ClassVar[ModelName] = "two_mass"
+    belt_mass: float = 2.0
+    inflation_pressure: float = 240000.0
+    area_growth: float = 0.4
+    carcass_stiffness: float = 90000.0
+    carcass_exponent: float = 2.5
+    contact_damping: float = 0.06
+    belt_frequency: float = 85.0
+    belt_damping: float = 0.2
+
+
+ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley | TwoMass
 
 # Source models by name, the default first.
 MODELS: dict[str, type[ModelOptions]] = {
@@ -451,6 +490,7 @@ MODELS: dict[str, type[ModelOptions]] = {
     FiniteElement.name: FiniteElement,
     MeasuredModes.name: MeasuredModes,
     HuntCrossley.name: HuntCrossley,
+    TwoMass.name: TwoMass,
 }
 
 # Groups that every model uses.
@@ -500,7 +540,7 @@ KEYS = (
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves by the hole, or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 0.0, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 0.0, 1000.0),
-    Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley')),
+    Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic whose modes oscillate", (), 2.0, 200.0, True),
     Key("modal_ball", "modal_ball", "radial_modes", "whole", "", "modes of each harmonic that oscillate", (), 1.0, 20.0, True),
@@ -540,6 +580,14 @@ KEYS = (
     Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection", (), 1.0, 5.0),
     Key("hunt_crossley", "hunt_crossley", "damping", "real", "s/m", "damping alpha; 0: from restitution", (), 0.0, 100.0),
     Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "wanted coefficient of restitution; 0: from damping", (), 0.0, 1.0),
+    Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0),
+    Key("two_mass", "two_mass", "inflation_pressure", "real", "Pa", "inflation pressure", (), 0.0, 100000000.0),
+    Key("two_mass", "two_mass", "area_growth", "real", "m", "contact area over deflection of the patch", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass over its deflection at 20 mm", (), 0.0, 1000000000000.0),
+    Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection of the carcass", (), 1.5, 5.0),
+    Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping of the contact over its elastic force and velocity", (), 0.0, 100.0),
+    Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall, the rim held", (), 0.0, 1000000.0),
+    Key("two_mass", "two_mass", "belt_damping", "real", "", "damping ratio of the same motion", (), 0.0, 10.0),
     Key("", "sampling", "sample_rate", "real", "Hz", "samples per second", (), 2000.0, 10000000.0),
     Key("", "sampling", "duration", "real", "s", "length of the record from first touch", (), 0.001, 10.0),
     Key("", "sampling", "substeps", "whole", "", "integration steps per sampling interval", (), 1.0, 10000.0, True),

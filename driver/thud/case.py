@@ -41,9 +41,9 @@ if TYPE_CHECKING:
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
-# Groups of the level in the room below, and all that a case may ask for.
-BELOW: dict[str, type[Group]] = {"floor": Floor, "room": Room}
-OPTIONAL: dict[str, type[Group]] = {"modes": Modes, "compression": Compression, **BELOW}
+# Groups that an impact may have, and all that a case may ask for.
+FURTHER: dict[str, type[Group]] = {"compression": Compression, "floor": Floor, "room": Room}
+OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **FURTHER}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
@@ -74,7 +74,7 @@ class Case(Group, Displayed):
     ----------
     name : str
         Name of the case, also of its output directory.
-    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley or None
+    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
@@ -137,8 +137,6 @@ class Case(Group, Displayed):
         if self.modes:
             groups["modes"] = {"count": self.modes.count}
             groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
-        if self.compression:
-            groups["compression"] = vars(self.compression)
         if self.model:
             groups["model"] = {"name": self.model.name}
             groups |= {group: vars(getattr(self, group)) for group in GROUPS}
@@ -152,7 +150,7 @@ class Case(Group, Displayed):
                     )
                     raise InputError(message)
                 values[option.name] = value
-        groups |= {group: vars(given) for group in BELOW if (given := getattr(self, group))}
+        groups |= {group: vars(given) for group in FURTHER if (given := getattr(self, group))}
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
@@ -172,11 +170,9 @@ class Case(Group, Displayed):
         groups = {
             group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
         }
-        model = modes = compression = None
+        model = modes = None
         if "modes" in content:
             modes = Modes(**content["modes"], **content.get("mesh", {}))
-        if "compression" in content:
-            compression = Compression(**content["compression"])
         if "model" in content or not modes:
             name = content.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
@@ -185,13 +181,13 @@ class Case(Group, Displayed):
                 if option.name in given:
                     options[option.name] = given[option.name]
             model = MODELS[name](**_with_lists(options))
-        below: dict[str, Any] = {
+        further: dict[str, Any] = {
             group: kind(**_with_lists(content[group]))
-            for group, kind in BELOW.items()
+            for group, kind in FURTHER.items()
             if group in content
         }
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, compression=compression, **groups, **below)
+        return cls(name=title, model=model, modes=modes, **groups, **further)
 
 
 def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -59,12 +59,17 @@ def test_known_parameters_come_back() -> None:
             {},
         ),
         (
+            thud.Case(model=thud.TwoMass(belt_mass=1.0)),
+            {"inflation_pressure": 2.3e5, "contact_damping": 0.07},
+            {},
+        ),
+        (
             thud.Case(model=thud.MeasuredModes((23.0, 80.0), (0.05, 0.1), (2.4, 0.1))),
             {"frequency(1)": 24.0, "frequency(2)": 89.0, "damping_ratio(2)": 0.05},
             {},
         ),
     ],
-    ids=["modal_ball", "finite_element", "hunt_crossley", "measured_modes"],
+    ids=["modal_ball", "finite_element", "hunt_crossley", "two_mass", "measured_modes"],
 )
 def test_every_model_can_be_fitted(
     case: thud.Case, truth: dict[str, float], starts: dict[str, float]

@@ -15,6 +15,7 @@ names: tuple[thud.ModelName, ...] = ("hollow_sphere", "modal_ball")
 ball = thud.Ball(outer_radius=thud.quantity("8.9 cm"))
 impacts: dict[str, thud.Impact] = {name: thud.solve(ball, model=name) for name in names}
 lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
+tyre: thud.ModelOptions = thud.TwoMass(belt_mass=1.0)
 impacts["lumped"] = thud.solve(ball, thud.Drop(height=1.0), lumped)
 flagship = thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt")
 motion: thud.Motion | None = flagship.motion
