@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.recordings.read_recording import read_recording as read_recording
     from thud.recordings.recording import Recording as Recording
-    from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
     from thud.studies.design_map import DesignMap as DesignMap
     from thud.studies.design_map import design_map as design_map
@@ -71,7 +71,7 @@ _LATE = {
     "read_all": "comparison",
     "Recording": "recordings.recording",
     "quantity": "units",
-    "read_recording": "recordings.recording",
+    "read_recording": "recordings.read_recording",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,

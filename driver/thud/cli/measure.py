@@ -21,7 +21,7 @@ NOT_CONFORMING = 3
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings import results  # noqa: PLC0415 - SciPy takes its time
-    from thud.recordings.recording import read_recording  # noqa: PLC0415
+    from thud.recordings.read_recording import read_recording  # noqa: PLC0415
 
     recording = read_recording(
         options.drops,

@@ -13,6 +13,7 @@ from thud.checks import refuse, require_choice, require_number, shown
 from thud.levels import SOURCES, get_bands, judge
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
+from thud.recordings.plate import Plate
 from thud.recordings.reading import regular_file
 from thud.recordings.units import read_chain, require_unit
 
@@ -44,6 +45,11 @@ class PlateConfig:
     f0: float
     Q: float
     f0_uncertainty: float | None = None
+
+    @property
+    def resonance(self) -> Plate:
+        """The resonance that is corrected; an uncertainty that is not known counts as zero."""
+        return Plate(self.f0, self.Q, frequency_uncertainty=self.f0_uncertainty or 0.0)
 
 
 @dataclass(frozen=True)
@@ -114,6 +120,15 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
     _require_known(given, [one.name for one in fields(Config)], name)
     return Config(**{key: check_key(key, value, f"{name}: {key}") for key, value in given.items()})
+
+
+def checked_config(config: Config) -> Config:
+    """Return a configuration; raise InputError where a number is not within its range."""
+    for key in NUMBERS:
+        value = getattr(config, key, None)
+        if value is not None:
+            check_key(key, value, key)
+    return config
 
 
 def _require_known(given: Mapping[str, object], known: list[str], place: str) -> None:

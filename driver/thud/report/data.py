@@ -10,8 +10,7 @@ import numpy as np
 
 from thud._api import version
 from thud.levels import BANDWIDTHS, get_bands, judge
-from thud.recordings.recording import _plate
-from thud.recordings.verdict import CONFIDENCE, level_quantities
+from thud.recordings.verdict import CONFIDENCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from thud._schema import BandSet, LimitsSource
     from thud.recordings.estimates import Drop, Estimate
     from thud.recordings.recording import Recording
-    from thud.recordings.verdict import Decision, Quantity
+    from thud.recordings.verdict import Decision
 
 FORMAT = "thud calibration report 1"
 DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
@@ -81,16 +80,6 @@ def criteria_data(recording: Recording, source: LimitsSource | None = None) -> l
     verdict = recording.conformity(source)
     found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.decisions))
     return found
-
-
-def level_budgets(recording: Recording, bands: BandSet) -> tuple[Quantity, ...]:
-    """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
-    plate = _plate(recording.config)
-    return level_quantities(
-        recording.average(bands),
-        recording.calibration_uncertainty,
-        plate.level_uncertainty(bands) if plate else None,
-    )
 
 
 def read_date(text: str) -> datetime | None:
@@ -164,7 +153,7 @@ def _criteria(
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     """Return the levels of the average and of the drops."""
-    average, budgets = recording.average(bands), level_budgets(recording, bands)
+    average, budgets = recording.average(bands), recording.level_quantities(bands)
     columns = ("background", "spread", "flag", "drops")
     return {
         "band": get_bands(bands).nominal.tolist(),
