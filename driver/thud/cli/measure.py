@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -23,6 +24,7 @@ def measure(options: argparse.Namespace) -> int:
     from thud.recordings import results  # noqa: PLC0415 - SciPy takes its time
     from thud.recordings.read_recording import read_recording  # noqa: PLC0415
 
+    folder = Path(options.output or Path("outputs", Path(options.drops[0]).stem))
     recording = read_recording(
         options.drops,
         height=options.height,
@@ -36,9 +38,10 @@ def measure(options: argparse.Namespace) -> int:
         sample_rate=options.sample_rate,
         config=options.config,
         progress=not options.quiet and sys.stderr.isatty(),
+        workers=options.workers or len(os.sched_getaffinity(0)),
+        keep=folder,
     )
     verdict = recording.conformity()
-    folder = Path(options.output or Path("outputs", recording.name))
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", ReportWarning)
         results.save(recording, folder, figures=not options.no_figures)
@@ -84,10 +87,14 @@ MEASURE = Command(
             "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
         ),
         argument("--sample-rate", type=float, metavar="HZ", help="where the file does not say it"),
+        argument(
+            "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
+        ),
         output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
         NO_FIGURES,
         QUIET,
     ),
     measure,
+    "drops that were measured are taken up by the same command",
 )

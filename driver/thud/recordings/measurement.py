@@ -3,24 +3,36 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from threadpoolctl import threadpool_limits
+from tqdm import tqdm
 
 from thud.checks import refuse
+from thud.errors import NumericalError
+from thud.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Estimate, measure_drop
+from thud.recordings.kept import KeptDrops
 from thud.recordings.plate import REACH
 from thud.recordings.plate_correction import correct_window
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    import os
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
     from thud.recordings.config import Config
     from thud.recordings.drops import Window
     from thud.recordings.estimates import Drop
     from thud.recordings.signal import Signal
+
+# Drops that are worth a process of their own, which takes about two seconds to start.
+WORTH = 20
 
 
 @dataclass(frozen=True)
@@ -66,11 +78,17 @@ class Origin:
 
 
 def measure_signals(
-    signals: Iterable[Signal], config: Config, *, progress: bool = False
+    signals: Iterable[Signal],
+    config: Config,
+    *,
+    progress: bool = False,
+    workers: int = 1,
+    keep: str | os.PathLike[str] | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
-    The last is the largest of the signals, and None where it is not known of one.
+    The last is the largest of the signals, and None where it is not known of one. The others are
+    those of `read_recording`.
 
     Raises
     ------
@@ -80,21 +98,69 @@ def measure_signals(
     drops: list[Drop] = []
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
-    for given in signals:
-        signal = given
-        if config.calibration_uncertainty is not None:
-            signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
-        # Its many small products are slower by threads.
-        with threadpool_limits(1, "blas"):
+    # Its many small products are slower by threads.
+    with threadpool_limits(1, "blas"), KeptDrops(keep) as kept:
+        for given in signals:
+            signal = given
+            if config.calibration_uncertainty is not None:
+                signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
             windows = find_windows(signal, progress=progress)
-            drops += [measure_window(window, config) for window in windows]
-        uncertainties.append(signal.calibration_uncertainty)
-        origins.append(Origin.of(signal, len(windows)))
+            drops += _measure(windows, config, kept, progress=progress, workers=workers)
+            uncertainties.append(signal.calibration_uncertainty)
+            origins.append(Origin.of(signal, len(windows)))
     if not drops:
         refuse("there are no recordings", "one file or more")
     known = [one for one in uncertainties if one is not None]
     uncertainty = max(known) if len(known) == len(uncertainties) else None
     return tuple(drops), tuple(origins), uncertainty
+
+
+def _measure(
+    windows: Sequence[Window], config: Config, kept: KeptDrops, *, progress: bool, workers: int
+) -> list[Drop]:
+    """Return the drops in the windows of one signal, those that are kept among them."""
+    signal = windows[0].signal
+    found = kept.open(signal, config)
+    left = [window for window in windows if window.start not in found]
+    # An array would go to the processes with each of its windows.
+    width = min(workers, len(left) // WORTH) if signal.path else 1
+    with (
+        tqdm(
+            total=len(windows), initial=len(windows) - len(left), unit="drop", desc=signal.name,
+            disable=not progress,
+        ) as bar,
+        _calls(partial(measure_window, config=config), left, width) as results,
+    ):  # fmt: skip
+        for window, drop in zip(left, results, strict=True):
+            kept.add(window.start, drop)
+            found[window.start] = drop
+            bar.update()
+    return [found[window.start] for window in windows]
+
+
+@contextmanager
+def _calls(
+    measure: Callable[[Window], Drop], windows: Sequence[Window], width: int
+) -> Iterator[Iterator[Drop]]:
+    """Yield the results of calls in order, of more than one process where the width is larger."""
+    if width <= 1:
+        yield map(measure, windows)
+        return
+    with process_pool(width, partial(threadpool_limits, 1, "blas")) as pool:
+        with no_interrupt_in_processes():
+            calls = deque(pool.submit(measure, window) for window in windows)
+        try:
+            # What was taken is dropped, so that it is not held twice.
+            yield (calls.popleft().result() for _ in windows)
+        except BrokenExecutor as error:
+            message = (
+                f"{windows[0].signal.name}: a process that measured drops has died; allowed: "
+                "measure again, or with one worker"
+            )
+            raise NumericalError(message) from error
+        finally:
+            for call in calls:
+                call.cancel()
 
 
 def measure_window(window: Window, config: Config) -> Drop:

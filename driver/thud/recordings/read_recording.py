@@ -6,6 +6,8 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from thud.checks import require_whole
+from thud.ensemble import MAX_THREADS
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.reading import open_signals
 from thud.recordings.recording import Recording
@@ -30,6 +32,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     sample_rate: float | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
+    workers: int = 1,
+    keep: str | os.PathLike[str] | None = None,
 ) -> Recording:
     """Read recorded drops of one source, from any number of files with one or many drops each.
 
@@ -50,7 +54,14 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     config
         Configuration of the laboratory, or its file; the other arguments come first.
     progress
-        Show a progress bar.
+        Show progress bars.
+    workers
+        Processes that measure the drops of one file. Scripts that ask for more than one run their
+        own work below ``if __name__ == "__main__":``.
+    keep
+        Directory in which measured drops are kept while others are measured. After an interrupt
+        the same call measures only what is left; files or a configuration that have changed begin
+        again. At the end the directory is as it was.
 
     Returns
     -------
@@ -68,6 +79,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         "polarity": polarity, "sample_rate": sample_rate,
     }  # fmt: skip
     given = {key: value for key, value in given.items() if value is not None}
+    require_whole("workers", workers, 1, MAX_THREADS)
     known = checked_config(replace(known, **given))
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
     signals = (
@@ -82,4 +94,4 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
             sample_rate=known.sample_rate,
         )
     )
-    return Recording.from_signals(signals, known, progress=progress)
+    return Recording.from_signals(signals, known, progress=progress, workers=workers, keep=keep)

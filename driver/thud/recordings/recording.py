@@ -109,10 +109,24 @@ class Recording(Displayed):
 
     @classmethod
     def from_signals(
-        cls, signals: Iterable[Signal], config: Config, *, progress: bool = False
+        cls,
+        signals: Iterable[Signal],
+        config: Config,
+        *,
+        progress: bool = False,
+        workers: int = 1,
+        keep: str | os.PathLike[str] | None = None,
     ) -> Recording:
-        """Measure the drops of signals; raise InputError where that is not possible."""
-        drops, origins, uncertainty = measure_signals(signals, config, progress=progress)
+        """Measure the drops of signals; the other arguments are those of `read_recording`.
+
+        Raises
+        ------
+        InputError
+            One sentence: what cannot be measured.
+        """
+        drops, origins, uncertainty = measure_signals(
+            signals, config, progress=progress, workers=workers, keep=keep
+        )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)
 
