@@ -250,10 +250,11 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
             weight = other.uncertainty**2 / (by.uncertainty**2 + scale**2 + other.uncertainty**2)
             expected = weight * by.value + (1 - weight) * other.value
             assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
-            assert drop.restitution_calibration == pytest.approx(weight * scale, rel=1e-9)
+            found = drop.restitution_shared.get("calibration", 0.0)
+            assert found == pytest.approx(weight * scale, rel=1e-9)
         budget = recording.quantities["restitution"].contributions
         shares = {part.name: part.uncertainty for part in budget}
-        mean = np.mean([drop.restitution_calibration for drop in recording.drops])
+        mean = np.mean([d.restitution_shared.get("calibration", 0.0) for d in recording.drops])
         assert shares.get("calibration", 0.0) == pytest.approx(mean)
 
 

@@ -134,7 +134,7 @@ def _draw_drops(
     axes: Axes, x: NDArray[np.float64], curves: NDArray[np.float64], recording: Recording
 ) -> None:
     """Draw the curves of the drops, shape (n_drop, n), or their range; outliers in their style."""
-    deviant = {outlier.name for outlier in recording.average().outliers}
+    deviant = {outlier.name for outlier in recording.outliers}
     marked = np.array([drop.name in deviant for drop in recording.drops])
     count = len(curves)
     if count > MAX_LINES:

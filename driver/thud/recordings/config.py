@@ -77,6 +77,8 @@ class Config:
         that of the `Calibration`.
     mass, height : float or None
         Mass of the ball, kg, and drop height, m.
+    mass_uncertainty, height_uncertainty : float or None
+        Their standard uncertainties, kg and m; None where they are not known.
     plate : PlateConfig or None
         Resonance that is corrected.
     limits : mapping
@@ -98,6 +100,8 @@ class Config:
     sample_rate: float | None = None
     mass: float | None = None
     height: float | None = None
+    mass_uncertainty: float | None = None
+    height_uncertainty: float | None = None
     plate: PlateConfig | None = None
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -154,6 +158,8 @@ NUMBERS = {
     "sample_rate": (1.0, 1e9),
     "mass": (0.01, 1000.0),
     "height": (0.001, 100.0),
+    "mass_uncertainty": (0.0, 100.0),
+    "height_uncertainty": (0.0, 10.0),
     "f0": (1.0, 1e6),
     "Q": (0.5, 1e6),
     "f0_uncertainty": (0.0, 0.5),

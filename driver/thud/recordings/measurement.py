@@ -173,6 +173,8 @@ def measure_window(window: Window, config: Config) -> Drop:
         height=config.height,
         mass=config.mass,
         calibration_uncertainty=window.signal.calibration_uncertainty or 0.0,
+        mass_uncertainty=config.mass_uncertainty or 0.0,
+        height_uncertainty=config.height_uncertainty or 0.0,
     )
     if config.plate is None:
         return drop

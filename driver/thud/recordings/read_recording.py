@@ -23,6 +23,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     *,
     height: float | None = None,
     mass: float | None = None,
+    height_uncertainty: float | None = None,
+    mass_uncertainty: float | None = None,
     source: LimitsSource | None = None,
     channel: int | str | None = None,
     unit: str | None = None,
@@ -45,6 +47,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         Drop height, m.
     mass
         Mass of the source, kg. With both, restitution follows from the impulse.
+    height_uncertainty, mass_uncertainty
+        Their standard uncertainties, m and kg.
     source
         Source whose limits apply, ``"rubber_ball"`` or ``"tyre"``.
     channel, unit, calibration, polarity, sample_rate
@@ -74,7 +78,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     """
     known = config if isinstance(config, Config) else read_config(config) if config else Config()
     given: dict[str, Any] = {
-        "height": height, "mass": mass, "source": source, "channel": channel, "unit": unit,
+        "height": height, "mass": mass, "height_uncertainty": height_uncertainty,
+        "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel, "unit": unit,
         "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
         "polarity": polarity, "sample_rate": sample_rate,
     }  # fmt: skip

@@ -16,7 +16,7 @@ from thud.recordings.config import Config, checked_config
 from thud.recordings.excursion import doubt, scan
 from thud.recordings.levels import average_levels, compare_methods, measure_levels
 from thud.recordings.measurement import measure_signals
-from thud.recordings.quantities import drop_quantities
+from thud.recordings.quantities import drop_quantities, find_deviant, told_restitution
 from thud.recordings.signal import Signal
 from thud.recordings.verdict import decide, level_quantities
 
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from thud.recordings.estimates import Drop
     from thud.recordings.levels import AverageLevels
     from thud.recordings.measurement import Origin
+    from thud.recordings.outliers import Outlier
     from thud.recordings.verdict import Quantity, Verdict
 
 
@@ -81,6 +82,8 @@ class Recording(Displayed):
         *,
         height: float | None = None,
         mass: float | None = None,
+        height_uncertainty: float | None = None,
+        mass_uncertainty: float | None = None,
         calibration_uncertainty: float | None = None,
         name: str = "recording",
     ) -> Recording:
@@ -92,7 +95,7 @@ class Recording(Displayed):
             Force, N, positive in compression, with quiet before and after each drop.
         sample_rate
             Samples per second, Hz.
-        height, mass, calibration_uncertainty, name
+        height, mass, height_uncertainty, mass_uncertainty, calibration_uncertainty, name
             As `read_recording` takes them.
 
         Raises
@@ -101,7 +104,13 @@ class Recording(Displayed):
             One sentence: what cannot be measured.
         """
         config = checked_config(
-            Config(height=height, mass=mass, calibration_uncertainty=calibration_uncertainty)
+            Config(
+                height=height,
+                mass=mass,
+                height_uncertainty=height_uncertainty,
+                mass_uncertainty=mass_uncertainty,
+                calibration_uncertainty=calibration_uncertainty,
+            )
         )
         signal = Signal.from_array(force, sample_rate, name)
         doubts = doubt(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
@@ -184,17 +193,23 @@ class Recording(Displayed):
         """What is doubtful: of files, drops and levels; a sentence each."""
         found = [remark for one in self.origins for remark in one.remarks]
         found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
-        found += [str(outlier) for outlier in self.average().outliers]
-        plate = self.config.plate
+        found += map(str, self.outliers)
+        config = self.config
         missing = {
             "calibration": self.calibration_uncertainty is None,
-            "resonance of the plate": plate is not None and plate.f0_uncertainty is None,
+            "resonance of the plate": config.plate is not None
+            and config.plate.f0_uncertainty is None,
+            "mass": config.mass is not None and config.mass_uncertainty is None,
+            "drop height": config.height is not None and config.height_uncertainty is None,
         }
         if math.isnan(self.quantities["peaks"].value):
             found.append("the number of peaks is not known: noise may have made some")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
         if 0 < known < len(self.drops):
             found.append(f"the restitution is known of {known} of {len(self.drops)} drops")
+        found += told_restitution(self.drops, config, self.calibration_uncertainty)
+        if config.mass is None and math.isfinite(self.quantities["mass"].value):
+            found.append("the mass is not given: the effective mass is judged")
         found += [
             f"the uncertainty of the {what} is not given; it is not part of the uncertainties"
             for what in missing
@@ -257,7 +272,15 @@ class Recording(Displayed):
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
         """Contact time, restitution, peaks, mass and drop height with their budgets."""
-        return drop_quantities(self.drops, self.config)
+        return drop_quantities(self.drops, self.config, self.calibration_uncertainty)
+
+    @cached_property
+    def outliers(self) -> tuple[Outlier, ...]:
+        """Drops that differ in a level, the contact time, the restitution or the peak.
+
+        None is left out. Levels share a significance of 5 %, and so do the others.
+        """
+        return (*self.average().outliers, *find_deviant(self.drops))
 
     def level_quantities(self, bands: BandSet = "octave") -> tuple[Quantity, ...]:
         """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""

@@ -44,6 +44,8 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "instruments": list(config.instruments),
         "mass": config.mass,
         "height": config.height,
+        "mass_uncertainty": config.mass_uncertainty,
+        "height_uncertainty": config.height_uncertainty,
         "calibration_uncertainty": recording.calibration_uncertainty,
         "verdict": verdict.verdict,
         "confidence": CONFIDENCE,
@@ -53,7 +55,7 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
             method: found.tolist() for method, found in recording.agreement().items()
         },
         "drops": [_drop(drop) for drop in recording.drops],
-        "outliers": [vars(one) for one in recording.average().outliers],
+        "outliers": [vars(one) for one in recording.outliers],
         "files": [
             {
                 "name": one.name,
@@ -173,6 +175,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in estimates},
         "restitution_by": drop.restitution_by,
+        "restitutions": {way: _estimate(one) for way, one in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
         "steps": list(drop.steps),
