@@ -8,7 +8,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, channel_of, output
 from thud.errors import ReportWarning
 from thud.levels import SOURCES
 from thud.tables import format_rows
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import argparse
 
 NOT_CONFORMING = 3
+# Drops that the screen shows.
+SHOWN = 50
 
 
 def measure(options: argparse.Namespace) -> int:
@@ -32,12 +34,13 @@ def measure(options: argparse.Namespace) -> int:
         height_uncertainty=options.height_uncertainty,
         mass_uncertainty=options.mass_uncertainty,
         source=options.source,
-        channel=int(options.channel) if (options.channel or "").isdigit() else options.channel,
+        channel=channel_of(options.channel),
         unit=options.unit,
         calibration=options.calibration,
         calibration_uncertainty=options.calibration_uncertainty,
         polarity=options.polarity,
         sample_rate=options.sample_rate,
+        low_pass=options.low_pass or None,
         config=options.config,
         progress=not options.quiet and sys.stderr.isatty(),
         workers=options.workers or len(os.sched_getaffinity(0)),
@@ -48,14 +51,18 @@ def measure(options: argparse.Namespace) -> int:
         warnings.simplefilter("always", ReportWarning)
         results.save(recording, folder, figures=not options.no_figures)
     if not options.quiet:
-        print(format_rows(results.drop_table(recording)))
+        rows = results.drop_table(recording)
+        print(format_rows(rows[: SHOWN + 1]))
+        if len(rows) > SHOWN + 1:
+            print(f"and {len(rows) - SHOWN - 1} more drops, in {folder / 'report.json'}")
         print()
         print(format_rows(results.table(recording)))
         print()
-        for step in recording.steps:
+        for step in (*results.sentences(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {results.verdict_sentence(recording)}")
-    for remark in recording.remarks:
+    told = results.sentences(recording, "remarks")
+    for remark in (*recording.doubts, *recording.outliers, *told):
         print(f"thud-driver: {remark}", file=sys.stderr)
     for warning in found:
         print(f"thud-driver: {warning.message}", file=sys.stderr)
@@ -91,6 +98,7 @@ MEASURE = Command(
             "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
         ),
         argument("--sample-rate", type=float, metavar="HZ", help="where the file does not say it"),
+        argument("--low-pass", action="store_true", help="levels of the force below 1.25 kHz"),
         argument(
             "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
         ),

@@ -166,8 +166,9 @@ def _calls(
 def measure_window(window: Window, config: Config) -> Drop:
     """Return what the drop in a window tells, the resonance of the plate taken out before."""
     steps, remarks = tuple[str, ...](), tuple[str, ...]()
-    if config.plate is not None:
-        window, steps, remarks = correct_window(window, config.plate.resonance)
+    plate = config.resonance
+    if plate is not None:
+        window, steps, remarks = correct_window(window, plate)
     drop = measure_drop(
         window,
         height=config.height,
@@ -176,11 +177,11 @@ def measure_window(window: Window, config: Config) -> Drop:
         mass_uncertainty=config.mass_uncertainty or 0.0,
         height_uncertainty=config.height_uncertainty or 0.0,
     )
-    if config.plate is None:
+    if plate is None:
         return drop
     time = drop.contact_time
     # The correction ends at its reach: an edge is spread over half a period of that.
-    spread = 1 / (2 * REACH * config.plate.resonance.resonance)
+    spread = 1 / (2 * REACH * plate.resonance)
     return replace(
         drop,
         contact_time=Estimate(time.value, math.hypot(time.uncertainty, spread)),

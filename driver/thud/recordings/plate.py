@@ -229,6 +229,9 @@ def _check_high(plate: Plate | None, *, corrected: bool) -> PlateCheck:
     demand, high = "flat below", FLAT[1]
     if plate is None:
         return PlateCheck(demand, None, f"the response up to {high:g} Hz is not known (resonance)")
+    if corrected and not plate.frequency_uncertainty:
+        told = f"the response up to {high:g} Hz is not known (uncertainty of the resonance)"
+        return PlateCheck(demand, None, told)
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     if corrected:

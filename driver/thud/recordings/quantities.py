@@ -139,7 +139,7 @@ def average_mass(drops: Sequence[Drop], fall: Fall) -> Quantity:
 def find_deviant(drops: Sequence[Drop]) -> tuple[Outlier, ...]:
     """Return the drops that differ in contact time, restitution or peak, at 5 % for all three."""
     names = [drop.name for drop in drops]
-    found = []
+    found: list[Outlier] = []
     for attribute, words, unit in DEVIANT:
         ones = [getattr(drop, attribute) for drop in drops]
         found += find_outliers(

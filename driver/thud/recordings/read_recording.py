@@ -32,6 +32,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     calibration_uncertainty: float | None = None,
     polarity: str | None = None,
     sample_rate: float | None = None,
+    low_pass: bool | None = None,
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
     workers: int = 1,
@@ -55,6 +56,8 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         As `open_signals` takes them.
     calibration_uncertainty
         Relative standard uncertainty of the force, wherever its calibration comes from.
+    low_pass
+        Whether levels are those of the force below 1.25 kHz, as in the paper.
     config
         Configuration of the laboratory, or its file; the other arguments come first.
     progress
@@ -81,7 +84,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
         "height": height, "mass": mass, "height_uncertainty": height_uncertainty,
         "mass_uncertainty": mass_uncertainty, "source": source, "channel": channel, "unit": unit,
         "calibration": calibration, "calibration_uncertainty": calibration_uncertainty,
-        "polarity": polarity, "sample_rate": sample_rate,
+        "polarity": polarity, "sample_rate": sample_rate, "low_pass": low_pass,
     }  # fmt: skip
     given = {key: value for key, value in given.items() if value is not None}
     require_whole("workers", workers, 1, MAX_THREADS)

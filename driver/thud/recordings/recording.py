@@ -15,6 +15,7 @@ from thud.display import MAKERS, Displayed
 from thud.recordings.config import Config, checked_config
 from thud.recordings.excursion import doubt, scan
 from thud.recordings.levels import average_levels, compare_methods, measure_levels
+from thud.recordings.low_pass import describe_low_pass
 from thud.recordings.measurement import measure_signals
 from thud.recordings.quantities import drop_quantities, find_deviant, told_restitution
 from thud.recordings.signal import Signal
@@ -190,18 +191,16 @@ class Recording(Displayed):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What is doubtful: of files, drops and levels; a sentence each."""
-        found = [remark for one in self.origins for remark in one.remarks]
+        """What is doubtful: of the whole, of files and of drops; a sentence each."""
+        found = [*self.doubts, *map(str, self.outliers)]
+        found += [remark for one in self.origins for remark in one.remarks]
         found += [f"{drop.name}: {remark}" for drop in self.drops for remark in drop.remarks]
-        found += map(str, self.outliers)
-        config = self.config
-        missing = {
-            "calibration": self.calibration_uncertainty is None,
-            "resonance of the plate": config.plate is not None
-            and config.plate.f0_uncertainty is None,
-            "mass": config.mass is not None and config.mass_uncertainty is None,
-            "drop height": config.height is not None and config.height_uncertainty is None,
-        }
+        return tuple(dict.fromkeys(found))
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful of the recording as a whole; a sentence each."""
+        config, found = self.config, list[str]()
         if math.isnan(self.quantities["peaks"].value):
             found.append("the number of peaks is not known: noise may have made some")
         known = sum(math.isfinite(drop.restitution.value) for drop in self.drops)
@@ -210,19 +209,34 @@ class Recording(Displayed):
         found += told_restitution(self.drops, config, self.calibration_uncertainty)
         if config.mass is None and math.isfinite(self.quantities["mass"].value):
             found.append("the mass is not given: the effective mass is judged")
-        found += [
-            f"the uncertainty of the {what} is not given; it is not part of the uncertainties"
-            for what in missing
-            if missing[what]
-        ]
-        return tuple(dict.fromkeys(found))
+        found += [f"force plate: {one.sentence}" for one in config.plate_checks if one.met is False]
+        plate = config.resonance
+        missing = {
+            "calibration": self.calibration_uncertainty is None,
+            "resonance of the plate": plate is not None and not plate.frequency_uncertainty,
+            "mass": config.mass is not None and config.mass_uncertainty is None,
+            "drop height": config.height is not None and config.height_uncertainty is None,
+        }
+        if any(missing.values()):
+            words = ", ".join(what for what in missing if missing[what])
+            found.append(f"an uncertainty is neither given nor counted of: {words}")
+        return tuple(found)
 
     @property
     def steps(self) -> tuple[str, ...]:
         """What was done to the signals; a sentence each."""
         found = [f"{one.name}: {step}" for one in self.origins for step in one.steps]
         found += [f"{drop.name}: {step}" for drop in self.drops for step in drop.steps]
+        found += self.level_steps
         return tuple(dict.fromkeys(found))
+
+    @property
+    def level_steps(self) -> tuple[str, ...]:
+        """What was done to the forces before their levels were measured; a sentence each."""
+        if not self.config.low_pass:
+            return ()
+        rates = dict.fromkeys(drop.sample_rate for drop in self.drops)
+        return tuple(dict.fromkeys(f"levels: {describe_low_pass(rate)}" for rate in rates))
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:  # noqa: ARG002 - there is one
         """Return the force of the first drop, N, shape (n_sample,), for any `kind`."""
@@ -244,7 +258,8 @@ class Recording(Displayed):
         """
         known = self._averages
         if (bands, method) not in known:
-            drops = [measure_levels(drop, bands, method) for drop in self.drops]
+            low = self.config.low_pass
+            drops = [measure_levels(drop, bands, method, low_pass=low) for drop in self.drops]
             known[bands, method] = average_levels(drops)
         return known[bands, method]
 
@@ -263,7 +278,8 @@ class Recording(Displayed):
 
     def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
         """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
-        found = [compare_methods(drop, bands) for drop in self.drops]
+        low = self.config.low_pass
+        found = [compare_methods(drop, bands, low_pass=low) for drop in self.drops]
         return {
             method: np.max([np.abs(one[method] - one["exact"]) for one in found], axis=0)
             for method in found[0]
@@ -284,11 +300,11 @@ class Recording(Displayed):
 
     def level_quantities(self, bands: BandSet = "octave") -> tuple[Quantity, ...]:
         """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
-        plate = self.config.plate
+        plate = self.config.resonance
         return level_quantities(
             self.average(bands),
             self.calibration_uncertainty,
-            plate.resonance.level_uncertainty(bands) if plate else None,
+            plate.level_uncertainty(bands) if plate else None,
         )
 
     def conformity(

@@ -55,6 +55,9 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
             method: found.tolist() for method, found in recording.agreement().items()
         },
         "drops": [_drop(drop) for drop in recording.drops],
+        "plate": [vars(one) for one in config.plate_checks],
+        "steps": list(recording.level_steps),
+        "remarks": list(recording.doubts),
         "outliers": [vars(one) for one in recording.outliers],
         "files": [
             {

@@ -13,7 +13,7 @@ import matplotlib as mpl
 from thud.recordings.levels import BACKGROUND, MARGIN
 from thud.recordings.verdict import VERDICTS
 from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
-from thud.report.notes import fit_lines, group_sentences
+from thud.report.notes import fit_lines, group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
 from thud.report.template import BODY, PAGE
 
@@ -224,6 +224,9 @@ def _results(data: dict[str, Any]) -> list[str]:
         found.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
     if "background" in flags:
         found.append(f"levels less than {low:g} dB above the background are upper bounds")
+    met = [one["sentence"] for one in data["plate"] if one["met"]]
+    if met:
+        found.append(f"force plate: {'; '.join(met)}")
     bands = [f"{one['band']:g}" for one in data["criteria"] if one["band"] is not None]
     for method, differences in data["method_differences"].items():
         if any(differences):
@@ -246,12 +249,9 @@ def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
 
 
 def _told(data: dict[str, Any], kind: str) -> list[str]:
-    """Return the steps or remarks of files and drops; those of several in one sentence."""
-    found = []
-    for key in ("files", "drops"):
-        said = [(one["name"], sentence) for one in data[key] for sentence in one[kind]]
-        found += group_sentences(said, len(data[key]), key)
-    return found
+    """Return the steps or remarks of all, of files and of drops; those of several as one."""
+    places = {key: [(one["name"], one[kind]) for one in data[key]] for key in ("files", "drops")}
+    return [*data[kind], *group_places(places)]
 
 
 def _notes(title: str, sentences: Sequence[str], lines: int) -> str:
