@@ -33,8 +33,9 @@ NUMPY = {"_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype"}
 class KeptDrops:
     """Drops of signals, kept in a directory while others are measured; a context manager.
 
-    Each file holds drops of one signal and one configuration, named by their digest. All are
-    removed at the end; they stay where the process is interrupted or killed.
+    Each file holds drops of one signal and one configuration, named by their digest. At the end all
+    are removed, and so is the directory if it is empty; they stay where the process is interrupted
+    or killed.
 
     Parameters
     ----------
@@ -47,7 +48,6 @@ class KeptDrops:
         self._new: dict[int, Drop] = {}
         self._digest = ""
         self._written = time.monotonic()
-        self._made: list[Path] = []
 
     def __enter__(self) -> Self:
         """Return the drops."""
@@ -65,11 +65,12 @@ class KeptDrops:
         if kind is not None and not issubclass(kind, Exception):
             self._write()
             return
-        for path in self.folder.glob(f"{PREFIX}*{SUFFIX}"):
+        files = list(self.folder.glob(f"{PREFIX}*{SUFFIX}"))
+        for path in files:
             path.unlink(missing_ok=True)
-        for made in self._made:
-            with suppress(OSError):  # it holds something else by now
-                made.rmdir()
+        if files:
+            with suppress(OSError):  # it holds something else
+                self.folder.rmdir()
 
     def open(self, signal: Signal, config: Config) -> dict[int, Drop]:
         """Return the drops of a signal that were measured before, by their first samples."""
@@ -102,8 +103,6 @@ class KeptDrops:
         self._written = time.monotonic()
         if self.folder is None or not self._new:
             return
-        missing = [one for one in (self.folder, *self.folder.parents) if not one.exists()]
-        self._made = missing or self._made
         self.folder.mkdir(parents=True, exist_ok=True)
         path = self.folder / f"{PREFIX}{self._digest}-{min(self._new)}{SUFFIX}"
         replace_file(path, pickle.dumps(self._new))

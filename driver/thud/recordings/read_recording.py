@@ -68,7 +68,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     keep
         Directory in which measured drops are kept while others are measured. After an interrupt
         the same call measures only what is left; files or a configuration that have changed begin
-        again. At the end the directory is as it was.
+        again. At the end nothing of them is left.
 
     Returns
     -------
