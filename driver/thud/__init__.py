@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from thud.floors.rating import standardised_level as standardised_level
     from thud.floors.survey import RoomLevels as RoomLevels
     from thud.floors.survey import read_room_levels as read_room_levels
+    from thud.recordings.read_recording import read_recording as read_recording
     from thud.recordings.recording import Recording as Recording
-    from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
     from thud.studies.design_map import DesignMap as DesignMap
     from thud.studies.design_map import design_map as design_map
@@ -84,7 +84,7 @@ _LATE = {
     "predict_level": "floors.prediction",
     "quantity": "units",
     "rating": "floors.rating",
-    "read_recording": "recordings.recording",
+    "read_recording": "recordings.read_recording",
     "read_room_levels": "floors.survey",
     "standardised_level": "floors.rating",
 }

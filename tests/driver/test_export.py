@@ -20,8 +20,8 @@ import thud
 from thud import export_force
 from thud.cli.export import EXPORT, KINDS
 from thud.export_force import EXPORTS, BlockedForce, blocked_force
+from thud.recordings.read_recording import read_recording
 from thud.recordings.reading import open_signals
-from thud.recordings.recording import read_recording
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -11,7 +11,8 @@ from conftest import REPOSITORY
 from synthetic import make_recording
 
 import thud
-from thud.recordings.recording import Recording, read_recording
+from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import Recording
 from thud.recordings.signal import Signal
 from thud.studies.fit import KIND
 from thud.studies.fitting.force_target import ForceTarget

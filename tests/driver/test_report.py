@@ -28,8 +28,9 @@ from thud.levels import record_force
 from thud.plot.recording import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Drop, Estimate
-from thud.recordings.recording import Recording, read_recording
-from thud.report.data import level_budgets, read_date, report_data
+from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import Recording
+from thud.report.data import read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
 from thud.report.write import write_report
@@ -459,7 +460,9 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
         bars = axes.containers[0]
         np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels(bands))
         half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]
-        np.testing.assert_allclose(half, [one.expanded for one in level_budgets(recording, bands)])
+        np.testing.assert_allclose(
+            half, [one.expanded for one in recording.level_quantities(bands)]
+        )
 
 
 def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
@@ -470,7 +473,7 @@ def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> No
         for i, decision in enumerate(recording.conformity().decisions[:5]):
             assert found["uncertainty"][i] == decision.quantity.uncertainty
             assert found["expanded_uncertainty"][i] == decision.quantity.expanded
-    octaves, thirds = (level_budgets(recording, bands) for bands in ("octave", "third"))
+    octaves, thirds = (recording.level_quantities(bands) for bands in ("octave", "third"))
     for budgets in (octaves, thirds):
         names = [part.name for part in budgets[-1].contributions]
         assert names[-2:] == ["calibration", "plate"]

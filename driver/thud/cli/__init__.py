@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from thud._api import version
 from thud.checks import suggestion
+from thud.cli.calibrate import CALIBRATE
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
@@ -74,6 +75,7 @@ COMMANDS = {
         "nothing is written",
     ),
     "measure": MEASURE,
+    "calibrate": CALIBRATE,
     "export": EXPORT,
     "history": Command(
         "control chart of a ball from its calibration reports",
@@ -112,7 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             command = COMMANDS[options.name]
             kept = command.kept
-            if options.output is not None and not options.output.strip():
+            folder = getattr(options, "output", None)
+            if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
             code = command.function(options)

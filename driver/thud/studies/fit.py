@@ -23,7 +23,7 @@ from thud.errors import FitWarning
 from thud.key import check_keywords
 from thud.record import read_record
 from thud.recordings.formats import FORMATS as RECORDING_FORMATS
-from thud.recordings.recording import Recording, read_recording
+from thud.recordings.read_recording import read_recording
 from thud.studies.directory import FORMATS
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from thud.impact import Impact
+    from thud.recordings.recording import Recording
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
 
