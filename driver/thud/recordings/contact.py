@@ -282,10 +282,13 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     covariance += (FLOOR * background.peak) ** 2 * np.eye(len(value))
     time = (cells[0] + cells[1]) / 2 + middle
     if turned:
-        flank = Flank(-time[::-1], value[::-1], covariance[::-1, ::-1], background.peak, 1 / rate)
+        flank = Flank(
+            -time[::-1], value[::-1], covariance[::-1, ::-1], background.peak, 1 / rate, release=True
+        )
         touch, deviation = find_touch(flank, -bounds[1], -bounds[0], searches)
         return -touch, deviation
-    return find_touch(Flank(time, value, covariance, background.peak, 1 / rate), *bounds, searches)
+    flank = Flank(time, value, covariance, background.peak, 1 / rate, release=False)
+    return find_touch(flank, *bounds, searches)
 
 
 def flank_edges(

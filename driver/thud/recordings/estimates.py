@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Drop", "Estimate", "measure_drop"]
 
+# Draws of noise that show what it adds to the maximum.
+PEAK_DRAWS = 32
 # Bounces that are measured.
 MAX_BOUNCES = 2
 # Quiet below which it is told, s.
@@ -252,12 +254,22 @@ def _impulse(contact: Contact) -> Estimate:
 
 
 def _peak(contact: Contact) -> Estimate:
-    """Return the maximum of the force below 1.25 kHz, N."""
-    low = record_force(np.pad(contact.gated, 2), contact.sample_rate)
+    """Return the maximum of the force below 1.25 kHz, N, less what noise adds to a maximum.
+
+    As much again is added by further noise of the same density (bootstrap); half of it counts as
+    uncertain.
+    """
+    force = np.pad(contact.gated, 2)
+    low = record_force(force, contact.sample_rate)
     place = int(np.argmax(low)) * len(contact.covariance) // len(low)
-    variance = contact.background.variances[0] * min(RECORDED_BAND, contact.sample_rate / 2)
+    density, _ = contact.background.density(RECORDED_BAND)
+    deviation = math.sqrt(density * contact.sample_rate / 2)
+    draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
+    higher = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
+    excess = max(float(np.mean(higher) - low.max()), 0.0)
+    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + (excess / 2) ** 2
     variance += contact.covariance[place, place]
-    return Estimate(float(low.max()), math.sqrt(variance))
+    return Estimate(float(low.max()) - excess, math.sqrt(variance))
 
 
 def _noise(contact: Contact) -> Noise:

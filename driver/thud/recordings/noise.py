@@ -29,6 +29,7 @@ NEAR = 8.0
 # Prior of the standard deviation of each part in a cell: even up to this part of the peak force,
 # falling as its square beyond.
 LARGE = 0.03
+SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 # Standard deviation of each quiet cell that is no noise, over the peak force: digits.
 DIGITS = 1e-6
 # Draws of the variances from their posterior, and those that are kept.
@@ -271,7 +272,7 @@ class _Posterior:
             return -np.inf
         white = solve_triangular(factor, self.mean, lower=True, check_finite=False)
         value = -np.log(np.diagonal(factor)).sum() - 0.5 * white @ white
-        return float(value + 0.5 * phi.sum() - np.log1p(theta / self.large).sum())
+        return float(value + SLOPE @ phi - np.log1p(theta / self.large).sum())
 
     def _derivatives(
         self, phi: NDArray[np.float64]
@@ -284,9 +285,9 @@ class _Posterior:
         weighted = inverse @ self.mean
         turned = (self.parts @ weighted) * theta[:, None]
         trace = theta * np.einsum("kij,ij->k", self.parts, inverse)
-        score = 0.5 * (turned @ weighted - trace) + 0.5 - theta / (theta + self.large)
+        score = 0.5 * (turned @ weighted - trace) + SLOPE - theta / (theta + self.large)
         # At the maximum, where the score is zero, the prior adds a half.
-        return score, 0.5 * turned @ inverse @ turned.T + 0.5 * np.eye(len(phi))
+        return score, 0.5 * turned @ inverse @ turned.T + np.diag(SLOPE)
 
     def maximum(
         self, phi: NDArray[np.float64]
