@@ -18,8 +18,8 @@ from thud.recordings.contact import Contact, Estimate, cells_between, even_edges
 from thud.recordings.estimates import Drop
 from thud.recordings.levels import METHODS, average_levels, compare_methods, measure_levels
 from thud.recordings.low_pass import attenuation, low_pass_force
-from thud.recordings.outliers import find_outliers
 from thud.recordings.noise import Background, Noise
+from thud.recordings.outliers import find_outliers
 from thud.recordings.plate import Plate, check_plate, correct_plate
 from thud.recordings.verdict import (
     Contribution,
@@ -43,7 +43,7 @@ def half_sine(time: np.ndarray, contact: float = 0.02) -> np.ndarray:
     return np.where(inside, 1500 * np.sin(np.pi * time / contact), 0.0)
 
 
-def make_drop(
+def make_drop(  # noqa: PLR0913 - what a recording may be
     deviation: float = 0.0,
     rate: float = 25600.0,
     *,
@@ -199,9 +199,7 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
 def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -> None:
     drop = make_drop(3.0, rate)
     edges = thud.get_bands(bands)
-    found = [
-        drop.band_noise(*pair)[0] for pair in zip(edges.lower, edges.upper, strict=True)
-    ]
+    found = [drop.band_noise(*pair)[0] for pair in zip(edges.lower, edges.upper, strict=True)]
     expected = drop.noise.white * (edges.upper - edges.lower) * np.diff(drop.gate) / rate
     offset = drop.contact.covariance[0, 0] / (drop.noise.white * rate / 2) * np.diff(drop.gate)
     # The offset adds at most its part of the energy of the noise.
@@ -307,8 +305,7 @@ def test_average_is_that_of_energies() -> None:
     drops = [make_drop(2.0, seed=i) for i in range(5)]
     scales = [1.0, 1.01, 0.99, 1.02, 0.98]
     found = [
-        measure_levels(replace(d, force=s * d.force))
-        for s, d in zip(scales, drops, strict=True)
+        measure_levels(replace(d, force=s * d.force)) for s, d in zip(scales, drops, strict=True)
     ]
     average = average_levels(found)
     energies = np.array([10 ** (f.level / 10) for f in found])
@@ -334,9 +331,7 @@ def test_drops_that_differ_are_marked_and_kept() -> None:
     found = [measure_levels(make_drop(1.0, seed=i)) for i in range(6)]
     assert average_levels(found).outliers == ()
     odd = make_drop(1.0, seed=6)
-    found.append(
-        measure_levels(replace(odd, force=1.05 * odd.force, name="odd"))
-    )
+    found.append(measure_levels(replace(odd, force=1.05 * odd.force, name="odd")))
     average = average_levels(found)
     assert {o.name for o in average.outliers} == {"odd"}
     assert "odd" in average.names
@@ -488,9 +483,7 @@ def test_budget_after_the_gum() -> None:
     assert average_estimates([Estimate(1.0, 0.1)]).expanded == pytest.approx(0.196, abs=1e-3)
     pair = average_estimates([Estimate(1.0, 0.1), Estimate(1.2, 0.1)])
     assert pair.coverage_factor == pytest.approx(12.706, abs=1e-3)
-    shared = replace(
-        pair, contributions=(*pair.contributions, Contribution("calibration", 0.3))
-    )
+    shared = replace(pair, contributions=(*pair.contributions, Contribution("calibration", 0.3)))
     assert shared.uncertainty == pytest.approx(math.hypot(0.1, 0.3))
     assert shared.freedom == pytest.approx((0.1**2 + 0.3**2) ** 2 / 0.1**4)
     assert math.isnan(average_estimates([]).value)

@@ -283,7 +283,12 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     time = (cells[0] + cells[1]) / 2 + middle
     if turned:
         flank = Flank(
-            -time[::-1], value[::-1], covariance[::-1, ::-1], background.peak, 1 / rate, release=True
+            -time[::-1],
+            value[::-1],
+            covariance[::-1, ::-1],
+            background.peak,
+            1 / rate,
+            release=True,
         )
         touch, deviation = find_touch(flank, -bounds[1], -bounds[0], searches)
         return -touch, deviation

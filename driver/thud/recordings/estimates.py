@@ -256,8 +256,8 @@ def _impulse(contact: Contact) -> Estimate:
 def _peak(contact: Contact) -> Estimate:
     """Return the maximum of the force below 1.25 kHz, N, less what noise adds to a maximum.
 
-    As much again is added by further noise of the same density (bootstrap); half of it counts as
-    uncertain.
+    That is what further noise of the same density adds (bootstrap), a part of it where there is
+    much noise; as much again counts as uncertain.
     """
     force = np.pad(contact.gated, 2)
     low = record_force(force, contact.sample_rate)
@@ -267,7 +267,7 @@ def _peak(contact: Contact) -> Estimate:
     draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
     higher = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
     excess = max(float(np.mean(higher) - low.max()), 0.0)
-    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + (excess / 2) ** 2
+    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + excess**2
     variance += contact.covariance[place, place]
     return Estimate(float(low.max()) - excess, math.sqrt(variance))
 

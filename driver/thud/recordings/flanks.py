@@ -18,9 +18,9 @@ KNOTS = np.array(
 )
 # Powers n, the mean of a, and its standard deviation: lines, and the soft feet of bodies that touch
 # in a point (Hertz: 3/2 of a sphere) and roll off.
-POWERS = np.array([1.0, 1.5, 2.0])
-MEAN = np.array([0.17, 0.06, 0.04])
-SPREAD = np.array([0.12, 0.04, 0.03])
+POWERS = np.array([1.0, 1.5, 1.75])
+MEAN = np.array([0.16, 0.055, 0.045])
+SPREAD = np.array([0.08, 0.02, 0.015])
 PARABOLA = 0.06
 # Of lines the walk is random, with steps of a standard deviation that grows with the root of their
 # length; of feet its steps deviate from those of the power, with the mean of a, by a part.
@@ -37,7 +37,7 @@ CLASSES = (
 # Their probabilities at touch and at release: a body strikes with a jump and lets go softly.
 PRIOR = np.array([
     [0.25, 0.15, 0.1, 0.05, 0.05, 0.25, 0.15],
-    [0.28, 0.01, 0.01, 0.25, 0.25, 0.15, 0.05],
+    [0.38, 0.01, 0.01, 0.2, 0.2, 0.15, 0.05],
 ])  # fmt: skip
 # What these shapes leave of the time, s: errors of the method over the models, by class.
 LEFT = 1e-6 * np.array([

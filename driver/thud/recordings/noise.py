@@ -26,10 +26,10 @@ OFFSET = 1.0
 DRIFT = 0.1
 # Squared lag over mean squared length of two cells below which their covariance is exact.
 NEAR = 8.0
-# Prior of the standard deviation of each part in a cell: even up to this part of the peak force,
-# falling as its square beyond.
-LARGE = 0.03
+# Priors of the logarithms of the variances: these powers of the variance, up to a deviation of a
+# quiet cell of this part of the peak force; falling beyond.
 SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
+LARGE = 0.03
 # Standard deviation of each quiet cell that is no noise, over the peak force: digits.
 DIGITS = 1e-6
 # Draws of the variances from their posterior, and those that are kept.
@@ -150,7 +150,10 @@ class Background:
     def _factors(self) -> list[NDArray[np.float64]]:
         """Return the factor of the covariance of the quiet cells for each draw."""
         parts, fixed = covariances(self.quiet), _fixed(self.quiet, self.peak)
-        return [np.linalg.cholesky(np.tensordot(draw, parts, 1) + fixed) for draw in self.draws]
+        return [
+            np.asarray(np.linalg.cholesky(np.tensordot(draw, parts, 1) + fixed), dtype=np.float64)
+            for draw in self.draws
+        ]
 
     @cached_property
     def _weights(self) -> list[NDArray[np.float64]]:
@@ -203,8 +206,12 @@ class Background:
         """Frequency of the stronger hum, Hz, its amplitude and the deviation of that, N."""
         k = int(np.argmax(self.variances[3:]))
         waves = _waves(self.quiet, MAINS[k])
-        part = waves @ waves.T @ np.mean(
-            [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)], axis=0
+        part = (
+            waves
+            @ waves.T
+            @ np.mean(
+                [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)], axis=0
+            )
         )
         noise = np.mean(self.variances[0] / 2 / (self.quiet[1] - self.quiet[0]))
         return MAINS[k], float(np.sqrt(2 * np.mean(part**2))), float(np.sqrt(2 * noise / len(part)))
@@ -255,8 +262,8 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
 class _Posterior:
     """Posterior of the logarithms of the variances.
 
-    The covariance of the cells is linear in the variances. Priors are even in the standard
-    deviation of each part, up to `large`: a part that is absent is found to be small, not zero.
+    The covariance of the cells is linear in the variances. The priors rise with them, up to
+    `large`: a part that is absent is found to be small, not zero.
     """
 
     parts: NDArray[np.float64]
@@ -286,12 +293,10 @@ class _Posterior:
         turned = (self.parts @ weighted) * theta[:, None]
         trace = theta * np.einsum("kij,ij->k", self.parts, inverse)
         score = 0.5 * (turned @ weighted - trace) + SLOPE - theta / (theta + self.large)
-        # At the maximum, where the score is zero, the prior adds a half.
+        # At the maximum, where the score is zero, that of the likelihood is the prior's slope.
         return score, 0.5 * turned @ inverse @ turned.T + np.diag(SLOPE)
 
-    def maximum(
-        self, phi: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def maximum(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the most likely logarithms from a first guess, and the curvature there."""
         value = self.logarithm(phi)
         score, curvature = self._derivatives(phi)
