@@ -13,6 +13,7 @@ from synthetic import band_limited, coloured_noise, half_sine, make_recording
 import thud
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
+from thud.recordings.levels import measure_levels
 from thud.recordings.quantities import average_mass
 from thud.recordings.restitution import Fall
 from thud.recordings.signal import Signal
@@ -41,8 +42,7 @@ def drops(force: np.ndarray, rate: float, **knowledge: float) -> list[Drop]:
 
 
 def levels(drop: Drop) -> np.ndarray:
-    energies = [drop.band_energy(*edges)[0] for edges in zip(BANDS.lower, BANDS.upper, strict=True)]
-    return 10 * np.log10(energies)
+    return measure_levels(drop).level
 
 
 @pytest.mark.parametrize("before", [0.01, 0.1])
