@@ -17,11 +17,12 @@ from thud.record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit, require_positive
 from thud.studies.fitting.record_noise import (
+    MIN_HUM,
     MIN_QUIET,
     Quiet,
     Weights,
     find_pulse,
-    hum_orders,
+    hum_harmonics,
     new_weights,
     trimmed,
 )
@@ -48,8 +49,6 @@ NUMERICAL = 1e-4
 NOTABLE = 3.0
 # Scale of a shift in time, s.
 SHIFT_SCALE = 1e-3
-# Least frequency of hum, Hz: slower ones are drift within a pulse.
-MIN_HUM = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ class ForceTarget:
         An offset is a nuisance parameter; None: where there is enough quiet.
     hum : float or None
         Frequency, Hz, of hum whose first five harmonics are nuisance parameters; 0: there is none;
-        None: hum of 50 or 60 Hz as far as the quiet shows it.
+        None: hum of 50 or 60 Hz, and tones of other frequencies, as far as the quiet shows them.
     gain : float or None
         Relative standard uncertainty of the calibration: a factor of the record is fitted, known to
         be 1 to this extent; infinite: not known; None: it is 1.
@@ -219,8 +218,6 @@ class ForceMisfit(Misfit):
         self.known_noise = shown or target.noise is not None
         self.noise_freedom = self.quiet.freedom if shown and target.noise is None else None
         self._shown = shown
-        self.orders = hum_orders(target.hum, self.below)
-        self.absorbed = self.offset + 2 * len(self.orders)
         self.own = {}
         if not self.exact if target.time_shift is None else target.time_shift:
             self.own[SHIFT] = "s", SHIFT_SCALE
@@ -237,9 +234,16 @@ class ForceMisfit(Misfit):
         self._transforms: dict[tuple[int, float], ZoomFFT] = {}
 
     @cached_property
+    def tones(self) -> tuple[float, ...]:
+        """Frequencies of hum that are nuisance parameters, Hz."""
+        if self.target.hum is not None:
+            return hum_harmonics(self.target.hum, self.below)
+        return self.quiet.tones() if self._shown else ()
+
+    @cached_property
     def background(self) -> Background | None:
         """The noise of the quiet parts; None where they do not tell."""
-        return self.quiet.background() if self._shown else None
+        return self.quiet.background(self.tones) if self._shown else None
 
     @cached_property
     def weights(self) -> Weights:
@@ -250,8 +254,14 @@ class ForceMisfit(Misfit):
             background=self.background,
             noise=self.target.noise,
             offset=self.offset,
-            hum=self.target.hum,
+            tones=self.tones,
+            mains=self.target.hum is None,
         )
+
+    @property
+    def absorbed(self) -> int:
+        """Number of nuisance parameters that were projected out of the residuals."""
+        return self.offset + 2 * len(self.tones)
 
     @cached_property
     def unit_deviation(self) -> float:
@@ -349,13 +359,13 @@ class ForceMisfit(Misfit):
         found = {}
         if self.offset:
             found["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
-        if self.target.hum:
-            pair = self.offset + np.array([0, len(self.orders)])
+        for place, tone in enumerate(self.tones, start=int(self.offset)):
+            pair = np.array([place, place + len(self.tones)])
             size = float(np.hypot(*value[pair]))
             slope = value[pair] / size
             error = float(np.sqrt(slope @ covariance[np.ix_(pair, pair)] @ slope))
-            found[f"hum of {self.target.hum:g} Hz"] = size, error
-        elif self.background is not None and self.target.hum is None:
+            found[f"hum of {tone:.4g} Hz"] = size, error
+        if self.background is not None and self.target.hum is None:
             mains, size, error = self.background.hum
             if size > NOTABLE * error:
                 found[f"hum of {mains:g} Hz"] = size, error

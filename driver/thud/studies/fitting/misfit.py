@@ -29,8 +29,6 @@ class Misfit(ABC):
     ----------
     size : int
         Number of residuals.
-    absorbed : int
-        Number of nuisance parameters that were projected out of the residuals.
     known_noise : bool
         The standard deviations are known; else their common factor is estimated.
     noise_freedom : int or None
@@ -44,7 +42,6 @@ class Misfit(ABC):
     """
 
     size: int
-    absorbed: int = 0
     known_noise: bool
     noise_freedom: int | None = None
     deviation_unit: ClassVar[str]
@@ -55,6 +52,11 @@ class Misfit(ABC):
     def unit_deviation(self) -> float:
         """Unit of the residuals: the noise of forces, N; 1 for levels."""
         return 1.0
+
+    @property
+    def absorbed(self) -> int:
+        """Number of nuisance parameters that were projected out of the residuals."""
+        return 0
 
     @abstractmethod
     def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -6,7 +6,8 @@ to a frequency: `to_grid` is orthonormal, white noise stays white and keeps its 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,15 +15,30 @@ from scipy.linalg import solve_triangular
 
 from thud.recordings.contact import QUIET, cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
-from thud.recordings.noise import DRIFT, N_HARMONIC, fit_background, noise_covariances
+from thud.recordings.noise import (
+    DRIFT,
+    MAINS,
+    N_HARMONIC,
+    OFFSET,
+    covariances,
+    fit_background,
+    noise_covariances,
+)
+from thud.studies.fitting.residual_tests import UNLIKELY
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
-    from thud.recordings.noise import Background
+    from thud.recordings.noise import Background, Cells
 
 # Quiet with fewer independent values in the band does not tell the noise.
 MIN_QUIET = 50
+# Least frequency of hum, Hz: slower ones are drift within a pulse. Maximum number of its tones that
+# are looked for in the quiet.
+MIN_HUM = 10.0
+MAX_TONES = 3
 # Harmonics of hum count up to this part of the highest frequency.
 HARMONIC_EDGE = 0.95
 # Time from the foot of a pulse to its edge, s: flanks of the models rise to it in 4 ms.
@@ -115,10 +131,11 @@ class Quiet:
         first, stop = self.pulse
         return float(np.std(np.concatenate([self.force[:first], self.force[stop:]])))
 
-    def background(self) -> Background:
-        """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
+    @cached_property
+    def _means(self) -> tuple[Cells, NDArray[np.float64]]:
+        """Cells of the quiet, s from the middle of the pulse, and their means less the median, N.
 
-        The cells are those of the band: wider ones would not tell the noise of its upper end.
+        They are those of the band: wider ones would not tell the noise of its upper end.
         """
         width = max(1, int(self.rate / (2 * self.below)))
         first, stop = self.pulse
@@ -135,9 +152,108 @@ class Quiet:
             if len(side) > 1
         ]
         mean = np.concatenate(means)
-        cells = np.concatenate(begins), np.concatenate(ends)
-        peak = float(self.force.max() - np.median(mean))
-        return fit_background(cells, mean - np.median(mean), peak)
+        return (np.concatenate(begins), np.concatenate(ends)), mean - np.median(mean)
+
+    def background(self, tones: Sequence[float] = ()) -> Background:
+        """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
+
+        Tones, Hz, are removed first, by least squares.
+        """
+        cells, mean = self._means
+        waves = cell_waves(cells, tones)
+        left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+        peak = float(self.force.max() - np.median(self.force))
+        found = fit_background(cells, left, peak)
+        # What the waves have taken of the noise.
+        scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
+        return replace(found, variances=scale * found.variances)
+
+    def tones(self) -> tuple[float, ...]:
+        """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
+
+        A tone must raise the likelihood by more than the search over all frequencies does.
+        """
+        cells, mean = self._means
+        span = 2 * float(np.abs(cells).max())
+        step = 1 / (4 * span)
+        grid = np.arange(MIN_HUM, HARMONIC_EDGE * self.below, step)
+        # The noise has those of the mains.
+        grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
+        least = float(np.log(len(grid) / UNLIKELY))
+        found: tuple[float, ...] = ()
+        best = _log_likelihood(self.background())
+        while len(found) < MAX_TONES:
+            waves = cell_waves(cells, found)
+            left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+            tried = [
+                (_log_likelihood(self.background((*found, tone))), tone)
+                for whiten in (_trendless(cells), _whitening(self.background(found)))
+                for tone, gain in [_strongest(cells, whiten @ left, whiten, grid)]
+                if gain > least
+            ]
+            likelihood, tone = max(tried, default=(best, 0.0))
+            if likelihood < best + least:
+                break
+            best, found = likelihood, (*found, tone)
+        return found
+
+
+def cell_waves(cells: Cells, tones: Sequence[float]) -> NDArray[np.float64]:
+    """Return a constant, and means of the waves of tones, Hz, over cells: [n_cell, 1 + 2 n]."""
+    middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
+    phase = 2 * np.pi * np.multiply.outer(middle, np.asarray(tones, dtype=np.float64))
+    weight = np.sinc(np.multiply.outer(width, np.asarray(tones, dtype=np.float64)))
+    one = np.ones((len(middle), 1))
+    return np.concatenate([one, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
+
+
+def _strongest(
+    cells: Cells, mean: NDArray[np.float64], whiten: NDArray[np.float64], grid: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return the frequency of the strongest tone in whitened means, Hz, and its gain.
+
+    The gain is that of the logarithm of the likelihood, the deviation of the noise estimated.
+    """
+    tone = 0.0
+    for _ in range(2):
+        waves = np.moveaxis(cell_waves(cells, grid.tolist())[:, 1:].reshape(-1, 2, len(grid)), 2, 0)
+        basis, _ = np.linalg.qr(whiten @ waves)
+        power = np.sum(np.einsum("kni,n->ki", basis, mean) ** 2, axis=1)
+        place = int(np.argmax(power))
+        tone, step = float(grid[place]), float(np.diff(grid).min())
+        # Once more between the neighbours.
+        grid = np.linspace(tone - step, tone + step, 41)
+    share = min(float(power[place] / (mean @ mean)), 1 - 1e-12)
+    return tone, -0.5 * len(mean) * float(np.log1p(-share))
+
+
+def _trendless(cells: Cells) -> NDArray[np.float64]:
+    """Return the projection that takes offset and drift of white noise out of cells."""
+    middle = (cells[0] + cells[1]) / 2
+    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(middle), middle]))
+    return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
+
+
+def _covariance(background: Background) -> NDArray[np.float64]:
+    """Return the covariance of quiet cells, offset and drift with it, N2."""
+    middle = (background.quiet[0] + background.quiet[1]) / 2
+    trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
+    parts = np.tensordot(background.variances, covariances(background.quiet), 1)
+    return np.asarray(parts + background.peak**2 * trend, dtype=np.float64)
+
+
+def _whitening(background: Background) -> NDArray[np.float64]:
+    """Return what makes quiet cells independent and of unit variance."""
+    factor = np.linalg.cholesky(_covariance(background))
+    whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    return np.asarray(whiten, dtype=np.float64)
+
+
+def _log_likelihood(background: Background) -> float:
+    """Return the logarithm of the likelihood of quiet cells."""
+    whiten = _whitening(background)
+    white = whiten @ background.mean
+    return float(np.log(np.diag(whiten)).sum() - 0.5 * white @ white)
 
 
 def trimmed(force: NDArray[np.float64], rate: float) -> slice:
@@ -195,9 +311,10 @@ class Weights:
         return result
 
 
-def hum_orders(hum: float | None, below: float) -> NDArray[np.intp]:
-    """Return the harmonics of hum of a known frequency, Hz, that lie below another one."""
-    return np.arange(1, 1 + (min(N_HARMONIC, int(HARMONIC_EDGE * below / hum)) if hum else 0))
+def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
+    """Return the frequencies of hum and its harmonics, Hz, that lie below another one; 0: none."""
+    count = min(N_HARMONIC, int(HARMONIC_EDGE * below / hum)) if hum else 0
+    return tuple(hum * order for order in range(1, 1 + count))
 
 
 def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
@@ -207,7 +324,8 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     background: Background | None,
     noise: float | None,
     offset: bool,
-    hum: float | None,
+    tones: Sequence[float],
+    mains: bool,
 ) -> Weights:
     """Return the weights of a record.
 
@@ -223,9 +341,10 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
         Standard deviation of white noise instead, N; without either it is 1 N.
     offset
         An offset is a nuisance parameter.
-    hum
-        Frequency of hum whose harmonics are nuisance parameters, Hz, 0: there is none; None: the
-        hum of the quiet.
+    tones
+        Frequencies whose waves are nuisance parameters, Hz.
+    mains
+        Hum of 50 and 60 Hz counts as the background knows it.
     """
     n, rate = len(quiet.force), quiet.rate
     time = np.arange(n) / rate - quiet.middle
@@ -237,7 +356,7 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
         if noise is None:
             white = variances[0] * rate / 2
             coloured = variances[1:3] @ rows[:2]
-        if hum is None:
+        if mains:
             humming = variances[3:] @ rows[2:]
         drift = DRIFT * background.peak if offset else 0.0
     slope = to_grid(drift * time[:, np.newaxis], count)
@@ -245,6 +364,5 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     covariance = white * np.eye(count) + grid_covariance(coloured, count) + predicted
     # Covariances of pink and brown noise hold up to a constant, that of an unknown offset.
     covariance += 10 * np.abs(coloured).max()
-    phase = 2 * np.pi * (hum or 0) * np.multiply.outer(time, hum_orders(hum, quiet.below))
-    columns = np.concatenate([np.ones((n, int(offset))), np.cos(phase), np.sin(phase)], axis=1)
+    columns = cell_waves((time, time + 1 / rate), tones)[:, 0 if offset else 1 :]
     return Weights(covariance, to_grid(columns, count), predicted)
