@@ -33,6 +33,8 @@ INDICES = {
 }
 CONFIDENCE = 0.95
 RESAMPLES = 200
+# Variances below this are rounding errors, dB2.
+_ROUNDING = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,10 +168,14 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
             [study.surrogate.mean_square(name) for name in (f"{force}_level", "contact_time", peak)]
         )
         # Levels are in dB; other quantities are compared in dB too.
-        spread = [
-            np.var(v[rows] if i < levels.shape[1] else 20 * np.log10(v[rows]))
-            for i, v in enumerate(outputs.values())
-        ]
+        spread = np.array(
+            [
+                np.var(v[rows] if i < levels.shape[1] else 20 * np.log10(v[rows]))
+                for i, v in enumerate(outputs.values())
+            ]
+        )
+        # As the indices, none where nothing varies.
+        spread[spread <= _ROUNDING] = np.nan
         variables["surrogate"] = ("output", known / spread, meaning)
     names = {"output": list(outputs), "parameter": list(map(coordinate, study.parameters))}
     left_out = int((~usable).sum())
