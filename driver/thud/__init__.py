@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from thud.studies.blocks import read_sweep as read_sweep
     from thud.studies.design_map import DesignMap as DesignMap
     from thud.studies.design_map import design_map as design_map
+    from thud.studies.emulation.surrogate import Surrogate as Surrogate
+    from thud.studies.emulation.surrogate import read_surrogate as read_surrogate
     from thud.studies.fit import fit as fit
     from thud.studies.fitting.force_target import ForceTarget as ForceTarget
     from thud.studies.fitting.level_target import LevelTarget as LevelTarget
@@ -61,6 +63,7 @@ if TYPE_CHECKING:
     from thud.studies.sensitivity import Sensitivity as Sensitivity
     from thud.studies.sensitivity import sensitivity as sensitivity
     from thud.studies.study import Study as Study
+    from thud.studies.surrogate import surrogate as surrogate
     from thud.studies.sweep import sweep as sweep
     from thud.studies.uncertainty import Uncertainty as Uncertainty
     from thud.studies.uncertainty import uncertainty as uncertainty

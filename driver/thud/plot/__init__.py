@@ -44,6 +44,7 @@ from thud.plot.recording import recording_forces as recording_forces
 from thud.plot.recording import recording_levels as recording_levels
 from thud.plot.room import room_levels as room_levels
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
+from thud.plot.surrogate import draw_surrogate as draw_surrogate
 from thud.plot.sweep import draw_sweep as draw_sweep
 from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
 
