@@ -10,7 +10,6 @@ from thud._schema import (
     Ball,
     Drop,
     FiniteElementLaw,
-    FiniteElementTreatment,
     FiniteElementViscosity,
     HollowSphereMomentumFlux,
     ModalBallDampingLaw,
@@ -53,8 +52,8 @@ class FiniteElementOptions(SamplingOptions, total=False):
     loss_frequency: float
     prony_share: Sequence[float]
     prony_time: Sequence[float]
-    treatment: FiniteElementTreatment
-    penalty_ratio: float
+    friction: float
+    layer_stiffness: float
     snapshot_interval: float
 
 class MeasuredModesOptions(SamplingOptions, total=False):

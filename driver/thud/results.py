@@ -100,7 +100,10 @@ def _read_motion(folder: Path) -> Motion:
         plane["Points"][0] - plane["displacement"][0],
         plane["Points"],
         plane["velocity"],
-        np.stack([shot["contact_pressure"].reshape(size)[-1] for shot in shots]),
+        *(
+            np.stack([shot[name].reshape(size)[-1] for shot in shots])
+            for name in ("contact_pressure", "contact_shear")
+        ),
         np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
     )
 
