@@ -65,7 +65,7 @@ contains
       real(wp) :: cost
 
       ! The number of elements, and of steps, which grows as they shrink.
-      cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
+      cost = 0.3_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).
