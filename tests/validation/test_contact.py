@@ -62,7 +62,7 @@ def test_friction_stays_in_its_cone_and_costs_energy() -> None:
     pressure, shear = impact.motion.contact_pressure, impact.motion.contact_shear
     # Means over the sampling interval, of what holds in each step.
     assert (abs(shear) <= friction * pressure * (1 + 1e-12)).all()
-    # Bending shortens the outer surface as it flattens, and the floor holds it outwards; later inwards.
+    # Bending shortens the outer surface as it flattens: the floor holds it outwards, later inwards.
     assert shear.min() < -0.9 * friction * pressure.max() / 2 < 0 < shear.max()
     rubbed = impact.channels["friction_energy_J"]
     assert np.diff(rubbed[: np.argmax(rubbed) + 1]).min() > -1e-9
