@@ -185,6 +185,25 @@ class Modes(Group):
 
 
 @dataclass(frozen=True)
+class Compression(Group):
+    """Slow compression that is asked for.
+
+    Attributes
+    ----------
+    max_deflection : float
+        Maximum approach of the plates, m; 0 < max_deflection <= 10.
+    points : int
+        Points of the curve, the undeformed ball included; 2 <= points <= 10000.
+    gas : str
+        Gas in the ball: leaves by the hole, or is sealed in; "vented", "isothermal", "adiabatic".
+    """
+
+    max_deflection: float = 0.04
+    points: int = 41
+    gas: CompressionGas = "vented"
+
+
+@dataclass(frozen=True)
 class Floor(Group):
     """Floor over the room below: a homogeneous plate.
 
@@ -242,22 +261,6 @@ class Room(Group):
     reverberation_times: Sequence[float] = ()
     air_density: float = 1.2
     sound_speed: float = 343.0
-class Compression(Group):
-    """Slow compression that is asked for.
-
-    Attributes
-    ----------
-    max_deflection : float
-        Maximum approach of the plates, m; 0 < max_deflection <= 10.
-    points : int
-        Points of the curve, the undeformed ball included; 2 <= points <= 10000.
-    gas : str
-        Gas in the ball: leaves by the hole, or is sealed in; "vented", "isothermal", "adiabatic".
-    """
-
-    max_deflection: float = 0.04
-    points: int = 41
-    gas: CompressionGas = "vented"
 
 
 @dataclass(frozen=True)
@@ -384,7 +387,7 @@ class FiniteElement(Group):
     mooney_share: float = field(default=0.2, metadata={"group": "material"})
     bulk_ratio: float = field(default=200.0, metadata={"group": "material"})
     viscosity: FiniteElementViscosity = field(default="fractional", metadata={"group": "material"})
-    loss_factor: float = field(default=0.142, metadata={"group": "material"})
+    loss_factor: float = field(default=0.143, metadata={"group": "material"})
     loss_frequency: float = field(default=74.0, metadata={"group": "material"})
     fractional_order: float = field(default=0.3, metadata={"group": "material"})
     prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
