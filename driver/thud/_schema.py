@@ -39,7 +39,6 @@ HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservativ
 ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
 FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
-FiniteElementTreatment = Literal["penalty", "impulse"]
 LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
 LevelsForce = Literal["floor", "elastic"]
@@ -281,11 +280,11 @@ class FiniteElement(Group):
         Moduli over the long-term modulus, of prony; 0 <= prony_share <= 1000; group ``&material``.
     prony_time : sequence of float
         Relaxation times, of prony, s; 0 < prony_time <= 1000; group ``&material``.
-    treatment : str
-        How the floor holds the ball; "penalty", "impulse"; group ``&contact``.
-    penalty_ratio : float
-        Stiffness of the penalty over that of the elements above it, per area; 0.01 <=
-        penalty_ratio <= 100; group ``&contact``.
+    friction : float
+        Coefficient of friction between ball and floor; 0 <= friction <= 100; group ``&contact``.
+    layer_stiffness : float
+        Stiffness per area of a thin layer on the floor; 0: none, the floor is hard, N/m3; 0 <=
+        layer_stiffness <= 1e+13; group ``&contact``.
     snapshot_interval : float
         Time between snapshots of the deformed ball; 0: none, s; 0 <= snapshot_interval <= 10;
         group ``&output``.
@@ -302,13 +301,13 @@ class FiniteElement(Group):
     mooney_share: float = field(default=0.2, metadata={"group": "material"})
     bulk_ratio: float = field(default=200.0, metadata={"group": "material"})
     viscosity: FiniteElementViscosity = field(default="fractional", metadata={"group": "material"})
-    loss_factor: float = field(default=0.142, metadata={"group": "material"})
+    loss_factor: float = field(default=0.143, metadata={"group": "material"})
     loss_frequency: float = field(default=74.0, metadata={"group": "material"})
     fractional_order: float = field(default=0.3, metadata={"group": "material"})
     prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
     prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
-    treatment: FiniteElementTreatment = field(default="impulse", metadata={"group": "contact"})
-    penalty_ratio: float = field(default=3.0, metadata={"group": "contact"})
+    friction: float = field(default=0.0, metadata={"group": "contact"})
+    layer_stiffness: float = field(default=0.0, metadata={"group": "contact"})
     snapshot_interval: float = field(default=0.001, metadata={"group": "output"})
 
 
@@ -444,8 +443,8 @@ KEYS = (
     Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, of fractional; 1: kelvin_voigt", (), 0.0, 1.0),
     Key("finite_element", "material", "prony_share", "list", "", "moduli over the long-term modulus, of prony", (), 0.0, 1000.0),
     Key("finite_element", "material", "prony_time", "list", "s", "relaxation times, of prony", (), 0.0, 1000.0),
-    Key("finite_element", "contact", "treatment", "choice", "", "how the floor holds the ball", ('penalty', 'impulse')),
-    Key("finite_element", "contact", "penalty_ratio", "real", "", "stiffness of the penalty over that of the elements above it, per area", (), 0.01, 100.0),
+    Key("finite_element", "contact", "friction", "real", "", "coefficient of friction between ball and floor", (), 0.0, 100.0),
+    Key("finite_element", "contact", "layer_stiffness", "real", "N/m3", "stiffness per area of a thin layer on the floor; 0: none, the floor is hard", (), 0.0, 10000000000000.0),
     Key("finite_element", "output", "snapshot_interval", "real", "s", "time between snapshots of the deformed ball; 0: none", (), 0.0, 10.0),
     Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
     Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),

@@ -10,7 +10,6 @@ from thud._schema import (
     Ball,
     Drop,
     FiniteElementLaw,
-    FiniteElementTreatment,
     FiniteElementViscosity,
     HollowSphereMomentumFlux,
     ModalBallDampingLaw,
@@ -56,8 +55,8 @@ class FiniteElementOptions(SamplingOptions, total=False):
     fractional_order: float
     prony_share: Sequence[float]
     prony_time: Sequence[float]
-    treatment: FiniteElementTreatment
-    penalty_ratio: float
+    friction: float
+    layer_stiffness: float
     snapshot_interval: float
 
 class MeasuredModesOptions(SamplingOptions, total=False):

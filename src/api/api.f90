@@ -173,6 +173,7 @@ contains
          call bundle%add_array('motion.position', [shape(motion%start), n_frame], motion%position)
          call bundle%add_array('motion.velocity', [shape(motion%start), n_frame], motion%velocity)
          call bundle%add_array('motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
+         call bundle%add_array('motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
          call bundle%add_array('motion.cavity_pressure', [n_frame], motion%cavity_pressure)
       end associate
    end subroutine add_history

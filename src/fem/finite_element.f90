@@ -66,7 +66,7 @@ contains
       real(wp) :: cost
 
       ! The number of elements, and of steps, which grows as they shrink.
-      cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
+      cost = 0.3_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
       ! Branches cost more than all the rest.
       if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) &
          cost = 2.5_wp*cost
@@ -149,12 +149,11 @@ contains
       !> The ball cannot be computed, or the record is too short.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, time, first_energy
-      integer :: i, k, n_step, n_sample, stride, look, latest, last
+      integer :: i, k, n_step, n_sample, stride, look, latest
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
       n_step = 0
-      last = ubound(run%position, 2)
       look = max(1, nint(look_interval*sampling%sample_rate))
       stride = huge(stride)
       if (size(history%motion%time) > 0) stride = get_stride(options, sampling)
@@ -175,8 +174,7 @@ contains
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
                if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
-                  run%node_impulse/interval/get_nodal_areas(run%position(:, last, 1), run%position(:, last, 2)), &
-                  run%state%gas_pressure)
+                  get_contact_stress(run, interval), run%state%gas_pressure)
                run%node_impulse = 0.0_wp
             end if
             call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
@@ -247,9 +245,23 @@ contains
       logical :: touches
 
       associate (last => ubound(run%position, 2))
-         touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity)) < 0.0_wp
+         touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity) &
+            - run%contact%edge_height) < 0.0_wp
       end associate
    end function will_touch
+
+   !> Stress of the floor on the deformed surface, its mean since the latest sample.
+   pure function get_contact_stress(run, interval) result(stress)
+      type(impact_run_type), intent(in) :: run
+      !> Sampling interval, s.
+      real(wp), intent(in) :: interval
+      !> Outwards and upwards, Pa: [0:n_polar, 2].
+      real(wp) :: stress(0:ubound(run%position, 1), 2)
+
+      associate (surface => run%position(:, ubound(run%position, 2), :))
+         stress = run%node_impulse/interval/spread(get_nodal_areas(surface(:, 1), surface(:, 2)), 2, 2)
+      end associate
+   end function get_contact_stress
 
    !> Beginning of a sentence with the time of an event.
    function place(time) result(text)

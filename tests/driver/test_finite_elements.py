@@ -207,7 +207,7 @@ BAD = {
     "&material prony_share = 0.1, prony_time = 1e-3 /": "do nothing with viscosity",
     "&material viscosity = 'constant_loss', loss_factor = 1 /": "no Prony series",
     "&material bulk_ratio = 1e9 /": "&material: bulk_ratio",
-    "&contact treatment = 'glue' /": "&contact: treatment",
+    "&contact friction = -0.1 /": "&contact: friction",
     "&finite_element flight_before = 0.9 /": "longer than the fall",
     "&finite_element bounces = 3 /": "after contact 3",
     "&finite_element step_safety = 1.5 /": "&finite_element: step_safety",
