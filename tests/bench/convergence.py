@@ -38,7 +38,11 @@ def main() -> None:
     for study, (height, runs) in STUDIES.items():
         for options in runs:
             found = thud.solve(
-                FLAGSHIP, thud.Drop(height), "finite_element", snapshot_interval=0, **{**LAW, **options}
+                FLAGSHIP,
+                thud.Drop(height),
+                "finite_element",
+                snapshot_interval=0,
+                **{**LAW, **options},
             )
             value = ", ".join(f"{v}" for v in options.values())
             levels = " | ".join(f"{level:.2f}" for level in found.levels())

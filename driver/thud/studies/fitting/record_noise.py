@@ -166,7 +166,7 @@ class Quiet:
         found = fit_background(cells, left, peak)
         # What the waves have taken of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        return replace(found, variances=scale * found.variances)
+        return replace(found, draws=scale * found.draws)
 
     def tones(self) -> tuple[float, ...]:
         """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
