@@ -14,6 +14,7 @@ from thud._schema import (
     FiniteElementViscosity,
     HollowSphereMomentumFlux,
     ModalBallDampingLaw,
+    ModalBallFloorFriction,
     ModelName,
     ModelOptions,
 )
@@ -38,6 +39,7 @@ class ModalBallOptions(SamplingOptions, total=False):
     fractional_order: float
     cavity_gas: bool
     contact_gravity: bool
+    floor_friction: ModalBallFloorFriction
     static_families: Sequence[int]
 
 class FiniteElementOptions(SamplingOptions, total=False):
