@@ -43,6 +43,7 @@ ModelName = Literal[
 ]
 HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
 ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
+ModalBallFloorFriction = Literal["none", "stick"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
 FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
 LevelsMethod = Literal["exact", "fft"]
@@ -306,6 +307,8 @@ class ModalBall(Group):
         The gas in the cavity resists changes of its volume.
     contact_gravity : bool
         Gravity acts during the contact too.
+    floor_friction : str
+        Friction of the floor: none, or without end; "none", "stick".
     static_families : sequence of int
         Harmonics that answer statically; 0 <= static_families <= harmonics.
     """
@@ -321,6 +324,7 @@ class ModalBall(Group):
     fractional_order: float = 0.3
     cavity_gas: bool = True
     contact_gravity: bool = False
+    floor_friction: ModalBallFloorFriction = "none"
     static_families: Sequence[int] = ()
 
 
@@ -554,6 +558,7 @@ KEYS = (
     Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, of fractional; 1: rising", (), 0.0, 1.0),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
+    Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none, or without end", ('none', 'stick')),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics", True),
     Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0, True),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),

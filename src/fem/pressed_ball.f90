@@ -113,7 +113,8 @@ contains
             error = numerical_error('&compression: max_deflection: at '//to_text(pressed%deflection) &
                //' m the walls of the cavity meet; allowed: less')
             return
-         else if (halvings > max_halvings) then
+         end if
+         if (halvings > max_halvings) then
             error = numerical_error('&compression: max_deflection: no state of rest was found beyond ' &
                //to_text(pressed%deflection)//' m; allowed: less, or more polar_elements')
             return

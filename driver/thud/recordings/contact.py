@@ -66,8 +66,8 @@ class Contact:
         Maximum sample less the offset, N: a scale.
     span : tuple of int
         First sample of the part with its background removed, and the one behind it.
-    force : ndarray, shape (span[1] - span[0],)
-        Force of the part, N.
+    force, under : ndarray, shape (span[1] - span[0],)
+        Force of the part, and the background that was removed from it, N.
     offset : float
         Mean background that was removed from the gate, N.
     gate : tuple of int
@@ -87,6 +87,7 @@ class Contact:
     peak: float
     span: tuple[int, int]
     force: NDArray[np.float64]
+    under: NDArray[np.float64]
     offset: float
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
@@ -184,6 +185,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         background.peak,
         span,
         force[slice(*span)] - under,
+        under,
         float(under[gate[0] - span[0] : gate[1] - span[0]].mean()),
         gate,
         covariance,

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from thud.studies.emulation.plan import Plan
     from thud.studies.emulation.surrogate import Surrogate
-    from thud.studies.parameter import Parameter
     from thud.studies.temperature import Temperature
 
     Columns = dict[str, NDArray[Any]]

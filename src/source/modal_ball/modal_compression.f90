@@ -8,14 +8,17 @@ module thud_modal_compression
    use thud_modal_ball_options, only: modal_ball_options_type
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: mode_step_type
-   use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
+   use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
    use thud_sphere_modes, only: basis_type, family_type, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: compress_modal_ball
+   public :: compress_modal_ball, new_press
+
+   !> Maximum approach of the plates in a step where rings stick, over the outer radius.
+   real(wp), parameter :: max_step = 1.0e-3_wp
 
 contains
 
@@ -32,23 +35,38 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(surface_rings_type) :: rings
       type(ring_contact_type) :: contact
-      integer :: i
+      real(wp), allocatable :: start(:), gap(:)
+      real(wp) :: before, now
+      integer :: i, k, n_step
 
       force = 0.0_wp
-      rings = new_surface_rings(options%rings, options%static_harmonics)
+      rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call new_press(ball, options, rings, contact, error)
       if (allocated(error)) return
+      allocate (start(size(contact%impulse)), gap(size(contact%impulse)), source=0.0_wp)
+      start(::rings%n_way) = ball%outer_radius*(1 - rings%height)
+      before = 0.0_wp
       do i = 1, size(deflection)
-         call check_interrupt(error)
-         if (.not. allocated(error)) call solve_contact(contact, ball%outer_radius*(1 - rings%height) - deflection(i)/2, &
-            error)
-         if (allocated(error)) return
+         ! Where rings stick, the way there counts.
+         n_step = 1
+         if (rings%n_way == 2) n_step = 1 + int((deflection(i) - before)/(max_step*ball%outer_radius))
+         do k = 1, n_step
+            call check_interrupt(error)
+            if (allocated(error)) return
+            now = before + (deflection(i) - before)*k/n_step
+            gap = start
+            gap(::rings%n_way) = gap(::rings%n_way) - now/2
+            call solve_contact(contact, gap, error)
+            if (allocated(error)) return
+            call follow_sliding(contact, start)
+         end do
+         before = deflection(i)
          if (contact%last == options%rings) then
             error = numerical_error('&compression: max_deflection: at '//to_text(deflection(i)) &
                //' m the ball lies on its outermost ring; allowed: less')
             return
          end if
-         force(i) = sum(contact%impulse)
+         force(i) = sum(contact%impulse(::rings%n_way))
       end do
    end subroutine compress_modal_ball
 
@@ -64,7 +82,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp) :: response(options%rings, options%rings)
+      real(wp) :: response(rings%n_way*options%rings, rings%n_way*options%rings)
       type(ball_type) :: relaxed
       type(mode_step_type) :: no_modes
       real(wp) :: no_damping(0)
@@ -85,7 +103,7 @@ contains
             response = response + 2*matmul(fall, matmul(family%flexibility, transpose(fall)))
          end associate
       end do
-      if (.not. failed) call new_ring_contact(response, contact, failed)
+      if (.not. failed) call new_ring_contact(response, rings%n_way, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, or more static_harmonics')
    end subroutine new_press
