@@ -286,8 +286,9 @@ contains
          component = merge(at_belt, at_gap, tyre%touching)
          if (new_state(component) > 0.0_wp) exit
          length = locate_zero(tyre, time, state, length, component)
-         call rk4_step(tyre, time, state, length, state, valid)
+         call rk4_step(tyre, time, state, length, new_state, valid)
          time = time + length
+         state = new_state
          state([at_belt, at_gap]) = 0.0_wp
          if (tyre%touching) history%contact_time = time
          tyre%touching = .not. tyre%touching
