@@ -55,12 +55,13 @@ def solve(
 STANDARD_BALL = '''
     @classmethod
     def standard(cls) -> Self:
-        """Return the ball that conforms to the standards by finite elements.
+        """Return the standard rubber ball for finite elements.
 
         With its modulus, 2.08 MPa, the first free modes are those that the paper computed by finite
-        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. The call that conforms
-        is ``thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt",
-        loss_factor=0.2, loss_frequency=74.0)``; the shell model has another modulus, the default.
+        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. By
+        ``thud.solve(thud.Ball.standard(), model="finite_element")`` it conforms to the standards up
+        to 250 Hz; the octave of 500 Hz depends on the law of the loss (docs/finite_elements.md).
+        The shell model has another modulus, the default.
         """
         return cls(youngs_modulus=2.08e6)
 '''
