@@ -71,7 +71,9 @@ def test_examples_are_measured_as_they_were_made(
 
 
 def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
-    impact = thud.solve(thud.Ball.standard(), model="finite_element")
+    impact = thud.solve(
+        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+    )
     random = np.random.default_rng(3)
     for quiet, noise, offset in ((0.01, 5.0, 0.0), (0.1, 5.0, 0.0), (0.1, 0.5, 12.0)):
         force = np.pad(impact.floor_force, int(quiet * impact.sample_rate)) + offset
@@ -83,7 +85,9 @@ def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
 
 
 def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
-    impact = thud.solve(thud.Ball.standard(), model="finite_element")
+    impact = thud.solve(
+        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+    )
     assert recorded(impact).conformity().verdict == "cannot be decided"
     verdict = recorded(impact, height=1.0, mass=2.5).conformity()
     assert verdict.verdict == "conforms"

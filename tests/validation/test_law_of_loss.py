@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
-from conftest import REPOSITORY
 
 import thud
 
-# Quadratic elements at large strain, its finest mesh, each law at the restitution 0.805: order, contact
-# time, ms, and octaves of 63, 250 and 500 Hz, dB.
+STUDY = Path(__file__).parents[2] / "inputs/studies/law_of_loss.toml"
+
+# Quadratic elements at large strain, its finest mesh, each law at the restitution 0.805: order,
+# contact time, ms, and octaves of 63, 250 and 500 Hz, dB.
 REFERENCE = np.array(
     [
         [0.15, 19.64, 30.67, 17.87, 9.82],
@@ -21,11 +24,12 @@ REFERENCE = np.array(
 
 
 def test_band_of_the_laws_is_that_of_the_independent_code() -> None:
-    found = thud.sweep(REPOSITORY / "inputs/studies/law_of_loss.toml")
+    found = thud.sweep(STUDY)
     # The study says so; its loss factors have four digits.
     np.testing.assert_allclose(found["restitution"], 0.805, atol=0.002)
     found = found.set_index(set="fractional_order").sel(set=REFERENCE[:, 0])
-    np.testing.assert_allclose(1e3 * found["contact_time"], REFERENCE[:, 1], atol=0.04)
+    # Release is a glancing contact: two samples of the record, and the digits of the reference.
+    np.testing.assert_allclose(1e3 * found["contact_time"], REFERENCE[:, 1], atol=0.06)
     levels = found["floor_level"].sel(octave=[63, 250, 500])
-    # The default mesh: 0.05 dB to 250 Hz, 0.15 dB at 500 Hz; the restitution: 0.03 dB.
-    assert (abs(levels - REFERENCE[:, 2:]).max("set") < [0.08, 0.08, 0.18]).all()
+    # The default mesh, and four digits of the loss factor.
+    np.testing.assert_allclose(levels, REFERENCE[:, 2:], atol=0.08)

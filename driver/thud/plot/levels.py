@@ -12,7 +12,6 @@ from thud._schema import Ball, BandSet, Drop, Levels, LevelsForce, LevelsMethod,
 from thud.checks import refuse
 from thud.impact import Impact, solve
 from thud.levels import octave_limits
-from thud.plot.examples import solve_published
 from thud.plot.look import (
     SIZE,
     Curve,
@@ -128,7 +127,17 @@ def _draw_models() -> Figure:
     impacts = {
         "hollow sphere": solve(),
         "modal ball": solve(model="modal_ball"),
-        "finite elements": solve_published(),
+        # The ends of the band of inputs/studies/law_of_loss.toml.
+        **{
+            f"finite elements, order {order:g}": solve(
+                Ball.standard(),
+                model="finite_element",
+                viscosity="fractional",
+                fractional_order=order,
+                loss_factor=loss_factor,
+            )
+            for order, loss_factor in ((0.15, 0.1305), (1.0, 0.2041))
+        },
     }
     return levels(impacts)
 

@@ -63,7 +63,7 @@ def _draw_laws() -> Figure:
             f"Fractional, order {order:g}": FiniteElement(
                 viscosity="fractional", fractional_order=order, loss_factor=loss
             )
-            for order, loss in ((0.15, 0.1298), (0.3, 0.1424), (0.5, 0.1601))
+            for order, loss in ((0.15, 0.1305), (0.3, 0.1434), (0.5, 0.1613))
         },
         "Kelvin–Voigt": FiniteElement(viscosity="kelvin_voigt", loss_factor=0.2),
         "Constant": FiniteElement(viscosity="constant_loss", loss_factor=0.13),
