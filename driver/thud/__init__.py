@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.compression_fit import CompressionFit as CompressionFit
+    from thud.compression_fit import fit_compression as fit_compression
     from thud.recordings.recording import Recording as Recording
     from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
@@ -69,6 +71,8 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "CompressionFit": "compression_fit",
+    "fit_compression": "compression_fit",
     "read_all": "comparison",
     "Recording": "recordings.recording",
     "quantity": "units",
