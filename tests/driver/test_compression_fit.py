@@ -35,8 +35,8 @@ def test_modulus_and_touch_are_found_with_honest_intervals(
         errors.append((np.array([fit.youngs_modulus, fit.touch]) - truth) ** 2)
         assert fit.noise == pytest.approx(3.0, rel=0.5)
         assert fit.warnings == ()
-    # Of 12 intervals of 90 %, fewer than 7 hold the truth with a probability of 5e-4; over 100 seeds
-    # 94 and 92 of 100 did.
+    # Of 12 intervals of 90 %, fewer than 7 hold the truth with a probability of 5e-4; of 100 seeds
+    # 94 and 92 did.
     assert np.all(covered >= 7)
     np.testing.assert_allclose(np.mean(errors, axis=0), np.diag(fit.covariance), rtol=0.9)
 
