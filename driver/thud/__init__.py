@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.compression_fit import CompressionFit as CompressionFit
+    from thud.compression_fit import fit_compression as fit_compression
     from thud.floors.prediction import RoomPrediction as RoomPrediction
     from thud.floors.prediction import predict_level as predict_level
     from thud.floors.rating import Rating as Rating
@@ -79,6 +81,8 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "CompressionFit": "compression_fit",
+    "fit_compression": "compression_fit",
     "read_all": "comparison",
     "Rating": "floors.rating",
     "Recording": "recordings.recording",

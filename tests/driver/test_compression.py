@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import thud
+from thud import cli
 
 if TYPE_CHECKING:
     import subprocess
@@ -96,3 +97,10 @@ def test_compression_takes_a_model(run: Run, tmp_path: Path) -> None:
     done = run(case)
     assert done.returncode == 1
     assert "&compression in line 1 does nothing with &modes alone" in done.stderr
+
+
+def test_driver_draws_the_compression_of_a_case(tmp_path: Path) -> None:
+    case = tmp_path / "ball.nml"
+    case.write_text(CASE + "&compression points = 5 /")
+    assert cli.main(["run", "-q", "-o", str(tmp_path / "out"), str(case)]) == 0
+    assert {"compression.csv", "compression.png"} <= {p.name for p in (tmp_path / "out").iterdir()}

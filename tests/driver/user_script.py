@@ -34,6 +34,9 @@ missed: list[thud.Criterion] = [one for one in verdict.criteria if not one.confo
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_elements=16)
 press = thud.Compression(gas="isothermal")
 pressed: thud.CompressionCurve = thud.compress(ball, "modal_ball", points=5, gas=press.gas)
+modulus_fit: thud.CompressionFit = thud.fit_compression(
+    pressed.deflection, pressed.force, ball, "modal_ball", gas=press.gas
+)
 bands: thud.Bands = thud.get_bands("third")
 thirds = thud.force_exposure_levels(flagship.floor_force, flagship.sample_rate, "third", "fft")
 many: thud.Ensemble = thud.solve_many({"height": [0.5, 1.0]}, case, source=thud.Limits().source)

@@ -65,8 +65,8 @@ def test_free_modes_of_the_paper(poisson_ratio: float, reference: list[float]) -
 
 def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
     # At 0.2 m/s the ball deflects by 2 mm, 1/16 of its wall. Large strain then takes 2 % off the
-    # static force (test_pressed_ball.py), which is 1 % of the contact time and 0.2 dB. There is next
-    # to no gravity, which the modal ball leaves out.
+    # static force (test_pressed_ball.py), which is 1 % of the contact time and 0.2 dB. There is
+    # next to no gravity, which the modal ball leaves out.
     gravity = 1e-3
     drop = thud.Drop(0.2**2 / (2 * gravity), gravity)
     ball = thud.Ball(poisson_ratio=0.495)

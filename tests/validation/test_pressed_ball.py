@@ -1,4 +1,4 @@
-"""Slow compression against closed forms, Reissner, Hertz, CalculiX, and models against each other."""
+"""Slow compression against closed forms, Reissner, Hertz, CalculiX, and model against model."""
 
 from __future__ import annotations
 

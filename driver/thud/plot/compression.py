@@ -55,4 +55,5 @@ def _draw_models() -> Figure:
     return compression(curves)
 
 
+COMPRESSION_FIGURES = {"compression": CompressionCurve.plot}
 DOCUMENTATION_FIGURES = {"compression": _draw_models}
