@@ -114,7 +114,7 @@ def test_other_sampling_rates_are_no_hindrance() -> None:
 
 
 @pytest.mark.parametrize(
-    ("noise", "count"), [(5.0, 100), (None, 200)], ids=["given noise", "noise from the residuals"]
+    ("noise", "count"), [(5.0, 100), (None, 100)], ids=["given noise", "noise from the residuals"]
 )
 def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, count: int) -> None:
     # 90 % of the intervals are to hold the truth: the number of those that do is binomial, and

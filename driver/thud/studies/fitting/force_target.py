@@ -389,8 +389,9 @@ class ForceMisfit(Misfit):
         inside = (time >= begin) & (time <= begin + impact.contact_time)
         unit = deviation * self.unit_deviation
         found = _contact_doubt(weighted, inside, count, unit)
-        found = found or _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
-        found = found or residual_doubts(weighted, time)
+        if not found:
+            found = residual_doubts(weighted, time)
+            found += _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
         if not (self.quiet.known or self.target.offset is not None or self.exact):
             found.append(
                 f"the record has {1e3 * self.quiet.seconds:.3g} ms of quiet: offset, hum and "

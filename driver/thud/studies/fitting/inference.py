@@ -139,9 +139,9 @@ def pair_sentences(
         size = strong[i, j]
         # 1.00 would hide a difference.
         digits = int(np.clip(np.ceil(-np.log10(max(1 - size, 1e-9))), 2, 9))
-        words = "cannot be" if size >= INSEPARABLE else "are hard to be"
+        words = "cannot be told" if size >= INSEPARABLE else "are hard to tell"
         value = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
-        found.append(f"{names[i]} and {names[j]} {words} told apart: correlation {value}")
+        found.append(f"{names[i]} and {names[j]} {words} apart: correlation {value}")
     return found
 
 
