@@ -11,7 +11,6 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 from quadratic_impact import HARD, Body, Rubber, drop_of_library
 
-
 # What 2 x 16 elements read more than 6 x 48 of the same code: docs/finite_elements.md.
 COARSE = np.array([0.09, 0.28, 0.29, -0.24, 0.63])
 
