@@ -246,7 +246,6 @@ def test_missing_files_get_one_sentence(name: str, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def plate():  # noqa: ANN201 - a module
     """Return the example."""
-    pytest.importorskip("skfem", reason="scikit-fem, of the extra bench, is not installed")
     path = REPOSITORY / "docs/examples/plate_scikit_fem.py"
     spec = importlib.util.spec_from_file_location("plate_scikit_fem", path)
     module = importlib.util.module_from_spec(spec)

@@ -293,7 +293,7 @@ def show(name: str, found: Impact | thud.Impact, levels: np.ndarray) -> None:
 
 
 def main() -> None:
-    """Print the table; it takes a quarter of an hour."""
+    """Print the table; it takes half an hour."""
     sys.stdout.write("| | contact, ms | e | 31.5 | 63 | 125 | 250 | 500 Hz |\n")
     sys.stdout.write("|---|---|---|---|---|---|---|---|\n")
     runs = [(n, HARD, 0.0) for n in (2, 3, 4, 6, 8)]
@@ -302,7 +302,7 @@ def main() -> None:
         found = Body(Rubber(), through, 8 * through).drop(penalty, friction)
         name = f"{through} x {8 * through}, {penalty:.1e} Pa/m, friction {friction}"
         show(name, found, found.levels)
-    for through, friction in ((8, 0.0), (12, 0.0), (16, 0.0), (24, 0.0)):
+    for through, friction in ((8, 0.0), (16, 0.0), (8, 0.5), (16, 0.5)):
         impact = drop_of_library(through, friction)
         show(f"thud, {through} x {8 * through}, friction {friction}", impact, impact.levels())
 

@@ -9,17 +9,21 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from quadratic_impact import Body, Rubber, drop_of_library
+from quadratic_impact import HARD, Body, Rubber, drop_of_library
+
+# What 2 x 16 elements read more than 6 x 48 of the same code: docs/finite_elements.md.
+COARSE = np.array([0.09, 0.28, 0.29, -0.24, 0.63])
 
 
 def test_flagship_is_that_of_a_second_code() -> None:
-    found, impact = Body(Rubber(), 2, 16).drop(4e9), drop_of_library(8)
-    # Its step is of first order in the losses, 1e-6 s long.
+    found, impact = Body(Rubber(), 2, 16).drop(HARD), drop_of_library(8)
+    # Its steps of 1e-6 s are of first order in the losses.
     assert found.impulse_residual < 1e-5
     assert found.energy_residual < 1e-4
-    assert impact.contact_time == pytest.approx(found.contact_time, rel=0.02)
-    assert impact.restitution == pytest.approx(found.restitution, abs=0.01)
-    # What this mesh and penalty are from 8 x 64 and the limit of the penalty, and the latter from
-    # the library (0.1 dB): docs/finite_elements.md.
-    coarse = np.array([0.12, 0.36, 0.23, 0.1, 1.0])
-    assert (np.abs(impact.levels() - found.levels) < coarse + 0.1).all()
+    # The coarse mesh is 0.25 ms off.
+    assert impact.contact_time == pytest.approx(found.contact_time + 0.25e-3, abs=0.1e-3)
+    assert impact.restitution == pytest.approx(found.restitution - 0.0014, abs=0.002)
+    difference = np.abs(impact.levels() - (found.levels - COARSE))
+    assert difference[:4].max() < 0.05
+    # 8 x 64 elements of the library are not converged at 500 Hz.
+    assert difference[4] < 0.2

@@ -28,6 +28,14 @@ def test_one_mass_on_hertz_s_force_does_not() -> None:
     assert met == [False, False, False, True, False]
 
 
+def test_one_mass_on_the_patch_conforms_too() -> None:
+    # docs/lumped_models.md: it is the law of the patch that Hertz's force lacks, not the belt.
+    model = replace(TYRE.model, belt_frequency=2e3, carcass_stiffness=4.6e4, contact_damping=0.055)
+    impact = thud.solve_case(replace(TYRE, model=model))
+    assert impact.conformity().conforms
+    np.testing.assert_allclose(impact.levels(), [47.8, 41.2, 22.0, 13.1, 4.1], atol=0.06)
+
+
 def test_rigid_sidewall_is_one_mass_on_the_patch() -> None:
     # The sidewall's flexibility falls with the square of the frequency, and all that it does.
     levels = [
