@@ -191,7 +191,7 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             assert abs(found.value - truth) <= found.expanded
 
 
-NOT_COUNTED = "an uncertainty is neither given nor counted of: "
+NOT_COUNTED = "no uncertainty is given, and none counted, of: "
 
 
 def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:
