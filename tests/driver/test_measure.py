@@ -348,6 +348,13 @@ class Call:
         return Path.touch, (self.path,)
 
 
+def test_drops_that_held_more_than_their_force() -> None:
+    recording = thud.read_recording(FOLDER / "three_drops.flac", config=FOLDER / "lab.toml")
+    for drop in recording.drops:
+        known = drop.force.nbytes + drop.contact.covariance.nbytes
+        assert len(pickle.dumps(drop)) < known + 20_000
+
+
 def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
     monkeypatch.setattr(measurement, "WORTH", 1)
