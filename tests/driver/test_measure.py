@@ -195,7 +195,7 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             assert abs(found.value - truth) <= found.expanded
 
 
-NOT_COUNTED = "an uncertainty is neither given nor counted of: "
+NOT_COUNTED = "no uncertainty is given, and none counted, of: "
 
 
 def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:
@@ -350,6 +350,13 @@ class Call:
     def __reduce__(self) -> tuple[object, ...]:
         """Return what is called, and its arguments."""
         return Path.touch, (self.path,)
+
+
+def test_drops_that_held_more_than_their_force() -> None:
+    recording = thud.read_recording(FOLDER / "three_drops.flac", config=FOLDER / "lab.toml")
+    for drop in recording.drops:
+        known = drop.force.nbytes + drop.contact.covariance.nbytes
+        assert len(pickle.dumps(drop)) < known + 20_000
 
 
 def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -79,10 +79,10 @@ def remembered(measure: Any) -> Any:  # noqa: ANN401 - a function
     known: dict[Any, Any] = {}
 
     @functools.wraps(measure)
-    def measured(drop: Drop, *arguments: str) -> Any:  # noqa: ANN401
-        key = (drop.force.tobytes(), *arguments)
+    def measured(drop: Drop, *arguments: str, low_pass: bool) -> Any:  # noqa: ANN401
+        key = (drop.force.tobytes(), *arguments, low_pass)
         if key not in known:
-            known[key] = measure(drop, *arguments)
+            known[key] = measure(drop, *arguments, low_pass=low_pass)
         found = known[key]
         return found if isinstance(found, dict) else replace(found, name=drop.name)
 

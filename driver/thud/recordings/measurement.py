@@ -177,6 +177,9 @@ def measure_window(window: Window, config: Config) -> Drop:
         mass_uncertainty=config.mass_uncertainty or 0.0,
         height_uncertainty=config.height_uncertainty or 0.0,
     )
+    # Factors that the background has cached serve the fit alone, and are larger than all else.
+    contact = replace(drop.contact, background=replace(drop.contact.background))
+    drop = replace(drop, contact=contact)
     if plate is None:
         return drop
     time = drop.contact_time

@@ -219,7 +219,7 @@ class Recording(Displayed):
         }
         if any(missing.values()):
             words = ", ".join(what for what in missing if missing[what])
-            found.append(f"an uncertainty is neither given nor counted of: {words}")
+            found.append(f"no uncertainty is given, and none counted, of: {words}")
         return tuple(found)
 
     @property

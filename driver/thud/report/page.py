@@ -28,7 +28,7 @@ SIZE = 7.3
 WIDTH, COLUMN, LABEL, REASON = 186.0, 91.0, 23.0, 112.0
 # Lines of a value, of the instruments, of files, of the blocks of notes and of a note.
 VALUE_LINES, INSTRUMENT_LINES, FILES = 2, 6, 5
-RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 5, 7
+RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 8, 7
 SENTENCE_LINES = 3
 # Of two drops, none is an outlier.
 MIN_DROPS = 2
@@ -200,9 +200,8 @@ def _rule(data: dict[str, Any]) -> str:
     )
 
 
-def _results(data: dict[str, Any]) -> list[str]:
-    """Return sentences on drops, other quantities and methods."""
-    drops, low, high = data["drops"], *BACKGROUND
+def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
+    """Return sentences on means of the drops that are no criteria."""
     names = {"peak_force": ("peak force below 1.25 kHz", "N", 0), "impulse": ("impulse", "N s", 2)}
     names["effective_mass"] = ("effective mass", "kg", 3)
     means = []
@@ -210,10 +209,18 @@ def _results(data: dict[str, Any]) -> list[str]:
         known = [one[key]["value"] for one in drops if one[key]["value"] is not None]
         if known:
             means.append(f"{title} {number(sum(known) / len(known), decimals)} {unit}")
-    ways = list(dict.fromkeys(one["restitution_by"] for one in drops if one["restitution_by"]))
-    found = [f"mean: {', '.join(means)}"]
-    if ways:
-        found.append(f"restitution by {', '.join(ways)}")
+    ways: dict[str, list[float]] = {}
+    for one in drops:
+        for way, estimate in one["restitutions"].items():
+            ways.setdefault(way, []).append(estimate["value"])
+    by = [f"by {way} {number(sum(found) / len(found), 3)}" for way, found in ways.items()]
+    return [f"mean: {', '.join(means)}", *([f"mean restitution: {', '.join(by)}"] if by else [])]
+
+
+def _results(data: dict[str, Any]) -> list[str]:
+    """Return sentences on drops, other quantities and methods."""
+    drops, low, high = data["drops"], *BACKGROUND
+    found = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
     found.append(
         f"levels: {averaged}, method exact (band energy of the contact and at least "
