@@ -134,7 +134,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
     np.testing.assert_allclose(levels.level, recording.levels(), rtol=0, atol=1e-9)
     oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
     pairs = zip(BANDS.lower, BANDS.upper, strict=True)
-    energy, bounds = np.array([oracle.band_bound(*edges) for edges in pairs]).T
+    energy, bounds = np.array([band_bound(oracle, *edges) for edges in pairs]).T
     found = 10 ** (levels.measured / 10) - 10 ** (levels.background / 10)
     decibels = levels.level - 10 * np.log10(energy)
     pull = decibels / levels.uncertainty
@@ -152,6 +152,13 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
         np.where(upper, np.nan, decibels),
         ENERGY_DECIBEL * bounds / energy,
     )
+
+
+def band_bound(oracle: Drop, lower: float, upper: float) -> tuple[float, float]:
+    """Return the energy of a band, N2 s, and the deviation of its best unbiased estimate."""
+    value, covariance = oracle.band_values(lower, upper)
+    variance = 4 * float(value @ covariance @ value) + 2 * float((covariance**2).sum())
+    return float(value @ value), float(np.sqrt(variance))
 
 
 def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording

@@ -106,26 +106,19 @@ class Drop:
         The second is the standard deviation of the energy of the force when the first is subtracted
         from what is measured (docs/recordings_theory.md, section 4).
         """
-        value, covariance = self._band(lower, upper)
+        value, covariance = self.band_values(lower, upper)
         noise, squares = float(np.trace(covariance)), float((covariance**2).sum())
         # The first term is too large by twice the second, on the mean.
         variance = max(4 * float(value @ covariance @ value) - 2 * squares, 2 * squares)
         density, doubt = self.contact.background.density((lower + upper) / 2)
         return noise, math.sqrt(variance + (noise * doubt / density) ** 2)
 
-    def band_bound(self, lower: float, upper: float) -> tuple[float, float]:
-        """Return energy and deviation of the best unbiased estimate, N2 s, where this is the force.
+    def band_values(
+        self, lower: float, upper: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return values whose squares add up to the energy of the gate in a band, N2 s.
 
-        The noise counts as known.
-        """
-        value, covariance = self._band(lower, upper)
-        variance = 4 * float(value @ covariance @ value) + 2 * float((covariance**2).sum())
-        return float(value @ value), math.sqrt(variance)
-
-    def _band(self, lower: float, upper: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return functionals of the gated force the squares of which add up to a band's energy.
-
-        Their values and the covariance of the noise in them.
+        Linear functionals of the force, [n], and the covariance of the noise in them, [n, n].
         """
         first, stop = self.gate
         force, time = self.force[first:stop], self.time[first:stop]
