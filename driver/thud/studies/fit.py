@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case
@@ -25,6 +25,9 @@ from thud.record import read_record
 from thud.recordings.formats import FORMATS as RECORDING_FORMATS
 from thud.recordings.recording import Recording, read_recording
 from thud.studies.directory import FORMATS
+from thud.studies.emulation.answered_levels import answered, confirmed, within_region
+from thud.studies.emulation.plan import read_plan
+from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.level_target import LevelTarget
@@ -37,6 +40,7 @@ from thud.studies.study import Study, table_of, with_density
 from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterable, Mapping
     from pathlib import Path
 
@@ -44,6 +48,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from thud.impact import Impact
+    from thud.studies.fitting.misfit import Misfit
+    from thud.studies.fitting.ranges import Range
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
 
@@ -67,6 +73,7 @@ def fit(  # noqa: PLR0913 - options of a search
     starts: int = 1,
     seed: int = 0,
     max_steps: int = 100,
+    surrogate: Surrogate | str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
@@ -93,6 +100,9 @@ def fit(  # noqa: PLR0913 - options of a search
         Seed of the other starts.
     max_steps
         Maximum number of steps from each start.
+    surrogate
+        What answers the drops of the search instead of the model, or the path of its file; for
+        levels. Its errors add to the given uncertainties; the impact at the result is the model's.
     progress
         Show how many impacts were computed.
 
@@ -123,10 +133,29 @@ def fit(  # noqa: PLR0913 - options of a search
     ranges = get_ranges(case, bound_parameters(case, parameters))
     if not isinstance(target, ForceTarget | LevelTarget):
         target = ForceTarget(target)
-    found = search(case, ranges, target.misfit(), options, progress=progress)
+    if surrogate is not None and not isinstance(surrogate, Surrogate):
+        surrogate = read_surrogate(surrogate)
+    found = _search(case, ranges, target.misfit(), options, surrogate, progress=progress)
     for sentence in found.warnings:
         warnings.warn(sentence, FitWarning, stacklevel=3)
     return found
+
+
+def _search(  # noqa: PLR0913 - those of `search`, and a surrogate
+    case: Case,
+    ranges: list[Range],
+    misfit: Misfit,
+    options: Mapping[str, Any],
+    surrogate: Surrogate | None,
+    *,
+    progress: bool,
+) -> Fit:
+    """Return the best fit by the model or, where there is one, by a surrogate."""
+    if surrogate is None:
+        return search(case, ranges, misfit, options, progress=progress)
+    by_answers = answered(misfit, surrogate, case, [entry.name for entry in ranges])
+    inside = [within_region(entry, surrogate) for entry in ranges]
+    return confirmed(search(case, inside, by_answers, options, progress=progress), by_answers)
 
 
 def _require_options(options: Mapping[str, Any]) -> None:
@@ -148,11 +177,14 @@ class FitStudy(Study):
         The file as JSON holds it.
     options : dict
         Confidence of the intervals, starts, seed and maximum number of steps.
+    surrogate : Surrogate or None
+        What answers the drops instead of the model.
     """
 
     target: ForceTarget | LevelTarget = field(default_factory=lambda: LevelTarget(()))
     tables: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
+    surrogate: Surrogate | None = None
 
     @property
     def units(self) -> dict[str, tuple[str, float]]:
@@ -167,6 +199,7 @@ class FitStudy(Study):
             **{f"[target] {key}": f"{value!r}" for key, value in self.tables["target"].items()},
             "numbers of [target]": hashlib.sha256(vector.tobytes()).hexdigest()[:16],
             **{name: f"{value!r}" for name, value in self.options.items()},
+            **({"surrogate": self.surrogate.digest} if self.surrogate else {}),
         }
 
 
@@ -174,7 +207,7 @@ class FitKind(Kind[FitStudy, Fit]):
     """Fits as a kind of study."""
 
     name = "fit"
-    words = ("target", *OPTIONS)
+    words = ("target", "surrogate", *OPTIONS)
 
     def new_parameter(self, name: str, given: object, case: Case, centre: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
@@ -196,15 +229,31 @@ class FitKind(Kind[FitStudy, Fit]):
         # JSON knows neither dates nor infinity.
         tables = json.loads(json.dumps(given, default=str), parse_constant=str)
         head = {**vars(study), "case": case}
-        return FitStudy(**head, target=target, tables=tables, options=options)
+        found = FitStudy(**head, target=target, tables=tables, options=options)
+        if "surrogate" not in given:
+            return found
+        trained = read_plan(table_of(given, "surrogate"), folder)
+        if not isinstance(trained, Surrogate):
+            refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
+        return self.with_surrogate(found, trained)
+
+    def with_surrogate(
+        self, study: FitStudy, given: Surrogate | str | os.PathLike[str]
+    ) -> FitStudy:
+        """Return a study whose drops a surrogate answers. Raises InputError where it cannot."""
+        trained = given if isinstance(given, Surrogate) else read_surrogate(given)
+        names = [parameter.name for parameter in study.parameters]
+        answered(study.target.misfit(), trained, study.case, names)
+        return replace(study, surrogate=trained)
 
     def compute(self, study: FitStudy, folder: Path | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
         """Return the fit."""
-        return search(
+        return _search(
             study.case,
             get_ranges(study.case, study.parameters),
             study.target.misfit(),
             study.options,
+            study.surrogate,
             progress=how.get("progress", False),
         )
 

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from thud.checks import refuse_value, require_number
+from thud.impact import compute
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from thud.case import Case
     from thud.impact import Impact
 
 
@@ -59,6 +61,10 @@ class Misfit(ABC):
     def first_shift(self, impact: Impact) -> float:
         """Return a time of first touch to start from, s."""
         raise NotImplementedError
+
+    def solve(self, case: Case) -> Impact:
+        """Return the impact of a case."""
+        return compute(case)
 
     def doubt(self, impact: Impact, shift: float, count: int) -> str:  # noqa: ARG002
         """Return what `count` parameters cannot explain, or nothing."""
