@@ -359,9 +359,45 @@ def test_drops_without_result_are_refused() -> None:
         thud.surrogate(study)
 
 
-def test_fits_take_no_surrogate() -> None:
-    with pytest.raises(thud.InputError, match="not allowed for a fit study"):
-        thud.studies.kinds.get_kind("fit").run(
-            {"target": {"levels": [39, 31, 23, 17, 12.5]}, "parameters": {"height": {}}},
-            surrogate="x.npz",
+def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
+    truth = {"youngs_modulus": 1.77e6, "wall_thickness": 0.0304}
+    case = replace(
+        trained.case, ball=replace(trained.case.ball, **truth), drop=thud.Drop(height=1.0)
+    )
+    impact = thud.solve_case(case)
+    target = thud.LevelTarget(
+        impact.levels().tolist(), 0.05, contact_time=(impact.exact_contact_time, 2e-5)
+    )
+    starts = {"youngs_modulus": 1.85e6, "wall_thickness": 0.0307}
+    with pytest.warns(thud.FitWarning, match="errors of the surrogate are up to"):
+        found = thud.fit(target, starts, replace(case, ball=thud.Ball()), surrogate=trained)
+    assert found.converged
+    for name, value in truth.items():
+        # The target is exact: only the surrogate errs, whose share of the variances is small.
+        assert abs(found.values[name] - value) < found.standard_errors[name]
+    # The impact is that of the model.
+    np.testing.assert_array_equal(found.impact.floor_force, thud.solve_case(found.case).floor_force)
+    # Errors of the surrogate add to the uncertainties.
+    variance = 0.05**2 + trained.mean_square("floor_level")
+    np.testing.assert_allclose(found.misfit.deviation[:5] ** 2, variance)
+
+
+def test_fits_refuse_what_a_surrogate_does_not_know(trained: thud.Surrogate) -> None:
+    case = trained.case
+    levels = thud.LevelTarget([39, 31, 23, 17, 12.5], 0.5)
+    with pytest.raises(thud.InputError, match="surrogate is not allowed for a force"):
+        thud.fit(thud.solve_case(case), {"height": 1.0}, case, surrogate=trained)
+    with pytest.raises(thud.InputError, match="mass: the surrogate was not trained on it"):
+        thud.fit(levels, {"mass": 2.5}, case, surrogate=trained)
+    with pytest.raises(thud.InputError, match=r"height: start = 0\.9 is outside the region"):
+        thud.fit(levels, {"height": 0.9}, case, surrogate=trained)
+    with pytest.raises(thud.InputError, match="has no file; allowed: file"):
+        thud.read_study(
+            {
+                "fixed": FIXED,
+                "target": {"levels": [39, 31, 23, 17, 12.5]},
+                "parameters": {"height": {}},
+                "surrogate": {},
+            },
+            "fit",
         )

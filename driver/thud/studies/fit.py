@@ -26,6 +26,9 @@ from thud.record import read_record
 from thud.recordings.formats import FORMATS as RECORDING_FORMATS
 from thud.recordings.read_recording import read_recording
 from thud.studies.directory import FORMATS
+from thud.studies.emulation.answered_levels import answered, confirmed, within_region
+from thud.studies.emulation.plan import read_plan
+from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.level_target import LevelTarget
@@ -38,6 +41,7 @@ from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterable, Sequence
     from collections.abc import Set as AbstractSet
     from pathlib import Path
@@ -48,6 +52,7 @@ if TYPE_CHECKING:
     from thud.impact import Impact
     from thud.recordings.recording import Recording
     from thud.studies.fitting.misfit import Misfit
+    from thud.studies.fitting.ranges import Range
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
 
@@ -75,6 +80,7 @@ def fit(  # noqa: PLR0913 - options of a search
     starts: int = 1,
     seed: int = 0,
     max_steps: int = 100,
+    surrogate: Surrogate | str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
@@ -101,6 +107,9 @@ def fit(  # noqa: PLR0913 - options of a search
         Seed of the other starts.
     max_steps
         Maximum number of steps from each start.
+    surrogate
+        What answers the drops of the search instead of the model, or the path of its file; for
+        levels. Its errors add to the given uncertainties; the impact at the result is the model's.
     progress
         Show how many impacts were computed.
 
@@ -130,7 +139,9 @@ def fit(  # noqa: PLR0913 - options of a search
     _require_options(options)
     known = bound_parameters(case, parameters)
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in known})
-    found = search(pairs, get_ranges(case, known), options, progress=progress)
+    if surrogate is not None and not isinstance(surrogate, Surrogate):
+        surrogate = read_surrogate(surrogate)
+    found = _search(pairs, get_ranges(case, known), options, surrogate, progress=progress)
     for sentence in found.warnings:
         warnings.warn(sentence, FitWarning, stacklevel=3)
     return found
@@ -173,6 +184,31 @@ def _pairs(
     return found
 
 
+def _search(
+    pairs: list[tuple[Case, Misfit]],
+    ranges: list[Range],
+    options: Mapping[str, Any],
+    surrogate: Surrogate | None,
+    *,
+    progress: bool,
+) -> Fit:
+    """Return the best fit by the model or, where there is one, by a surrogate."""
+    if surrogate is None:
+        return search(pairs, ranges, options, progress=progress)
+    inside = [within_region(entry, surrogate) for entry in ranges]
+    return confirmed(
+        search(_answered(pairs, surrogate, ranges), inside, options, progress=progress)
+    )
+
+
+def _answered(
+    pairs: list[tuple[Case, Misfit]], surrogate: Surrogate, parameters: Iterable[Range | Parameter]
+) -> list[tuple[Case, Misfit]]:
+    """Return pairs whose impacts a surrogate answers."""
+    names = [parameter.name for parameter in parameters]
+    return [(case, answered(misfit, surrogate, case, names)) for case, misfit in pairs]
+
+
 def _require_options(options: Mapping[str, Any]) -> None:
     require_confidence(options["confidence"])
     require_whole("starts", options["starts"], 1, _MAXIMUM)
@@ -192,11 +228,14 @@ class FitStudy(Study):
         The file as JSON holds it.
     options : dict
         Confidence of the intervals, starts, seed and maximum number of steps.
+    surrogate : Surrogate or None
+        What answers the drops instead of the model.
     """
 
     targets: tuple[Target, ...] = ()
     tables: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
+    surrogate: Surrogate | None = None
 
     @property
     def units(self) -> dict[str, tuple[str, float]]:
@@ -215,6 +254,8 @@ class FitStudy(Study):
             found |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
             digest = hashlib.sha256(misfit.data().tobytes()).hexdigest()[:16]
             found[f"numbers of [target{end}]"] = digest
+        if self.surrogate:
+            found["surrogate"] = self.surrogate.digest
         return found | {name: f"{value!r}" for name, value in self.options.items()}
 
     def pairs(self) -> list[tuple[Case, Misfit]]:
@@ -226,7 +267,7 @@ class FitKind(Kind[FitStudy, Fit]):
     """Fits as a kind of study."""
 
     name = "fit"
-    words = ("target", *OPTIONS)
+    words = ("target", "surrogate", *OPTIONS)
 
     def new_parameter(self, name: str, given: object, case: Case, centre: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
@@ -254,14 +295,28 @@ class FitKind(Kind[FitStudy, Fit]):
         head = {**vars(study), "case": case}
         found = FitStudy(**head, targets=targets, tables=shown, options=options)
         found.pairs()
-        return found
+        if "surrogate" not in given:
+            return found
+        trained = read_plan(table_of(given, "surrogate"), folder)
+        if not isinstance(trained, Surrogate):
+            refuse("[surrogate] of a fit has no file", "file, of a surrogate that is trained")
+        return self.with_surrogate(found, trained)
+
+    def with_surrogate(
+        self, study: FitStudy, given: Surrogate | str | os.PathLike[str]
+    ) -> FitStudy:
+        """Return a study whose drops a surrogate answers. Raises InputError where it cannot."""
+        trained = given if isinstance(given, Surrogate) else read_surrogate(given)
+        _answered(study.pairs(), trained, study.parameters)
+        return replace(study, surrogate=trained)
 
     def compute(self, study: FitStudy, folder: Path | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
         """Return the fit."""
-        return search(
+        return _search(
             study.pairs(),
             get_ranges(study.case, study.parameters),
             study.options,
+            study.surrogate,
             progress=how.get("progress", False),
         )
 

@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from thud.checks import refuse_value, require_number
+from thud.impact import compute
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from thud.case import Case
     from thud.impact import Impact
 
 # Names of parameters that records may have of their own.
@@ -85,6 +87,10 @@ class Misfit(ABC):
     def nuisances(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, tuple[float, float]]:  # noqa: ARG002
         """Return nuisance parameters and their standard errors, N, by name."""
         return {}
+
+    def solve(self, case: Case) -> Impact:
+        """Return the impact of a case."""
+        return compute(case)
 
     def doubts(
         self,

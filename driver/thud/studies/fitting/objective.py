@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.errors import NumericalError, ThudError
-from thud.impact import Impact, compute
 from thud.studies.fitting.ranges import with_values
 
 if TYPE_CHECKING:
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
     from thud.case import Case
+    from thud.impact import Impact
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
@@ -85,7 +85,7 @@ class Objective:
             self.evaluations += 1
             self.bar.update()
             try:
-                found.append(compute(self.case_at(part, place)))
+                found.append(part.misfit.solve(self.case_at(part, place)))
             except ThudError as error:
                 self.failures += 1
                 self.error = error
