@@ -20,7 +20,6 @@ from thud.plot.look import (
     new_figure,
 )
 from thud.studies.fitting.misfit import SHIFT
-from thud.studies.fitting.result import file_ends
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -47,8 +46,9 @@ def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figu
 
     Units are given by name and size in SI units.
     """
-    ends = file_ends(len(fit.targets))
-    figures = {f"fit{end}": target_and_fit(fit, number) for number, end in enumerate(ends, start=1)}
+    figures = {
+        f"fit{end}": target_and_fit(fit, number) for number, end in enumerate(fit.ends, start=1)
+    }
     if len(fit.names) > 1:
         figures["confidence"] = confidence(fit, units)
     return figures

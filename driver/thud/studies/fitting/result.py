@@ -128,6 +128,11 @@ class Fit(Displayed):
     targets: tuple[FittedTarget, ...]
 
     @property
+    def ends(self) -> list[str]:
+        """What the names of the files of each target end with."""
+        return file_ends(len(self.targets))
+
+    @property
     def case(self) -> Case:
         """The case of the first target with the fitted values."""
         return self.targets[0].case
@@ -322,7 +327,7 @@ class Fit(Displayed):
         """
         content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
         files = {"fit.json": f"{content}\n".encode()}
-        for target, end in zip(self.targets, file_ends(len(self.targets)), strict=True):
+        for target, end in zip(self.targets, self.ends, strict=True):
             columns = target.columns()
             rows = [columns, *zip(*columns.values(), strict=True)]
             table = "".join(f"{','.join(map(str, row))}\n" for row in rows)
