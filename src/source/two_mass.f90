@@ -29,8 +29,8 @@ module thud_two_mass
    !> Angle by which the fastest motion advances in a step, rad: such steps lose 1e-12 of its energy each.
    real(wp), parameter :: step_angle = 0.02_wp
 
-   !> Steps of one record; more would run for minutes.
-   real(wp), parameter :: max_steps = 1.0e8_wp
+   !> Steps of one record; more would take longer than finite elements, and a tyre needs 1e4.
+   real(wp), parameter :: max_steps = 2.0e7_wp
 
    !> Deflection d0 at which the stiffness of the carcass is given, m.
    real(wp), parameter :: carcass_deflection = 0.02_wp
