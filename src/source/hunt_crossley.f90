@@ -1,5 +1,5 @@
 !> A lumped source on a spring with damping that grows with the deflection (Hunt and Crossley
-!> 1975; paper, reference [6]): for the tyre, and as a baseline.
+!> 1975; paper, reference [6]): a baseline, also of the tyre.
 module thud_hunt_crossley
    use thud_ball, only: ball_type
    use thud_drop, only: drop_type, get_impact_velocity

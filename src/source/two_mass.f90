@@ -29,8 +29,8 @@ module thud_two_mass
    !> Angle by which the fastest motion advances in a step, rad: such steps lose 1e-12 of its energy each.
    real(wp), parameter :: step_angle = 0.02_wp
 
-   !> Steps of one record; more would run for minutes.
-   real(wp), parameter :: max_steps = 1.0e8_wp
+   !> Steps of one record; more would take longer than finite elements, and a tyre needs 1e4.
+   real(wp), parameter :: max_steps = 2.0e7_wp
 
    !> Deflection d0 at which the stiffness of the carcass is given, m.
    real(wp), parameter :: carcass_deflection = 0.02_wp
@@ -135,7 +135,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(tyre_type) :: tyre
       real(wp) :: state(n_state)
-      real(wp) :: step, steps
+      real(wp) :: step
       integer :: i, j, n_sample, n_step
       logical :: left
 
@@ -146,14 +146,8 @@ contains
       history%channel_name = [character(len=19) :: 'belt_displacement_m', 'rim_displacement_m']
       allocate (history%channel(n_sample, 2), source=0.0_wp)
       history%impact_velocity = get_impact_velocity(drop)
-      steps = real(sampling%substeps, wp)*ceiling(min(max_steps, &
-         get_fastest_rate(tyre, history%impact_velocity)/(step_angle*sampling%sample_rate)))
-      if (steps*n_sample > max_steps) then
-         error = input_error('&two_mass: belt_mass = '//to_text(tyre%belt_mass)//' kg with the stiffness of patch and ' &
-            //'sidewall needs '//to_text(steps*n_sample)//' steps; allowed: up to '//to_text(max_steps))
-         return
-      end if
-      n_step = nint(steps)
+      call choose_steps(tyre, history%impact_velocity, sampling, n_step, error)
+      if (allocated(error)) return
       step = 1/(sampling%sample_rate*n_step)
       state = 0.0_wp
       state([at_belt_velocity, at_rim_velocity]) = history%impact_velocity
@@ -193,6 +187,27 @@ contains
          sidewall_stiffness=options%belt_mass*omega**2, &
          sidewall_damping=2*options%belt_damping*options%belt_mass*omega)
    end function new_tyre
+
+   !> Chooses the steps in each sampling interval by the fastest motion.
+   subroutine choose_steps(tyre, impact_velocity, sampling, n_step, error)
+      type(tyre_type), intent(in) :: tyre
+      !> Velocity at first touch, m/s.
+      real(wp), intent(in) :: impact_velocity
+      type(sampling_type), intent(in) :: sampling
+      !> Steps in each sampling interval.
+      integer, intent(out) :: n_step
+      !> The record would take too many.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: steps, total
+
+      steps = real(sampling%substeps, wp)*ceiling(min(max_steps, &
+         get_fastest_rate(tyre, impact_velocity)/(step_angle*sampling%sample_rate)))
+      total = steps*get_sample_count(sampling)
+      n_step = nint(min(steps, max_steps))
+      if (total > max_steps) error = input_error('&two_mass: belt_mass = '//to_text(tyre%belt_mass) &
+         //' kg with the stiffness of patch and sidewall needs '//to_text(total)//' steps; allowed: up to ' &
+         //to_text(max_steps))
+   end subroutine choose_steps
 
    !> Bound of the fastest rate of the motion, rad/s: of its frequencies by the trace, and of its decay.
    pure function get_fastest_rate(tyre, impact_velocity) result(rate)

@@ -42,10 +42,10 @@ def test_slow_impacts_go_to_hertz_s() -> None:
     size, time, force = hertz(SPEEDS)
     time_ratio = [i.exact_contact_time for i in impacts] / time
     force_ratio = [i.peak_force for i in impacts] / force
-    # 128 x 32 elements change the slowest time by 0.1 % and its force by 1 %; the line carries
-    # that to its end with a factor of 2.
-    assert np.polyfit(size, time_ratio, 1)[1] == pytest.approx(1, abs=0.002)
-    assert np.polyfit(size, force_ratio, 1)[1] == pytest.approx(1, abs=0.02)
-    # The line is one: half of what is left at the fastest is left at half the contact radius.
+    # Meshes from 64 x 16 to 128 x 32 change a time by up to 0.2 %, which the line carries to its
+    # end three times as large; that of the force ends at 0.975 to 0.99, as speeds are chosen.
+    assert np.polyfit(size, time_ratio, 1)[1] == pytest.approx(1, abs=0.006)
+    assert np.polyfit(size, force_ratio, 1)[1] == pytest.approx(1, abs=0.03)
+    # What is left falls as the contact radius does; 0.2 % of a time is 0.06 of what is left.
     left = 1 - time_ratio
-    assert left[2] / left[0] == pytest.approx(size[2] / size[0], abs=0.03)
+    assert left[2] / left[0] == pytest.approx(size[2] / size[0], abs=0.06)
