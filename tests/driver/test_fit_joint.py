@@ -84,9 +84,10 @@ def test_three_heights_give_modulus_and_mass(
         offset, error = target.nuisances["offset"]
         assert abs(offset - 4.0 * number) < FAR * error
     # 40 ms of quiet hold some 60 values.
-    found = re.search(r"target 3: standard deviation (\S+) N, that of the quiet", str(fit))
+    found = re.search(r"target 3: noise of (\S+) N in the compared band, by the quiet", str(fit))
     assert found
-    assert float(found[1]) == pytest.approx(8.0, rel=FAR / np.sqrt(2 * 60))
+    band = np.sqrt(2 * 1250 / RATE)
+    assert float(found[1]) == pytest.approx(8.0 * band, rel=FAR / np.sqrt(2 * 60))
 
 
 def test_information_of_records_adds() -> None:

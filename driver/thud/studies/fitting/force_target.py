@@ -25,6 +25,7 @@ from thud.studies.fitting.record_noise import (
     hum_harmonics,
     new_weights,
     trimmed,
+    wave_size,
 )
 from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 
@@ -45,8 +46,8 @@ END = 1e-3
 # residual above this part of the peak force, which exceeds sampling errors.
 MIN_FREEDOM = 5
 NUMERICAL = 1e-4
-# Standard deviations that make hum worth telling.
-NOTABLE = 3.0
+# Standard errors of hum that make it worth telling: noise alone has as much with UNLIKELY.
+NOTABLE = float(np.sqrt(-2 * np.log(UNLIKELY)))
 # Scale of a shift in time, s.
 SHIFT_SCALE = 1e-3
 
@@ -259,13 +260,18 @@ class ForceMisfit(Misfit):
         )
 
     @property
+    def band_share(self) -> float:
+        """Part of the deviation of white noise that lies in the compared band."""
+        return float(np.sqrt(self.count / len(self.time)))
+
+    @property
     def absorbed(self) -> int:
         """Number of nuisance parameters that were projected out of the residuals."""
         return self.offset + 2 * len(self.tones)
 
     @cached_property
     def unit_deviation(self) -> float:
-        """Standard deviation of the noise, N; 1 where it is not known."""
+        """Deviation of white noise with the power of the noise below `below`, N; 1: not known."""
         return self.target.noise or (self.weights.deviation() if self.known_noise else 1.0)
 
     def model_spectrum(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -361,12 +367,9 @@ class ForceMisfit(Misfit):
             found["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
         for place, tone in enumerate(self.tones, start=int(self.offset)):
             pair = np.array([place, place + len(self.tones)])
-            size = float(np.hypot(*value[pair]))
-            slope = value[pair] / size
-            error = float(np.sqrt(slope @ covariance[np.ix_(pair, pair)] @ slope))
-            found[f"hum of {tone:.4g} Hz"] = size, error
+            found[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
         if self.background is not None and self.target.hum is None:
-            mains, size, error = self.background.hum
+            mains, size, error = self.quiet.mains(self.background)
             if size > NOTABLE * error:
                 found[f"hum of {mains:g} Hz"] = size, error
         return found

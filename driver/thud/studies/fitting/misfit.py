@@ -56,6 +56,11 @@ class Misfit(ABC):
         return 1.0
 
     @property
+    def band_share(self) -> float:
+        """Part of the deviation of white noise that lies in the compared band."""
+        return 1.0
+
+    @property
     def absorbed(self) -> int:
         """Number of nuisance parameters that were projected out of the residuals."""
         return 0

@@ -197,6 +197,26 @@ class Quiet:
             best, found = likelihood, (*found, tone)
         return found
 
+    def mains(self, background: Background) -> tuple[float, float, float]:
+        """Return the mains frequency, Hz, and the amplitude and standard error of its hum, N.
+
+        By generalised least squares with the other noise of the quiet.
+        """
+        cells, mean = self._means
+        tone = MAINS[int(np.argmax(background.variances[3:]))]
+        others = np.append(background.variances[:3], np.zeros(len(MAINS)))
+        whiten = _whitening(replace(background, variances=others))
+        basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone])[:, 1:])
+        inverse = np.linalg.inv(triangle)
+        return (tone, *wave_size(inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T))
+
+
+def wave_size(value: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the amplitude of a cosine and a sine, and its standard error."""
+    size = float(np.hypot(*value))
+    slope = value / size
+    return size, float(np.sqrt(slope @ covariance @ slope))
+
 
 def cell_waves(cells: Cells, tones: Sequence[float]) -> NDArray[np.float64]:
     """Return a constant, and means of the waves of tones, Hz, over cells: [n_cell, 1 + 2 n]."""

@@ -91,8 +91,9 @@ class Fit(Displayed):
     confidence : float
         Confidence of the intervals in tables and files.
     noise : float
-        Standard deviation of one residual of the first target: N for forces, for levels in units of
-        their uncertainties, or dB where none were given.
+        Standard deviation of one residual of the first target: for forces that of white noise with
+        the same power in the compared band, N, for levels in units of their uncertainties, or dB
+        where none were given.
     known_noise : bool
         The standard deviations were given, or are those of the quiet of the records.
     residuals : ndarray, shape (n_residual,)
@@ -268,8 +269,11 @@ class Fit(Displayed):
         if self.known_noise and unit == "dB":  # they may differ
             return "standard deviations given"
         size = self.deviation_of(target)
-        source = "given" if misfit.noise_freedom is None else "that of the quiet"
-        source = source if self.known_noise else "estimated from the residuals"
+        if self.known_noise and misfit.noise_freedom is not None:
+            return (
+                f"noise of {size * misfit.band_share:.3g} {unit} in the compared band, by the quiet"
+            )
+        source = "given" if self.known_noise else "estimated from the residuals"
         return f"standard deviation {size:.3g} {unit}, {source}"
 
     def __str__(self) -> str:
