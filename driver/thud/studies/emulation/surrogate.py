@@ -18,7 +18,7 @@ from thud.checks import refuse, require_kind
 from thud.display import Displayed
 from thud.extras import require_extra
 from thud.files import replace_file
-from thud.keys import put
+from thud.keys import OF_FILES, put
 from thud.levels import get_bands
 from thud.studies.emulation.verdict import judge_many
 from thud.studies.study import value_in
@@ -296,7 +296,7 @@ def keys_of(case: Case) -> dict[str, str]:
     return {
         f"&{group}: {key}": f"{value!r}"
         for group, keys in groups.items()
-        if group not in {"case", "limits"}
+        if group not in {"case", "limits", OF_FILES}
         for key, value in keys.items()
     }
 
