@@ -126,6 +126,20 @@ def test_powers_of_a_lumped_source_are_learned() -> None:
     assert found.table()[0][-1] == "error of the surrogate"
 
 
+def test_what_exceeds_the_bound_is_withheld() -> None:
+    learned = thud.surrogate(LUMPED)
+    place = learned.labels.index("peak force")
+    worse = learned.residuals.copy()
+    worse[:, place] = 0.2
+    coarse = replace(learned, residuals=worse)
+    assert coarse.withheld == ["peak force"]
+    found = thud.sensitivity({**LUMPED, "design": {"size": 8}}, surrogate=coarse)
+    assert np.isnan(found.dataset["peak_force"]).all()
+    assert np.isfinite(found.dataset["floor_level"]).all()
+    assert np.isnan(found.indices["total"].sel(output="peak force")).all()
+    assert found.dataset.attrs["surrogate"].endswith("above 0.1 dB: peak force")
+
+
 def test_stated_errors_hold_as_often_as_they_say(trained: thud.Surrogate) -> None:
     # Of normal residuals the share within the error is known; it is to be 95 % or more in 95 % of
     # all trainings or more, and not in all.
@@ -239,6 +253,8 @@ def test_other_cases_are_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.uncertainty({**TOLERANCES, **change}, surrogate=trained)
+    with pytest.raises(thud.InputError, match="mass: the surrogate was not trained on it"):
+        trained.predict(trained.case, {"mass": np.array([2.5])})
 
 
 def test_files_of_a_run_make_no_other_case() -> None:
