@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from scipy.stats import binom
+from scipy.stats import binom, norm
 
 import thud
 from thud import cli
 from thud.studies.emulation.plan import Plan
+from thud.studies.emulation.surrogate import keys_of
 from thud.studies.emulation.training import regress
 from thud.studies.emulation.verdict import judge_many
 
@@ -125,6 +126,32 @@ def test_powers_of_a_lumped_source_are_learned() -> None:
     assert found.table()[0][-1] == "error of the surrogate"
 
 
+def test_what_exceeds_the_bound_is_withheld() -> None:
+    learned = thud.surrogate(LUMPED)
+    place = learned.labels.index("peak force")
+    worse = learned.residuals.copy()
+    worse[:, place] = 0.2
+    coarse = replace(learned, residuals=worse)
+    assert coarse.withheld == ["peak force"]
+    found = thud.sensitivity({**LUMPED, "design": {"size": 8}}, surrogate=coarse)
+    assert np.isnan(found.dataset["peak_force"]).all()
+    assert np.isfinite(found.dataset["floor_level"]).all()
+    assert np.isnan(found.indices["total"].sel(output="peak force")).all()
+    assert found.dataset.attrs["surrogate"].endswith("above 0.1 dB: peak force")
+
+
+def test_stated_errors_hold_as_often_as_they_say(trained: thud.Surrogate) -> None:
+    # Of normal residuals the share within the error is known; it is to be 95 % or more in 95 % of
+    # all trainings or more, and not in all.
+    draw = np.random.default_rng(6)
+    for count in (64, 200):
+        points = np.zeros((count, 3))
+        residuals = draw.normal(size=(count, 2000))
+        errors = replace(trained, points=points, residuals=residuals).errors
+        held = int((2 * norm.cdf(errors) - 1 >= 0.95).sum())
+        assert binom.ppf(1e-4, 2000, 0.95) <= held < 2000
+
+
 def test_leave_one_out_is_what_it_says() -> None:
     # The closed form against training without each point, with the same kernel.
     points = np.random.default_rng(3).random((40, 2))
@@ -226,6 +253,17 @@ def test_other_cases_are_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.uncertainty({**TOLERANCES, **change}, surrogate=trained)
+    with pytest.raises(thud.InputError, match="mass: the surrogate was not trained on it"):
+        trained.predict(trained.case, {"mass": np.array([2.5])})
+
+
+def test_files_of_a_run_make_no_other_case() -> None:
+    # Studies write no snapshots; a fit keeps what its case says of them.
+    cases = [
+        thud.Case(model=thud.FiniteElement(snapshot_interval=interval)) for interval in (0.0, 1e-3)
+    ]
+    assert keys_of(cases[0]) == keys_of(cases[1])
+    assert keys_of(cases[0]) != keys_of(replace(cases[0], drop=thud.Drop(height=0.9)))
 
 
 def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:

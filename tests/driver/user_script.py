@@ -72,7 +72,11 @@ study: thud.Study = thud.read_study({"parameters": height})
 thud.sweep(study, folder / "sweep")
 kept = thud.read_sweep(folder / f"sweep/{study.name}.nc")
 chart: thud.DesignMap = thud.design_map({"parameters": height | modulus})
-spread: thud.Uncertainty = thud.uncertainty({"design": {"size": 8}, "parameters": mass})
+learned: thud.Surrogate = thud.surrogate({"parameters": mass})
+learned.save(folder / "mass.npz")
+trained = thud.read_surrogate(folder / "mass.npz")
+tolerances = {"design": {"size": 8}, "parameters": mass}
+spread: thud.Uncertainty = thud.uncertainty(tolerances, surrogate=trained)
 shares: thud.Sensitivity = thud.sensitivity({"design": {"size": 4}, "parameters": mass})
 targets = (
     thud.ForceTarget(impacts["hollow_sphere"]),
@@ -95,5 +99,6 @@ results = [
     below,
     site,
     rating,
+    learned,
 ]
 print(*results, *missed, sep="\n")

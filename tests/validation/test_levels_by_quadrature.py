@@ -52,7 +52,7 @@ def test_bins_agree_with_the_integral() -> None:
 
 
 def test_bins_of_random_pulses_differ_by_what_the_documentation_tells() -> None:
-    # docs/levels.md, from 1600 drops; these are some of the same ranges.
+    # docs/levels.md, from 1250 drops; these are some of the same ranges.
     rng = np.random.default_rng(1)
     worst: dict[str, list[float]] = {"models": [0, 0], "lumped": [0, 0]}
     for _ in range(60):

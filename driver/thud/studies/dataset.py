@@ -31,10 +31,14 @@ MEANINGS = {
     **{name: ("dB", _LEVEL.format(force)) for name, (force, _) in LEVELS.items()},
     "margin": ("dB", "minimum distance of the judged octave levels to a limit, positive inside"),
     "conforms": ("1", "all criteria of the standard are met"),
-    "doubtful": ("1", "the verdict could change by the errors of the surrogate"),
-    "peaks": ("1", "number of peaks of the judged force"),
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
+}
+# Those and what only sets of a surrogate, and of its training, have.
+_ALL = {
+    **MEANINGS,
+    "doubtful": ("1", "the verdict could change by the errors of the surrogate"),
+    "peaks": ("1", "number of peaks of the judged force"),
 }
 # Bytes of a set on disk without its levels and parameters, and of an empty file.
 _SET_BYTES = 95
@@ -52,7 +56,7 @@ def disk_space(study: SetStudy) -> int:
 def coordinate(parameter: Parameter) -> str:
     """Return the name of a parameter's coordinate; some keys are named as results are."""
     name = parameter.name.replace("(", "_").rstrip(")")
-    return f"{parameter.key.group}_{name}" if name in MEANINGS else name
+    return f"{parameter.key.group}_{name}" if name in _ALL else name
 
 
 def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset:
@@ -67,7 +71,7 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
         coordinates[coordinate(parameter)] = ("set", values, _attributes(study, parameter))
     variables = {}
     for name, values in found.items():
-        unit, meaning = MEANINGS[name]
+        unit, meaning = _ALL[name]
         dimensions = ("set", levels[name][1]) if name in levels else ("set",)
         attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
         if study.surrogate and name in study.surrogate.outputs:
@@ -133,8 +137,8 @@ def origin(case: Case) -> dict[str, str]:
 
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with variables in the order of `MEANINGS`, which Zarr does not keep."""
-    results = {name: dataset.variables[name] for name in MEANINGS if name in dataset.data_vars}
+    """Return a dataset with variables in their order, which Zarr does not keep."""
+    results = {name: dataset.variables[name] for name in _ALL if name in dataset.data_vars}
     names = [*BANDWIDTHS, *dataset.attrs["parameters"].split()]
     coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
     return xr.Dataset(results, coordinates, dataset.attrs)

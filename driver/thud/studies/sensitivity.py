@@ -192,8 +192,8 @@ def sobol_indices(
     """
     from SALib.analyze import sobol  # noqa: PLC0415 - takes its time
 
-    # Rounding errors are not variance.
-    if np.ptp(values) <= 1e-12 * np.abs(values).max():
+    # Rounding errors are not variance; a surrogate may withhold a quantity.
+    if not np.ptp(values) > 1e-12 * np.abs(values).max():
         return tuple(np.full((4, dimension), np.nan))
     cube = {"num_vars": dimension, "names": list(map(str, range(dimension)))}
     found = sobol.analyze(

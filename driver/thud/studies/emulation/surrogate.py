@@ -18,7 +18,7 @@ from thud.checks import refuse, require_kind
 from thud.display import Displayed
 from thud.extras import require_extra
 from thud.files import replace_file
-from thud.keys import put
+from thud.keys import OF_FILES, put
 from thud.levels import get_bands
 from thud.studies.emulation.verdict import judge_many
 from thud.studies.study import value_in
@@ -133,8 +133,9 @@ class Surrogate(Displayed):
     def errors(self) -> Values:
         """Error of each number, dB, shape (n_number,); NaN where the model has no such result."""
         count = len(self.points)
+        # With 58 drops or fewer there is no such order statistic.
         place = int(binom.ppf(SHARE, count, SHARE))
-        found: Values = np.sort(np.abs(self.residuals), axis=0)[min(place, count - 1)]
+        found: Values = np.sort(np.abs(self.residuals), axis=0)[place]
         return found
 
     @property
@@ -188,8 +189,9 @@ class Surrogate(Displayed):
                 f"parameters among {', '.join(self.keys)}",
             )
         middle = dict(zip(self.keys, self.region.mean(axis=1).tolist(), strict=True))
-        if case.model is None or case.model.name != self.case.model.name:  # type: ignore[union-attr]
-            refuse("the surrogate was trained on another model", f"model = {self.case.model}")
+        model = self.case.model.name  # type: ignore[union-attr]
+        if case.model is None or case.model.name != model:
+            refuse("the surrogate was trained on another model", f"model = {model!r}")
         before, now = (keys_of(put(one, middle)) for one in (self.case, case))
         if changed := [key for key in before if before[key] != now.get(key)]:
             key = changed[0]
@@ -199,8 +201,10 @@ class Surrogate(Displayed):
         """Return the results of sets of a case that differ in some keys, shape (n_set,) each.
 
         They are those of `thud.studies.evaluation.evaluate`, and ``doubtful``: the verdict could
-        change by the errors. Sets outside the region have a status and a reason instead.
+        change by the errors. Sets outside the region have a status and a reason instead. Raises
+        InputError as `require`.
         """
+        self.require(case, columns)
         with require_extra("surrogate"):
             from sklearn.gaussian_process.kernels import Matern  # noqa: PLC0415 - optional
 
@@ -296,7 +300,7 @@ def keys_of(case: Case) -> dict[str, str]:
     return {
         f"&{group}: {key}": f"{value!r}"
         for group, keys in groups.items()
-        if group not in {"case", "limits"}
+        if group not in {"case", "limits", OF_FILES}
         for key, value in keys.items()
     }
 
