@@ -22,18 +22,19 @@ POWERS = np.array([1.0, 1.5, 1.75])
 MEAN = np.array([0.16, 0.055, 0.045])
 SPREAD = np.array([0.08, 0.02, 0.015])
 PARABOLA = 0.06
-# Of lines the walk is random, with steps of a standard deviation that grows with the root of their
-# length; of feet its steps deviate from those of the power, with the mean of a, by a part.
-# Classes: power, jump, jump that a filter spreads, walk in 1 ms or part.
+# The steps of the walk of smooth flanks and feet deviate from those of the power, with the mean of
+# a, by a part; the walk of rough flanks is random, its deviation grows with the root of time.
+# Classes: power, jump, jump that a filter spreads, part, or walk in 1 ms.
 CLASSES = (
-    (0, 0.0, 0.0, 0.02),
-    (0, 0.2, 0.0, 0.02),
-    (0, 0.0, 0.2, 0.02),
+    (0, 0.0, 0.0, 0.15),
+    (0, 0.2, 0.0, 0.15),
+    (0, 0.0, 0.2, 0.15),
     (1, 0.0, 0.0, 0.3),
     (2, 0.0, 0.0, 0.3),
     (0, 0.0, 0.0, 0.12),
     (0, 0.0, 0.0, 0.5),
 )
+SMOOTH = 5
 # Their probabilities at touch and at release: a body strikes with a jump and lets go softly.
 PRIOR = np.array([
     [0.25, 0.15, 0.1, 0.05, 0.05, 0.25, 0.15],
@@ -42,11 +43,10 @@ PRIOR = np.array([
 # What these shapes leave of the time, s: errors of the method over the models, by class.
 LEFT = 1e-6 * np.array([
     [5.0, 5.0, 5.0, 30.0, 30.0, 40.0, 40.0],
-    [60.0, 60.0, 60.0, 60.0, 60.0, 100.0, 100.0],
+    [60.0, 60.0, 60.0, 60.0, 60.0, 140.0, 140.0],
 ])  # fmt: skip
 # What these shapes miss of a flank, as part of the force itself: of smooth classes and of rough.
 MISSED = (0.005, 0.1)
-SMOOTH = 5
 # Times of one search, each within REACH standard deviations of the one before.
 N_TIME = 33
 REACH = 6.0
@@ -149,15 +149,16 @@ def _evidence(
     return result
 
 
-def _spread(power: int, jump: float, filtered: float, walk: float) -> NDArray[np.float64]:
+def _spread(k: int) -> NDArray[np.float64]:
     """Return the standard deviations of the shapes of a class, [n_column]."""
+    power, jump, filtered, walk = CLASSES[k]
     powers = np.where(np.arange(len(POWERS)) == power, SPREAD, 0.0)
-    steps = np.sqrt(np.diff(KNOTS)) if power == 0 else MEAN[power] * np.diff(KNOTS ** POWERS[power])
+    steps = MEAN[power] * np.diff(KNOTS ** POWERS[power]) if k < SMOOTH else np.sqrt(np.diff(KNOTS))
     parabola = PARABOLA if power == 0 else 0.0
     return np.array([jump, filtered, *powers, parabola, *(walk * steps)])
 
 
-SPREADS = np.array([_spread(*one) for one in CLASSES])
+SPREADS = np.array([_spread(k) for k in range(len(CLASSES))])
 
 
 def _columns(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
