@@ -236,9 +236,8 @@ contains
       real(wp) :: impulse, quiet
       integer :: i, j, n_step, last
 
-      allocate (state%motion(size(step%omega), 2 + size(step%time)), state%before(size(step%omega), 2 + size(step%time)), &
-         source=0.0_wp)
-      allocate (state%push, mold=step%omega)
+      allocate (state%motion, state%before, source=0*step%factor(:, :, place_q))
+      allocate (state%push, source=0*step%omega)
       allocate (state%gap(size(step%fall, 2)), state%start(size(step%fall, 2)), source=0.0_wp)
       state%start(::rings%n_way) = -ball%outer_radius*rings%height
       state%height = ball%outer_radius
