@@ -7,6 +7,7 @@
 module thud_pressed_ball
    use thud_ball, only: ball_type
    use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume
+   use thud_constants, only: pi
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
    use thud_error, only: error_type, numerical_error
    use thud_interrupt, only: check_interrupt
@@ -28,6 +29,9 @@ module thud_pressed_ball
 
    !> Displacement of the differences, over the thickness of an element.
    real(wp), parameter :: trial = 1.0e-7_wp
+
+   !> How much smaller elements are around the poles, where the contacts are, than their mean.
+   real(wp), parameter :: grading = 0.4_wp
 
    !> Maximum approach in a step over the wall thickness.
    real(wp), parameter :: max_step = 0.05_wp
@@ -56,19 +60,21 @@ contains
    !> The ball at rest between plates that just touch it. A slow press finds the long-term modulus.
    pure function new_pressed_ball(ball, mesh, material) result(pressed)
       type(ball_type), intent(in) :: ball
-      !> Mesh of order 1.
+      !> Mesh of order 1, whose nodes are moved along the meridians.
       type(mesh_type), intent(in) :: mesh
       type(material_type), intent(in) :: material
       type(pressed_ball_type) :: pressed
       type(material_type) :: relaxed
+      type(mesh_type) :: even
       integer :: n
 
       n = mesh%n_polar
+      even = get_even_mesh(mesh)
       relaxed = material
       relaxed%viscosity = 0.0_wp
       relaxed%branch_modulus = material%branch_modulus(:0)
       relaxed%branch_time = material%branch_time(:0)
-      pressed%body = new_elastic_body(ball, mesh, relaxed)
+      pressed%body = new_elastic_body(ball, even, relaxed)
       pressed%cavity = pressed%body%cavity
       pressed%body%cavity%pressure = 0.0_wp
       pressed%body%cavity%ambient = 0.0_wp
@@ -77,12 +83,29 @@ contains
       pressed%wall = ball%wall_thickness
       pressed%thickness = ball%wall_thickness/mesh%n_radial
       allocate (pressed%position(0:n, 0:mesh%n_radial, 2))
-      pressed%position(:, :, 1) = mesh%r
-      pressed%position(:, :, 2) = mesh%z + ball%outer_radius
+      pressed%position(:, :, 1) = even%r
+      pressed%position(:, :, 2) = even%z + ball%outer_radius
       allocate (pressed%touches(0:n, 2), source=.false.)
       pressed%touches(0, 1) = .true.
       pressed%touches(n, 2) = .true.
    end function new_pressed_ball
+
+   !> The mesh with nodes as dense around the highest point as around the lowest.
+   pure function get_even_mesh(mesh) result(even)
+      type(mesh_type), intent(in) :: mesh
+      type(mesh_type) :: even
+      real(wp) :: angle
+      integer :: j
+
+      even = mesh
+      do j = 0, mesh%n_polar
+         angle = pi*real(j, wp)/real(mesh%n_polar, wp)
+         angle = angle - grading*sin(2*angle)/2
+         even%r(j, :) = hypot(mesh%r(j, :), mesh%z(j, :))*sin(angle)
+         even%z(j, :) = -hypot(mesh%r(j, :), mesh%z(j, :))*cos(angle)
+      end do
+      even%r([0, mesh%n_polar], :) = 0.0_wp
+   end function get_even_mesh
 
    !> Brings the plates to an approach.
    subroutine press(pressed, deflection, error)

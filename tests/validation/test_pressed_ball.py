@@ -92,7 +92,7 @@ def test_linear_modes_and_elements_agree_at_small_deflections() -> None:
     difference = large.force[2:] / linear.force[2:] - 1
     slope, limit = np.polyfit(1e3 * linear.deflection[2:], difference, 1)
     assert slope == pytest.approx(-0.005, abs=0.0015)
-    assert abs(limit) < 0.005
+    assert abs(limit) < 0.007
 
 
 def test_large_compression_is_that_of_calculix() -> None:
@@ -102,5 +102,5 @@ def test_large_compression_is_that_of_calculix() -> None:
     reference = np.array([61.88, 153.00, 256.13, 366.98, 483.67, 604.62, 729.53, 856.59])
     curve = thud.compress(thud.Ball(poisson_ratio=0.49), "finite_element", points=9)
     np.testing.assert_allclose(curve.deflection[1:], 0.04 * EIGHTHS, rtol=1e-12)
-    np.testing.assert_allclose(curve.force[2:], reference[1:], rtol=0.007)
+    np.testing.assert_allclose(curve.force[2:], reference[1:], rtol=0.004)
     assert curve.force[1] == pytest.approx(reference[0], rel=0.02)
