@@ -11,7 +11,9 @@ FLAGSHIP = thud.Ball(youngs_modulus=2.08e6)
 
 
 def solve(height: float = 1.0, **options: object) -> thud.Impact:
-    options = {"snapshot_interval": 0} | options
+    options = {
+        "snapshot_interval": 0, "viscosity": "kelvin_voigt", "loss_factor": 0.2, **options,
+    }  # fmt: skip
     return thud.solve(FLAGSHIP, thud.Drop(height), "finite_element", **options)
 
 

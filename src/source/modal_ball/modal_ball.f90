@@ -218,9 +218,8 @@ contains
 
       height = ball%outer_radius*rings%height
       radius = ball%outer_radius*rings%radius
-      allocate (state%motion(size(step%omega), 2 + size(step%time)), state%before(size(step%omega), 2 + size(step%time)), &
-         source=0.0_wp)
-      allocate (state%push, mold=step%omega)
+      allocate (state%motion, state%before, source=0*step%factor(:, :, place_q))
+      allocate (state%push, source=0*step%omega)
       allocate (state%gap, mold=height)
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
