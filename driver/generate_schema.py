@@ -65,6 +65,8 @@ STANDARD_BALL = '''
         return cls(youngs_modulus=2.08e6)
 '''
 EXTRAS = {"ball": STANDARD_BALL}
+# Owners of keys that are no models, in words.
+USERS = {"modes": "free modes", "compression": "a slow compression"}
 INDENT = " " * 8
 LONGEST = 100
 PAGE = """# Keys of an input file
@@ -151,7 +153,9 @@ def python_module(schema: Entry) -> str:
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
     names = list(map(class_name, models))
-    public = sorted([*map(class_name, [*groups, "modes"]), *names, "ModelName", "ModelOptions"])
+    public = sorted(
+        [*map(class_name, [*groups, "modes", "compression"]), *names, "ModelName", "ModelOptions"]
+    )
     choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
     choices.append(literal("BandSet", schema["band_sets"]))
     quoted_names = "".join(f"    {quoted(name)},\n" for name in public)
@@ -161,6 +165,9 @@ def python_module(schema: Entry) -> str:
         parts.append(python_class(f"Group ``&{group}``.", members, group))
     members = [key for key in keys if key["owner"] == "modes"]
     parts.append(python_class("Free modes that are asked for.", members, "modes"))
+    members = [key for key in keys if key["owner"] == "compression"]
+    title = "Slow compression that is asked for."
+    parts.append(python_class(title, members, "compression"))
     for model in models:
         members = [key for key in keys if key["owner"] == model]
         title = f"Options of the source model ``{model}``."
@@ -187,7 +194,7 @@ def python_calls(schema: Entry) -> str:
     """Return the text of ``_solve.pyi``."""
     keys, models = schema["keys"], schema["models"]
     owned = {model: [key for key in keys if key["owner"] == model] for model in models}
-    choices = {choice_name(key) for key in keys if key["owner"] and key["choices"]}
+    choices = {choice_name(key) for key in keys if key["owner"] in models and key["choices"]}
     names = sorted({"Ball", "Drop", "ModelName", "ModelOptions", *choices})
     parts = [SOLVE.format(names="".join(f"    {name},\n" for name in names))]
     shared = [key for key in keys if key["group"] == "sampling"]
@@ -241,7 +248,7 @@ def page(schema: Entry) -> str:
         if key["group"] != group:
             group = key["group"]
             owners = sorted({k["owner"] for k in schema["keys"] if k["group"] == group} - {""})
-            users = [("free modes" if owner == "modes" else f"`{owner}`") for owner in owners]
+            users = [USERS.get(owner, f"`{owner}`") for owner in owners]
             used = f"Used by {' and '.join(users)}.\n\n" if users else ""
             text += f"\n## `&{group}`\n\n{used}"
             text += "| key | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"

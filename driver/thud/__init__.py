@@ -16,6 +16,7 @@ from thud._schema import *  # noqa: F403 - the groups and models that the librar
 from thud._schema import __all__ as _groups
 from thud.case import Case, read_case, write_case
 from thud.checks import suggestion
+from thud.compression import CompressionCurve, compress
 from thud.criteria import Conformity, Criterion
 from thud.display import MAKERS
 from thud.ensemble import solve_many
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.compression_fit import CompressionFit as CompressionFit
+    from thud.compression_fit import fit_compression as fit_compression
     from thud.recordings.recording import Recording as Recording
     from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
@@ -68,6 +71,8 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "CompressionFit": "compression_fit",
+    "fit_compression": "compression_fit",
     "read_all": "comparison",
     "Recording": "recordings.recording",
     "quantity": "units",
@@ -79,6 +84,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     *kinds.PUBLIC,
     "Bands",
     "Case",
+    "CompressionCurve",
     "Conformity",
     "Criterion",
     "Ensemble",
@@ -90,6 +96,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "NumericalError",
     "PlausibilityWarning",
     "ThudError",
+    "compress",
     "force_exposure_levels",
     "free_modes",
     "get_bands",
@@ -134,6 +141,8 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
+    compression=_maker("plot.compression", "compression"),
+    compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),

@@ -13,6 +13,7 @@ from thud.key import Group, Key
 
 __all__ = [
     "Ball",
+    "Compression",
     "Drop",
     "FiniteElement",
     "HollowSphere",
@@ -28,6 +29,7 @@ __all__ = [
 ]
 
 # Choices of keys.
+CompressionGas = Literal["vented", "isothermal", "adiabatic"]
 ModelName = Literal[
     "hollow_sphere",
     "modal_ball",
@@ -37,6 +39,7 @@ ModelName = Literal[
 ]
 HollowSphereMomentumFlux = Literal["momentum_balance", "retarding", "conservative", "none"]
 ModalBallDampingLaw = Literal["constant", "rising", "fractional"]
+ModalBallFloorFriction = Literal["none", "stick"]
 FiniteElementLaw = Literal["neo_hookean", "mooney_rivlin"]
 FiniteElementViscosity = Literal["none", "kelvin_voigt", "fractional", "constant_loss", "prony"]
 LevelsMethod = Literal["exact", "fft"]
@@ -178,6 +181,25 @@ class Modes(Group):
 
 
 @dataclass(frozen=True)
+class Compression(Group):
+    """Slow compression that is asked for.
+
+    Attributes
+    ----------
+    max_deflection : float
+        Maximum approach of the plates, m; 0 < max_deflection <= 10.
+    points : int
+        Points of the curve, the undeformed ball included; 2 <= points <= 10000.
+    gas : str
+        Gas in the ball: leaves by the hole, or is sealed in; "vented", "isothermal", "adiabatic".
+    """
+
+    max_deflection: float = 0.04
+    points: int = 41
+    gas: CompressionGas = "vented"
+
+
+@dataclass(frozen=True)
 class HollowSphere(Group):
     """Options of the source model ``hollow_sphere``.
 
@@ -220,6 +242,8 @@ class ModalBall(Group):
         The gas in the cavity resists changes of its volume.
     contact_gravity : bool
         Gravity acts during the contact too.
+    floor_friction : str
+        Friction of the floor: none, or without end; "none", "stick".
     static_families : sequence of int
         Harmonics that answer statically; 0 <= static_families <= harmonics.
     """
@@ -235,6 +259,7 @@ class ModalBall(Group):
     fractional_order: float = 0.3
     cavity_gas: bool = True
     contact_gravity: bool = False
+    floor_friction: ModalBallFloorFriction = "none"
     static_families: Sequence[int] = ()
 
 
@@ -413,6 +438,9 @@ KEYS = (
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
     Key("modes", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0, True),
     Key("modes", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
+    Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 0.0, 10.0),
+    Key("compression", "compression", "points", "whole", "", "points of the curve, the undeformed ball included", (), 2.0, 10000.0, True),
+    Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves by the hole, or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 0.0, 1000000.0),
     Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 0.0, 1000.0),
     Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley')),
@@ -427,6 +455,7 @@ KEYS = (
     Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, of fractional; 1: rising", (), 0.0, 1.0),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
+    Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none, or without end", ('none', 'stick')),
     Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics", True),
     Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0, True),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),

@@ -13,6 +13,7 @@ from thud._schema import (
     FiniteElementViscosity,
     HollowSphereMomentumFlux,
     ModalBallDampingLaw,
+    ModalBallFloorFriction,
     ModelName,
     ModelOptions,
 )
@@ -37,6 +38,7 @@ class ModalBallOptions(SamplingOptions, total=False):
     fractional_order: float
     cavity_gas: bool
     contact_gravity: bool
+    floor_friction: ModalBallFloorFriction
     static_families: Sequence[int]
 
 class FiniteElementOptions(SamplingOptions, total=False):

@@ -15,6 +15,7 @@ from thud._schema import (
     KEYS,
     MODELS,
     Ball,
+    Compression,
     Drop,
     HollowSphere,
     Levels,
@@ -72,6 +73,8 @@ class Case(Group, Displayed):
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
+    compression : Compression or None
+        Options of the slow compression by the source model; None: no compression.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -84,12 +87,14 @@ class Case(Group, Displayed):
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
     modes: Modes | None = None
+    compression: Compression | None = None
 
     def __repr__(self) -> str:
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
-        return f"<Case {self.name}: {', '.join(filter(None, (model, modes)))}>"
+        press = "slow compression" if self.compression else ""
+        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -114,6 +119,7 @@ class Case(Group, Displayed):
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
         require_kind("modes", self.modes, Modes | None)
+        require_kind("compression", self.compression, Compression | None)
         groups: dict[str, dict[str, object]] = {
             "case": {"name": self.name},
             "ball": vars(self.ball),
@@ -121,6 +127,8 @@ class Case(Group, Displayed):
         if self.modes:
             groups["modes"] = {"count": self.modes.count}
             groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
+        if self.compression:
+            groups["compression"] = vars(self.compression)
         if self.model:
             groups["model"] = {"name": self.model.name}
             groups |= {group: vars(getattr(self, group)) for group in GROUPS}
@@ -153,9 +161,11 @@ class Case(Group, Displayed):
         groups = {
             group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
         }
-        model = modes = None
+        model = modes = compression = None
         if "modes" in content:
             modes = Modes(**content["modes"], **content.get("mesh", {}))
+        if "compression" in content:
+            compression = Compression(**content["compression"])
         if "model" in content or not modes:
             name = content.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
@@ -168,7 +178,7 @@ class Case(Group, Displayed):
                     options[option.name] = entries
             model = MODELS[name](**options)
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, **groups)
+        return cls(name=title, model=model, modes=modes, compression=compression, **groups)
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:

@@ -113,6 +113,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     base = replace(
         base,
         modes=None,
+        compression=None,
         sampling=Sampling(
             sampling.sample_rate if sample_rate is None else sample_rate,
             sampling.duration if duration is None else duration,

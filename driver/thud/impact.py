@@ -309,8 +309,9 @@ def compute(case: Case) -> Impact:
     if case.model is None:
         message = "&model is missing; allowed: a case with a source model"
         raise InputError(message)
-    # Free modes of the case have their own function.
-    return new_impact(case, call(api.solve, case_text(replace(case, modes=None))))
+    # Free modes and compression of the case have their own functions.
+    plain = replace(case, modes=None, compression=None)
+    return new_impact(case, call(api.solve, case_text(plain)))
 
 
 def new_impact(case: Case, found: Bundle) -> Impact:

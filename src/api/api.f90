@@ -8,7 +8,8 @@ module thud_api
    use thud_bundle, only: bundle_type, leave, take
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, results_type
+   use thud_compression, only: compression_type
+   use thud_compute, only: compress_case, compute_case, results_type
    use thud_constants, only: compiler, version
    use thud_error, only: error_type
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
@@ -21,7 +22,7 @@ module thud_api
    implicit none (type, external)
    private
 
-   public :: check_text, collect, describe_library, effective_case, end_calls, free_modes, loss_factors, run, solve
+   public :: check_text, collect, compress, describe_library, effective_case, end_calls, free_modes, loss_factors, run, solve
 
 contains
 
@@ -133,6 +134,7 @@ contains
 
       if (case%has_impact) call add_history(bundle, results%history)
       if (case%has_modes) call add_modes(bundle, results%modes)
+      if (case%has_compression) call add_compression(bundle, results%compression)
       do i = 1, size(results%remark)
          call bundle%add_text('remarks.'//to_text(i), trim(results%remark(i)))
       end do
@@ -214,6 +216,37 @@ contains
       call bundle%add_array('modes.z', shape(modes%mesh%z), modes%mesh%z)
       call bundle%add_array('modes.shape', shape(modes%shape), modes%shape)
    end subroutine add_modes
+
+   !> Slow compression of the ball of a case.
+   subroutine compress(text, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !> Text of a namelist file with the group `&compression`.
+      character(len=*), intent(in) :: text
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(compression_type) :: compression
+      type(error_type), allocatable :: error
+
+      allocate (bundle)
+      call begin_call()
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call compress_case(case, compression, error)
+      if (.not. allocated(error)) call add_compression(bundle, compression)
+      call end_call()
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine compress
+
+   !> Adds a slow compression to a bundle.
+   subroutine add_compression(bundle, compression)
+      type(bundle_type), intent(inout) :: bundle
+      type(compression_type), intent(in) :: compression
+
+      call bundle%add_array('compression.deflection', shape(compression%deflection), compression%deflection)
+      call bundle%add_array('compression.force', shape(compression%force), compression%force)
+   end subroutine add_compression
 
    !> Loss factor of the material of a case against frequency.
    subroutine loss_factors(text, frequency, n, status, handle, n_byte, n_value)

@@ -40,7 +40,7 @@ module thud_field
       character(len=key_length) :: group = ''
       !> Key within the group.
       character(len=key_length) :: key = ''
-      !> What uses it: a source model, `modes` for the free modes, blank for every impact.
+      !> What uses it: a source model, `modes` for the free modes, `compression`, blank for every impact.
       character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''

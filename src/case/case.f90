@@ -2,6 +2,7 @@
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
    use thud_band, only: band_choices
+   use thud_compression, only: check_compression, compression_options_type, get_compression_fields
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
@@ -29,6 +30,10 @@ module thud_case
       logical :: has_modes = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
+      !> A slow compression is asked for, by the group `&compression`.
+      logical :: has_compression = .false.
+      !> How far, in how many points, and what the gas does.
+      type(compression_options_type) :: compression
       type(ball_type) :: ball
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
@@ -76,6 +81,7 @@ contains
          in_group('case', [text_field('name', case%name, 'name of the case, also of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
          owned_by('modes', get_modes_fields(case%modes)), &
+         owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
          in_group('drop', get_drop_fields(case%drop)), &
          in_group('model', [choice_field('name', case%model, 'source model', model_names)])]
       do i = 1, size(case%models)
@@ -91,7 +97,7 @@ contains
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)])]
    end function get_fields
 
-   !> Whether a key does something: for the impact, its model, or the free modes.
+   !> Whether a key does something: for the impact, its model, the free modes, or the slow compression.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -99,6 +105,8 @@ contains
 
       if (field%owner == 'modes') then
          used = case%has_modes
+      else if (field%owner == 'compression') then
+         used = case%has_compression .and. case%has_impact
       else if (case%has_impact) then
          used = field%owner == '' .or. field%owner == case%model
       else
@@ -130,6 +138,8 @@ contains
       if (allocated(error)) return
       if (case%has_modes) call check_modes(case%modes, error)
       if (allocated(error) .or. .not. case%has_impact) return
+      if (case%has_compression) call check_compression(case%compression, case%ball, error)
+      if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
          call model%check(case%ball, case%sampling, error)
       end associate

@@ -17,8 +17,10 @@ module thud_finite_element
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
+   use thud_mesh, only: new_mesh
    use thud_motion, only: new_motion, take_snapshot
    use thud_nodal_areas, only: get_nodal_areas
+   use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
@@ -55,6 +57,7 @@ module thud_finite_element
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
       procedure, pass(options) :: get_loss_factors
+      procedure, pass(options) :: compress
    end type finite_element_type
 
 contains
@@ -99,6 +102,33 @@ contains
       if (allocated(error)) return
       loss_factor = [(get_material_loss_factor(material, frequency(i)), i=1, size(frequency))]
    end subroutine get_loss_factors
+
+   !> Force on each of two plates that press the ball slowly, at its long-term modulus.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> Mesh and material.
+      class(finite_element_type), intent(in) :: options
+      !> Approach of the plates, ascending from 0, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> No Prony series fits the loss factor, or no state of rest was found.
+      type(error_type), allocatable, intent(out) :: error
+      type(material_type) :: material
+      type(pressed_ball_type) :: pressed
+      integer :: i
+
+      force = 0.0_wp
+      call new_material(options%material, ball, material, error)
+      if (allocated(error)) return
+      pressed = new_pressed_ball(ball, new_mesh(ball, options%mesh, 1), material)
+      do i = 1, size(deflection)
+         call press(pressed, deflection(i), error)
+         if (allocated(error)) return
+         force(i) = pressed%force
+      end do
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)

@@ -36,6 +36,7 @@ contains
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
+      case%has_compression = any([(groups(i)%name == 'compression', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
       do i = 1, merge(size(main_groups), 1, case%has_impact)

@@ -9,10 +9,10 @@ module thud_run
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
-   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
+   use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
    use thud_system, only: get_free_bytes
-   use thud_table, only: get_defaults_line, get_modes_table, get_table
+   use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
    implicit none (type, external)
    private
@@ -24,6 +24,9 @@ module thud_run
 
    !> File of models with channels.
    character(len=*), parameter :: channel_file = 'channels.csv'
+
+   !> File of a slow compression.
+   character(len=*), parameter :: compression_file = 'compression.csv'
 
    !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
@@ -178,6 +181,12 @@ contains
             files(at)%content = get_channels_csv(history)
          end if
       end associate
+      if (case%has_compression) then
+         at = at + 1
+         files(at)%name = compression_file
+         files(at)%content = get_compression_csv(results%compression)
+         outcome%table = outcome%table//newline//get_compression_table(results%compression)
+      end if
       if (results%history%motion%n_frame > 0) call get_motion_files(results%history%motion, files(at + 1:))
    end subroutine describe
 
@@ -192,6 +201,7 @@ contains
       if (.not. case%has_impact) return
       n_file = n_file + size(file_names)
       if (allocated(results%history%channel)) n_file = n_file + 1
+      if (case%has_compression) n_file = n_file + 1
       if (results%history%motion%n_frame > 0) n_file = n_file + results%history%motion%n_frame + size(motion_names)
    end function count_files
 

@@ -64,8 +64,9 @@ def test_free_modes_of_the_paper(poisson_ratio: float, reference: list[float]) -
 
 
 def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
-    # At 0.2 m/s the ball deflects by 2 mm, 1/16 of its wall: large strain matters to a part of
-    # that. There is next to no gravity, which the modal ball leaves out.
+    # At 0.2 m/s the ball deflects by 2 mm, 1/16 of its wall. Large strain then takes 2 % off the
+    # static force (test_pressed_ball.py), which is 1 % of the contact time and 0.2 dB. There is
+    # next to no gravity, which the modal ball leaves out.
     gravity = 1e-3
     drop = thud.Drop(0.2**2 / (2 * gravity), gravity)
     ball = thud.Ball(poisson_ratio=0.495)
@@ -77,7 +78,7 @@ def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
     assert finite.contact_time == pytest.approx(linear.contact_time, rel=0.016)
     assert finite.max_deflection == pytest.approx(linear.max_deflection, rel=0.016)
     assert finite.restitution == pytest.approx(linear.restitution, abs=0.004)
-    np.testing.assert_allclose(finite.levels()[0], linear.levels()[0], atol=0.2)
+    np.testing.assert_allclose(finite.levels()[0], linear.levels()[0], atol=0.25)
 
 
 def test_slow_impact_loses_what_the_modal_ball_of_the_same_law_loses() -> None:

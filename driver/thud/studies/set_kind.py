@@ -71,8 +71,8 @@ class SetKind(Kind[SetStudy, R]):
         law = table_of(given, "temperature") if "temperature" in given else None
         temperature = read_temperature(law, study.case, study.parameters)
         design = read_design(table_of(given, "design"), self.designs, study.parameters)
-        # Sets need neither snapshots nor free modes.
-        case = replace(study.case, modes=None)
+        # Sets need neither snapshots nor free modes nor a compression.
+        case = replace(study.case, modes=None, compression=None)
         owned = (key for key in KEYS if key.owner == study.model)
         files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
         if case.model and files:

@@ -238,7 +238,7 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     refusals = []
     for share in SHARES:
         try:
-            check_case(replace(study.trial_case(share), modes=None))
+            check_case(replace(study.trial_case(share), modes=None, compression=None))
         except InputError as error:
             refusals.append(str(error))
     named = [_NAMED_KEY.match(refusal) for refusal in refusals]

@@ -16,9 +16,10 @@ module thud_modal_ball
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm, dgemv
    use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: advance, get_energies, mode_step_type, place_q, place_v, set_factors
-   use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
+   use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
@@ -41,6 +42,7 @@ module thud_modal_ball
    type, extends(modal_ball_options_type) :: modal_ball_type
    contains
       procedure, pass(options) :: solve
+      procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
@@ -59,8 +61,10 @@ module thud_modal_ball
       real(wp) :: loss = 0.0_wp
       !> Workspace of a step: motion at its beginning; push of the floor on the modes: [n_mode].
       real(wp), allocatable :: before(:, :), push(:)
-      !> Gaps between rings and floor, m: [n_ring].
+      !> Gaps between rings and floor, and of rings that stick to where they touched first, m: [n_gap].
       real(wp), allocatable :: gap(:)
+      !> Gaps of the undeformed ball with its centre on the floor, m: [n_gap].
+      real(wp), allocatable :: start(:)
    end type state_type
 
 contains
@@ -82,6 +86,22 @@ contains
 
       modulus = 1.6e6_wp
    end function get_paper_modulus
+
+   !> Force on each of two plates that press the ball slowly.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> Harmonics and rings.
+      class(modal_ball_type), intent(in) :: options
+      !> Approach of the plates, ascending, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The rings cannot be distinguished, or the ball lies on the outermost one.
+      type(error_type), allocatable, intent(out) :: error
+
+      call compress_modal_ball(ball, options, deflection, force, error)
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
@@ -109,7 +129,7 @@ contains
          'energy_rest_J']
       allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
-      rings = new_surface_rings(options%rings, options%static_harmonics)
+      rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call prepare(ball, options, rings, interval, step, contact, error)
       if (allocated(error)) return
       call march(ball, merge(drop%gravity, 0.0_wp, options%contact_gravity), sampling, interval, rings, step, contact, &
@@ -128,19 +148,20 @@ contains
       type(ring_contact_type), intent(out) :: contact
       !> The modes cannot be computed, or the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: response(options%rings, options%rings)
+      real(wp) :: response(rings%n_way*options%rings, rings%n_way*options%rings)
       real(wp), allocatable :: zeta(:)
       logical :: failed
 
-      response = interval/ball%mass
+      response = 0.0_wp
+      response(::rings%n_way, ::rings%n_way) = interval/ball%mass
       call add_modes(ball, options, rings, interval, step, response, error)
       if (allocated(error)) return
       allocate (zeta, mold=step%omega)
       call set_damping(options, step, zeta)
       call set_factors(step, zeta, interval)
       response = response + matmul(transpose(step%fall), spread(step%factor(:, place_q, place_v), 2, &
-         options%rings)*step%fall)
-      call new_ring_contact(response, contact, failed)
+         size(response, 1))*step%fall)
+      call new_ring_contact(response, rings%n_way, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
@@ -155,19 +176,19 @@ contains
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and falls of the modes.
       type(mode_step_type), intent(inout) :: step
-      !> Gets the fall of each ring by unit impulse on each added, m/(N s): [n_ring, n_ring].
+      !> Gets the fall of each ring by unit impulse on each added, m/(N s): [n_gap, n_gap].
       real(wp), intent(inout) :: response(:, :)
       !> The modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp), dimension(options%rings, 2, 0:options%static_harmonics) :: sunk
+      real(wp), dimension(size(response, 1), 2, 0:options%static_harmonics) :: sunk
       real(wp), allocatable :: fall(:, :)
       logical :: failed
       integer :: n, kept, k, last
 
       basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
-      allocate (step%omega(0), step%harmonic(0), fall(options%rings, (options%harmonics + 1)*options%radial_modes))
+      allocate (step%omega(0), step%harmonic(0), fall(size(response, 1), (options%harmonics + 1)*options%radial_modes))
       do n = 0, options%static_harmonics
          call check_interrupt(error)
          if (allocated(error)) return
@@ -192,7 +213,7 @@ contains
          step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
       end do
       step%fall = transpose(fall(:, :last))
-      associate (rows => options%rings, columns => size(sunk)/options%rings)
+      associate (rows => size(response, 1), columns => size(sunk)/size(response, 1))
          call dgemm('N', 'T', rows, rows, columns, 1/interval, sunk, rows, rings%fall, rows, 1.0_wp, response, rows)
       end associate
    end subroutine add_modes
@@ -212,20 +233,17 @@ contains
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
       type(state_type) :: state
-      real(wp), dimension(size(step%fall, 2)) :: height, radius
       real(wp) :: impulse, quiet
       integer :: i, j, n_step, last
 
-      height = ball%outer_radius*rings%height
-      radius = ball%outer_radius*rings%radius
       allocate (state%motion, state%before, source=0*step%factor(:, :, place_q))
       allocate (state%push, source=0*step%omega)
-      allocate (state%gap, mold=height)
+      allocate (state%gap(size(step%fall, 2)), state%start(size(step%fall, 2)), source=0.0_wp)
+      state%start(::rings%n_way) = -ball%outer_radius*rings%height
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
       state%gravity = gravity
-      ! The ball has left for good when nothing touched for half a period of its slowest mode: its
-      ! surface may touch again while it swings back.
+      ! The surface may touch again while the slowest mode swings back, half a period later.
       quiet = 0.0_wp
       if (size(step%omega) > 0) quiet = pi/(sqrt(step%spring)*minval(step%omega))
       last = 0
@@ -233,16 +251,16 @@ contains
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
             n_step = (i - 1)*sampling%substeps + j
-            call take_step(step, interval, ball%mass, height, state, contact, impulse, error)
+            call take_step(step, interval, ball%mass, state, contact, impulse, error)
             call check_interrupt(error)
             if (allocated(error)) return
             if (contact%last > 0) then
                last = n_step
                history%impulse = history%impulse + impulse
                history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
-               history%channel(i, 1) = max(history%channel(i, 1), radius(contact%last))
+               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius*rings%radius(contact%last))
             end if
-            if (contact%last == size(height)) then
+            if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
                   //'on its outermost ring, its centre sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
@@ -262,12 +280,10 @@ contains
    end subroutine march
 
    !> One step of the modes, and the impulses of the floor at its beginning.
-   subroutine take_step(step, interval, mass, height, state, contact, impulse, error)
+   subroutine take_step(step, interval, mass, state, contact, impulse, error)
       type(mode_step_type), intent(in) :: step
       !> Length of the step, s; mass of the ball, kg.
       real(wp), intent(in) :: interval, mass
-      !> Heights of the rings of the undeformed ball below its centre, m: [n_ring].
-      real(wp), intent(in) :: height(:)
       !> Motion of the ball.
       type(state_type), intent(inout) :: state
       !> The rings; get their impulses.
@@ -276,23 +292,26 @@ contains
       real(wp), intent(out) :: impulse
       !> The contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
-      integer :: i, n_mode
+      integer :: i, n_mode, n_gap
 
       n_mode = size(step%omega)
-      associate (motion => state%motion, before => state%before, push => state%push, gap => state%gap)
+      associate (motion => state%motion, before => state%before, push => state%push, gap => state%gap, way => contact%n_way)
          before = motion
          call advance(step, before, motion)
          push = 0.0_wp
          impulse = 0.0_wp
          state%height = state%height + interval*(state%speed - interval*state%gravity/2)
          state%speed = state%speed - interval*state%gravity
-         gap = state%height - height
-         if (n_mode > 0) call dgemv('T', n_mode, size(height), -1.0_wp, step%fall, n_mode, motion, 1, 1.0_wp, gap, 1)
+         gap = state%start
+         gap(::way) = gap(::way) + state%height
+         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, step%fall, n_mode, motion, 1, 1.0_wp, gap, 1)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
-         if (contact%last > 0) then
-            impulse = sum(contact%impulse(:contact%last))
-            if (n_mode > 0) call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
+         call follow_sliding(contact, state%start)
+         n_gap = contact%last_gap
+         if (n_gap > 0) then
+            impulse = sum(contact%impulse(:n_gap:way))
+            if (n_mode > 0) call dgemv('N', n_mode, n_gap, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
                0.0_wp, push, 1)
             do i = 1, size(motion, 2)
                motion(:, i) = motion(:, i) - step%factor(:, i, place_v)*push

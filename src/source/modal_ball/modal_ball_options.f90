@@ -36,6 +36,8 @@ module thud_modal_ball_options
       logical :: cavity_gas = .true.
       !> Gravity acts during the contact too.
       logical :: contact_gravity = .false.
+      !> Friction of the floor: `none`, or `stick`, by which touching rings do not slide.
+      character(len=name_length) :: floor_friction = 'none'
       !> Harmonics that answer statically instead of oscillating.
       type(list_type) :: static_families
    contains
@@ -49,7 +51,7 @@ contains
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(modal_ball_options_type), intent(in), target :: options
-      !> One field per component: [11].
+      !> One field per component: [12].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -69,6 +71,8 @@ contains
          'order of the derivative, of fractional; 1: rising', '(0, 1]'), &
          logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
          logical_field('contact_gravity', options%contact_gravity, 'gravity acts during the contact too'), &
+         choice_field('floor_friction', options%floor_friction, 'friction of the floor: none, or without end', &
+         [character(len=5) :: 'none', 'stick']), &
          list_field('static_families', options%static_families, '', 'harmonics that answer statically', &
          '[0, harmonics]', whole=.true.)]
    end function get_fields
