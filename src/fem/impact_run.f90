@@ -17,7 +17,7 @@ module thud_impact_run
    public :: new_impact_run
 
    !> Steps of the power iteration at the start, and at each later check of the step.
-   integer, parameter :: first_iterations = 80, next_iterations = 6
+   integer, parameter :: first_iterations = 80, next_iterations = 3
 
    !> Maximum number of steps in a sampling interval.
    integer, parameter :: max_steps = 100000
@@ -87,7 +87,7 @@ contains
       end associate
    end function new_impact_run
 
-   !> Number of steps in a sampling interval that keeps the run stable.
+   !> Number of steps in a sampling interval that keeps the run stable; it never falls during a run.
    subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
       !> Sampling interval, s; part of the limit of stability to be used.
@@ -98,9 +98,11 @@ contains
       integer, intent(inout) :: n_step
       real(wp) :: growth, ratio, wave, width
       integer :: n_iteration, iteration
+      logical :: starts
 
       n_iteration = next_iterations
-      if (n_step == 0) then
+      starts = n_step == 0
+      if (starts) then
          n_iteration = first_iterations
          associate (material => run%body%material, mesh => run%body%mesh)
             wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
@@ -119,7 +121,8 @@ contains
          ratio = growth/(safety*max_growth)
          ! Growth rises with the first to the second power of the step: take the higher.
          if (ratio <= 1.0_wp) then
-            n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
+            ! Later on no step is taken back: the direction follows the deforming ball late.
+            if (starts) n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit
          end if
          n_step = ceiling(n_step*min(ratio, 2.0_wp))
