@@ -8,8 +8,8 @@ module thud_finite_element
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_field, only: name_length
+   use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: force_history_type
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
    use thud_impact_run, only: choose_step, drift, get_energy, get_mean_height, get_mean_velocity, impact_run_type, kick, &
@@ -71,8 +71,9 @@ contains
       ! The number of elements, and of steps, which grows as they shrink.
       cost = 0.3_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
       ! Branches cost more than all the rest.
-      if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) &
+      if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) then
          cost = 2.5_wp*cost
+      end if
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).
