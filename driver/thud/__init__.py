@@ -42,11 +42,20 @@ if TYPE_CHECKING:
     from thud.comparison import read_all as read_all
     from thud.compression_fit import CompressionFit as CompressionFit
     from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.prediction import RoomPrediction as RoomPrediction
+    from thud.floors.prediction import predict_level as predict_level
+    from thud.floors.rating import Rating as Rating
+    from thud.floors.rating import rating as rating
+    from thud.floors.rating import standardised_level as standardised_level
+    from thud.floors.survey import RoomLevels as RoomLevels
+    from thud.floors.survey import read_room_levels as read_room_levels
+    from thud.recordings.read_recording import read_recording as read_recording
     from thud.recordings.recording import Recording as Recording
-    from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
     from thud.studies.design_map import DesignMap as DesignMap
     from thud.studies.design_map import design_map as design_map
+    from thud.studies.emulation.surrogate import Surrogate as Surrogate
+    from thud.studies.emulation.surrogate import read_surrogate as read_surrogate
     from thud.studies.fit import fit as fit
     from thud.studies.fitting.force_target import ForceTarget as ForceTarget
     from thud.studies.fitting.level_target import LevelTarget as LevelTarget
@@ -56,6 +65,7 @@ if TYPE_CHECKING:
     from thud.studies.sensitivity import Sensitivity as Sensitivity
     from thud.studies.sensitivity import sensitivity as sensitivity
     from thud.studies.study import Study as Study
+    from thud.studies.surrogate import surrogate as surrogate
     from thud.studies.sweep import sweep as sweep
     from thud.studies.uncertainty import Uncertainty as Uncertainty
     from thud.studies.uncertainty import uncertainty as uncertainty
@@ -74,9 +84,16 @@ _LATE = {
     "CompressionFit": "compression_fit",
     "fit_compression": "compression_fit",
     "read_all": "comparison",
+    "Rating": "floors.rating",
     "Recording": "recordings.recording",
+    "RoomLevels": "floors.survey",
+    "RoomPrediction": "floors.prediction",
+    "predict_level": "floors.prediction",
     "quantity": "units",
-    "read_recording": "recordings.recording",
+    "rating": "floors.rating",
+    "read_recording": "recordings.read_recording",
+    "read_room_levels": "floors.survey",
+    "standardised_level": "floors.rating",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
@@ -146,5 +163,7 @@ MAKERS.update(
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    prediction=_maker("plot.prediction", "draw_prediction"),
+    room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),
 )

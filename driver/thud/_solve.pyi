@@ -74,6 +74,16 @@ class HuntCrossleyOptions(SamplingOptions, total=False):
     damping: float
     restitution: float
 
+class TwoMassOptions(SamplingOptions, total=False):
+    belt_mass: float
+    inflation_pressure: float
+    area_growth: float
+    carcass_stiffness: float
+    carcass_exponent: float
+    contact_damping: float
+    belt_frequency: float
+    belt_damping: float
+
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., model: Literal["hollow_sphere"] = ...,
@@ -136,6 +146,20 @@ def solve(
     **options: Unpack[HuntCrossleyOptions],
 ) -> Impact:
     """Drop a ball on a rigid floor by the model ``hunt_crossley``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["two_mass"],
+    **options: Unpack[TwoMassOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``two_mass``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["two_mass"],
+    **options: Unpack[TwoMassOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``two_mass``."""
 
 @overload
 def solve(

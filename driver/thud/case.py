@@ -17,11 +17,13 @@ from thud._schema import (
     Ball,
     Compression,
     Drop,
+    Floor,
     HollowSphere,
     Levels,
     Limits,
     ModelOptions,
     Modes,
+    Room,
     Sampling,
 )
 from thud.checks import LARGEST, refuse, require_choice, require_kind, shown
@@ -39,6 +41,9 @@ if TYPE_CHECKING:
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
+# Groups that an impact may have, and all that a case may ask for.
+FURTHER: dict[str, type[Group]] = {"compression": Compression, "floor": Floor, "room": Room}
+OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **FURTHER}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
@@ -69,10 +74,12 @@ class Case(Group, Displayed):
     ----------
     name : str
         Name of the case, also of its output directory.
-    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley or None
+    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
+    floor, room : Floor and Room, or None
+        Floor and room below; None: no level in a room.
     compression : Compression or None
         Options of the slow compression by the source model; None: no compression.
     ball, drop, sampling, levels, limits
@@ -87,14 +94,17 @@ class Case(Group, Displayed):
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
     modes: Modes | None = None
+    floor: Floor | None = None
+    room: Room | None = None
     compression: Compression | None = None
 
     def __repr__(self) -> str:
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
+        room = "room below" if self.room else ""
         press = "slow compression" if self.compression else ""
-        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, press)))}>"
+        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, room, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -118,8 +128,8 @@ class Case(Group, Displayed):
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
-        require_kind("modes", self.modes, Modes | None)
-        require_kind("compression", self.compression, Compression | None)
+        for group, optional in OPTIONAL.items():
+            require_kind(group, getattr(self, group), optional | None)
         groups: dict[str, dict[str, object]] = {
             "case": {"name": self.name},
             "ball": vars(self.ball),
@@ -127,8 +137,6 @@ class Case(Group, Displayed):
         if self.modes:
             groups["modes"] = {"count": self.modes.count}
             groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
-        if self.compression:
-            groups["compression"] = vars(self.compression)
         if self.model:
             groups["model"] = {"name": self.model.name}
             groups |= {group: vars(getattr(self, group)) for group in GROUPS}
@@ -142,6 +150,7 @@ class Case(Group, Displayed):
                     )
                     raise InputError(message)
                 values[option.name] = value
+        groups |= {group: vars(given) for group in FURTHER if (given := getattr(self, group))}
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
@@ -161,24 +170,32 @@ class Case(Group, Displayed):
         groups = {
             group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
         }
-        model = modes = compression = None
+        model = modes = None
         if "modes" in content:
             modes = Modes(**content["modes"], **content.get("mesh", {}))
-        if "compression" in content:
-            compression = Compression(**content["compression"])
         if "model" in content or not modes:
             name = content.get("model", {}).get("name", next(iter(MODELS)))
             options = {}
             for option in fields(MODELS[name]):
                 given = content.get(group_of(name, option), {})
                 if option.name in given:
-                    entries = given[option.name]
-                    if option.name in LISTS:
-                        entries = tuple(entries) if isinstance(entries, list) else (entries,)
-                    options[option.name] = entries
-            model = MODELS[name](**options)
+                    options[option.name] = given[option.name]
+            model = MODELS[name](**_with_lists(options))
+        further: dict[str, Any] = {
+            group: kind(**_with_lists(content[group]))
+            for group, kind in FURTHER.items()
+            if group in content
+        }
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, compression=compression, **groups)
+        return cls(name=title, model=model, modes=modes, **groups, **further)
+
+
+def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of keys as `f90nml` reads them, lists of one entry as lists."""
+    return {
+        key: (tuple(value) if isinstance(value, list) else (value,)) if key in LISTS else value
+        for key, value in values.items()
+    }
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:

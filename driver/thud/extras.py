@@ -12,6 +12,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+# Distributions that have another name than what is imported.
+_DISTRIBUTIONS = {"sklearn": "scikit-learn"}
+
+
 @contextmanager
 def require_extra(extra: str) -> Iterator[None]:
     """Raise InputError where a package is not installed, with those of an optional extra."""
@@ -19,8 +23,9 @@ def require_extra(extra: str) -> Iterator[None]:
         yield
     except ModuleNotFoundError as error:
         wanted = packages(extra)
-        names = wanted if error.name in wanted else [str(error.name)]
-        refuse(f"{error.name} is not installed", f"pip install {' '.join(names)}", error)
+        missing = _DISTRIBUTIONS.get(str(error.name), str(error.name))
+        names = wanted if missing in wanted else [missing]
+        refuse(f"{missing} is not installed", f"pip install {' '.join(names)}", error)
 
 
 def packages(extra: str) -> list[str]:

@@ -254,8 +254,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         By default the rubber ball of the paper, from 1 m.
     model
         ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
-        one), ``"finite_element"``, ``"measured_modes"`` or ``"hunt_crossley"``; or an object of
-        the classes below, which holds the options.
+        one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``;
+        or an object of the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.
     duration
@@ -263,8 +263,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     **options
-        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`
-        and `HuntCrossley`; such as ``momentum_flux="retarding"``.
+        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
+        `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
 
     Returns
     -------

@@ -5,6 +5,7 @@
 !> it over and frees it. `status` is 0, or the code of the error whose sentence is the text `message` of the bundle.
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
+   use thud_band, only: band_type
    use thud_bundle, only: bundle_type, leave, take
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
@@ -15,14 +16,17 @@ module thud_api
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: int64, int8, wp
+   use thud_plate, only: get_resistance
    use thud_progress_line, only: begin_progress, end_progress
+   use thud_room, only: get_room_bands, get_room_level, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
    use thud_system, only: begin_call, end_call, end_all_calls => end_calls
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_text, collect, compress, describe_library, effective_case, end_calls, free_modes, loss_factors, run, solve
+   public :: check_text, collect, compress, describe_library, effective_case, end_calls, free_modes, loss_factors
+   public :: predict_room, run, solve
 
 contains
 
@@ -314,5 +318,44 @@ contains
       call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine run
+
+   !> Level that a force causes in the room below.
+   subroutine predict_room(text, level, n_band, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(level) :: n_band = len(level)
+      !> Text of a namelist file with floor and room.
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: n_band
+      !> Force exposure levels of the thirds that a rating is made of, see `get_rated`, dB: [n_band].
+      real(wp), intent(in) :: level(n_band)
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(room_level_type) :: prediction
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
+      integer :: n(1)
+
+      allocate (bundle)
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call get_room_bands(bands, error)
+      if (.not. allocated(error)) then
+         call get_room_level(case%floor, case%room, bands, level, prediction)
+         n = n_band
+         call bundle%add_number('resistance', get_resistance(case%floor))
+         call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
+         call bundle%add_array('bands.energy', n, prediction%energy)
+         call bundle%add_array('bands.radiation_factor', n, prediction%radiation_factor)
+         call bundle%add_array('bands.loss_factor', n, prediction%loss_factor)
+         call bundle%add_array('bands.reverberation_time', n, prediction%reverberation_time)
+         call bundle%add_array('bands.floor_modes', n, prediction%floor_modes)
+         call bundle%add_array('bands.room_modes', n, prediction%room_modes)
+         call bundle%add_array('bands.level', n, prediction%level)
+         call bundle%add_array('bands.time', n, prediction%time)
+      end if
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine predict_room
 
 end module thud_api

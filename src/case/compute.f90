@@ -9,12 +9,13 @@ module thud_compute
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
    use thud_remarks, only: get_remarks, remark_length
+   use thud_room, only: get_room_bands, get_room_level, room_level_type
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    implicit none (type, external)
    private
 
-   public :: compress_case, compute_case, get_judged_force, is_conforming, judge_case, results_type
+   public :: compress_case, compute_case, get_judged_force, is_conforming, judge_case, predict_room, results_type
    public :: verdict_type
 
    !> Levels and criteria of an impact.
@@ -37,6 +38,8 @@ module thud_compute
       type(verdict_type) :: verdict
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
+      !> Level in the room below, where it is asked for.
+      type(room_level_type) :: room
       !> Slow compression, where it is asked for.
       type(compression_type) :: compression
       !> What is possible but not plausible: [n_remark].
@@ -125,6 +128,27 @@ contains
       criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
          get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
    end subroutine judge_force
+
+   !> Level that a force causes in the room below.
+   subroutine predict_room(case, force, sample_rate, prediction, error)
+      !> The case, with floor and room.
+      type(case_type), intent(in) :: case
+      !> Force on the floor, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      type(room_level_type), intent(out) :: prediction
+      !> A level cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(band_type), allocatable :: bands(:)
+      real(wp), allocatable :: level(:)
+
+      call get_room_bands(bands, error)
+      if (allocated(error)) return
+      allocate (level(size(bands)))
+      call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
+      if (.not. allocated(error)) call get_room_level(case%floor, case%room, bands, level, prediction)
+   end subroutine predict_room
 
    !> Number of the force that the verdict is on.
    pure function get_judged_force(case) result(number)

@@ -272,6 +272,10 @@ contains
          error = input_error('the case computes no impact; allowed: a case with &model')
          return
       end if
+      if (case%has_room) then
+         error = input_error('&floor and &room: many drops have no level in a room; allowed: a case without these groups')
+         return
+      end if
       allocate (fields, source=get_active_fields(case))
       ! What every drop takes over from the case.
       call check_fields(pack(fields, fields%owner == '' .and. fields%group /= 'ball' .and. fields%group /= 'drop' &

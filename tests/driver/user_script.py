@@ -15,6 +15,7 @@ names: tuple[thud.ModelName, ...] = ("hollow_sphere", "modal_ball")
 ball = thud.Ball(outer_radius=thud.quantity("8.9 cm"))
 impacts: dict[str, thud.Impact] = {name: thud.solve(ball, model=name) for name in names}
 lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
+tyre: thud.ModelOptions = thud.TwoMass(belt_mass=1.0)
 impacts["lumped"] = thud.solve(ball, thud.Drop(height=1.0), lumped)
 flagship = thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt")
 motion: thud.Motion | None = flagship.motion
@@ -59,6 +60,11 @@ tables = (
     flagship.to_xarray().sizes,
     many.to_xarray().sizes,
 )
+floor, room = thud.Floor(thickness=0.2), thud.Room(volume=40.0)
+below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
+(folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
+site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
+rating: thud.Rating = thud.rating(thud.standardised_level(site.level, 0.6, 40.0))
 height = {"height": thud.Parameter(values=[0.5, 1.0])}
 mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
 modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
@@ -86,5 +92,8 @@ results = [
     chart,
     spread,
     shares,
+    below,
+    site,
+    rating,
 ]
 print(*results, *missed, sep="\n")

@@ -62,7 +62,7 @@ def run_study(options: argparse.Namespace) -> int:
     """Run a study, print its results, save files and figures; return the exit code."""
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
-    how: How = {"progress": not options.quiet}
+    how: How = {"progress": not options.quiet, "replace": options.replace}
     if KINDS[options.name].has_sets:
         how |= {
             "backend": options.backend,

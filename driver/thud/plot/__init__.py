@@ -40,9 +40,12 @@ from thud.plot.loss_factor import loss_factor as loss_factor
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion
+from thud.plot.prediction import draw_prediction as draw_prediction
 from thud.plot.recording import recording_forces as recording_forces
 from thud.plot.recording import recording_levels as recording_levels
+from thud.plot.room import room_levels as room_levels
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
+from thud.plot.surrogate import draw_surrogate as draw_surrogate
 from thud.plot.sweep import draw_sweep as draw_sweep
 from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
 

@@ -42,9 +42,20 @@ def draw_design_map(result: DesignMap) -> Figure:
     if margin.count():
         bar = _draw_margin(figure, axes, (x, y), margin)
         bar.set_label(f"Margin ({FORCE_WORDS[dataset.attrs['judged_force']]}), dB", fontsize=SIZE)
-    row, column = np.nonzero(conforms)
-    if row.size:
-        axes.plot(x[column], y[row], ".", markersize=2, color="black", label="All criteria met")
+    doubtful = np.zeros_like(conforms)
+    if "doubtful" in dataset:
+        doubtful = dataset["doubtful"].transpose(*result.axes).values.T
+    marks = {
+        "All criteria met": (conforms & ~doubtful, "."),
+        "In doubt by surrogate": (doubtful, "x"),
+    }
+    for label, (chosen, marker) in marks.items():
+        row, column = np.nonzero(chosen)
+        if row.size:
+            axes.plot(
+                x[column], y[row], marker, markersize=2, markeredgewidth=0.5, color="black",
+                label=label,
+            )  # fmt: skip
     if result.mark:
         place = [value * scale for value, scale in zip(result.mark, scales, strict=True)]
         axes.plot(

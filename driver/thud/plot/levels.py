@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud._schema import Ball, BandSet, Levels, LevelsForce, LevelsMethod, LimitsSource
+from thud._schema import Ball, BandSet, Drop, Levels, LevelsForce, LevelsMethod, LimitsSource
 from thud.checks import refuse
 from thud.impact import Impact, solve
 from thud.levels import octave_limits
@@ -142,6 +142,16 @@ def _draw_models() -> Figure:
     return levels(impacts)
 
 
+def _draw_tyres() -> Figure:
+    """Draw the tyre as one mass and as belt and rim."""
+    tyre, drop = Ball(mass=7.3), Drop(0.85)
+    impacts = {
+        "one mass": solve(tyre, drop, "hunt_crossley", contact_time=0.02, restitution=0.8),
+        "two masses": solve(tyre, drop, "two_mass"),
+    }
+    return levels(impacts, source="tyre")
+
+
 def _draw_fluxes() -> Figure:
     """Draw the interpretations of the flux term of the paper."""
     choices = ("momentum_balance", "retarding", "conservative", "none")
@@ -154,4 +164,5 @@ DOCUMENTATION_FIGURES = {
     "figure3_levels": _draw_shell,
     "finite_element_levels": _draw_models,
     "momentum_flux": _draw_fluxes,
+    "tyre_levels": _draw_tyres,
 }

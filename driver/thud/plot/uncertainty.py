@@ -51,5 +51,9 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     axes.set_ylabel(f"Level − nominal, dB\n({words})", fontsize=SIZE)
     low, high = result.interval
     share = f"{100 * result.probability:.1f} % ({100 * low:.1f} to {100 * high:.1f} %)"
-    legend_above(axes, f"All criteria met: {share}")
+    title = f"All criteria met: {share}"
+    if result.surrogate_range:
+        low, high = result.surrogate_range
+        title += f"\nby errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
+    legend_above(axes, title)
     return figure

@@ -31,6 +31,8 @@ MEANINGS = {
     **{name: ("dB", _LEVEL.format(force)) for name, (force, _) in LEVELS.items()},
     "margin": ("dB", "minimum distance of the judged octave levels to a limit, positive inside"),
     "conforms": ("1", "all criteria of the standard are met"),
+    "doubtful": ("1", "the verdict could change by the errors of the surrogate"),
+    "peaks": ("1", "number of peaks of the judged force"),
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
 }
@@ -67,7 +69,10 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
     for name, values in found.items():
         unit, meaning = MEANINGS[name]
         dimensions = ("set", levels[name][1]) if name in levels else ("set",)
-        variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
+        attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
+        if study.surrogate and name in study.surrogate.outputs:
+            attributes["surrogate_error"] = study.surrogate.error_of(name)
+        variables[name] = (dimensions, values, attributes)
     return in_order(xr.Dataset(variables, coordinates, provenance(study)))
 
 
@@ -104,6 +109,7 @@ def provenance(study: SetStudy) -> dict[str, str]:
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
         "parameters": " ".join(map(coordinate, study.parameters)),
+        **({"surrogate": study.surrogate.sentence} if study.surrogate else {}),
         **makers(study.design),
         **origin(study.case),
     }

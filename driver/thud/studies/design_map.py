@@ -68,6 +68,8 @@ class DesignMap(Displayed):
         rows: list[tuple[str, ...]] = [("sets", f"{margin.size}")]
         rows.append(("octave levels conform", f"{int((margin >= 0).sum())}"))
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
+        if "doubtful" in self.dataset:
+            rows.append(("in doubt by the surrogate", f"{int(self.dataset['doubtful'].sum())}"))
         if margin.notnull().any():
             best = margin.isel(margin.argmax(...))
             rows.append(("largest margin, dB", f"{float(best):z.2f}"))

@@ -14,7 +14,7 @@ from thud.errors import InputError
 from thud.files import lock, replace_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
     from matplotlib.figure import Figure
 
@@ -40,16 +40,8 @@ def take(
     place.mkdir(parents=True, exist_ok=True)
     descriptor = lock(place, results[0])
     try:
-        for path in results:
-            changes = _changes(path, kind, study) if path.exists() else ""
-            if changes and not replace:
-                refuse(
-                    f"{path} belongs to another version of this study: {changes}",
-                    "another directory, or --replace (replace=True) to compute it again",
-                )
-            if changes:
-                for name in (*kind.results(study), *kind.other_files(study)):
-                    remove(place / name)
+        others = [place / name for name in kind.other_files(study)]
+        require_version(dict.fromkeys(results, kind.identity_in), study, others, replace=replace)
         if not results[0].exists():
             with TemporaryFile(dir=place):
                 pass
@@ -58,10 +50,33 @@ def take(
         os.close(descriptor)
 
 
-def _changes(path: Path, kind: Kind[Any, Any], study: Study) -> str:
+def require_version(
+    readers: Mapping[Path, Callable[[Path], dict[str, str] | None]],
+    study: Study,
+    others: Iterable[Path],
+    *,
+    replace: bool,
+) -> None:
+    """Raise InputError where results belong to another study; with `replace`, remove them.
+
+    `readers` return the identity of results by their paths; `others` are removed with them.
+    """
+    for path, identity_in in readers.items():
+        changes = _changes(path, identity_in, study) if path.exists() else ""
+        if changes and not replace:
+            refuse(
+                f"{path} belongs to another version of this study: {changes}",
+                "another directory, or --replace (replace=True) to compute it again",
+            )
+        if changes:
+            for one in (*readers, *others):
+                remove(one)
+
+
+def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
     """Return the differences of a study from that of existing results."""
     try:
-        before = kind.identity_in(path)
+        before = identity_in(path)
     except InputError:
         raise
     except (ValueError, LookupError, TypeError, FileNotFoundError) as error:

@@ -5,18 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from thud import _schema as schema
 from thud._api import version
 from thud.checks import refuse
 from thud.ensemble import solve_many
 from thud.impact import FORCES
-from thud.levels import BANDWIDTHS
+from thud.levels import BANDWIDTHS, peak_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud._schema import BandSet, LevelsForce
     from thud.case import Case
+    from thud.studies.emulation.surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 
@@ -37,20 +40,23 @@ class Block:
     """Sets from number `start` on that are computed together.
 
     They differ from the case in the columns, shape (n_set,), by names of keys; `version` is that of
-    thud which has to compute them.
+    thud which has to compute them. A surrogate, where there is one, answers instead of the model.
     """
 
     start: int
     case: Case
     columns: Columns
     version: str
+    surrogate: Surrogate | None = None
+    counts_peaks: bool = False
 
 
 def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
     Returns the `SCALARS`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
-    ``conforms``; ``status`` and ``reason``. Sets with an error have no numbers: NaN.
+    ``conforms``; ``status`` and ``reason``; of a surrogate ``doubtful``; where they are counted,
+    the ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
     if block.version != version():
@@ -58,10 +64,17 @@ def evaluate(block: Block) -> Columns:
             f"thud {version()} cannot compute sets of thud {block.version}",
             "the same version everywhere",
         )
-    found = solve_many(block.columns, block.case, threads=1)
+    if block.surrogate:
+        return block.surrogate.predict(block.case, block.columns)
+    found = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
     columns: Columns = {name: getattr(found, name) for name in SCALARS}
     for name, (force, bands) in level_names(block.case).items():
         columns[name] = found.levels[force, bands]
+    if block.counts_peaks:
+        forces = getattr(found, f"{block.case.levels.force}_force")
+        columns["peaks"] = np.array(
+            [peak_count(f, found.sample_rate) if np.isfinite(f).all() else np.nan for f in forces]
+        )
     return columns | {
         "margin": found.margin,
         "conforms": found.conforms,

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from thud.case import Case
     from thud.keys import Value
+    from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
 
@@ -44,6 +45,8 @@ class How(TypedDict, total=False):
         Show a progress bar.
     replace : bool
         Remove results of another version of the study from the directory.
+    surrogate : Surrogate or str or None
+        What answers the sets instead of the model, or the path of its file.
     """
 
     backend: Literal["threads", "processes", "dask"] | None
@@ -52,6 +55,7 @@ class How(TypedDict, total=False):
     yes: bool
     progress: bool
     replace: bool
+    surrogate: Surrogate | str | os.PathLike[str] | None
 
 
 class Kind(ABC, Generic[S, R]):
@@ -77,6 +81,8 @@ class Kind(ABC, Generic[S, R]):
         """Return the result of a study, also written to an output directory."""
         require_words("keywords", how, How.__annotations__)
         study = self.read_study(source)
+        if (surrogate := how.get("surrogate")) is not None:
+            study = self.with_surrogate(study, surrogate)
         self.require(study, **how)
         if output is None:
             return self.compute(study, None, **how)
@@ -100,6 +106,10 @@ class Kind(ABC, Generic[S, R]):
     @abstractmethod
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> S:
         """Return a study with what only this kind has."""
+
+    def with_surrogate(self, study: S, given: Surrogate | str | os.PathLike[str]) -> S:  # noqa: ARG002
+        """Return a study whose drops a surrogate answers."""
+        refuse(f"surrogate is not allowed for a {self.name} study", "studies of sets of drops")
 
     def require(self, study: S, **how: Unpack[How]) -> None:
         """Raise InputError where a study cannot be computed this way."""

@@ -41,6 +41,7 @@ KINDS = {
     "sensitivity": Entry("sensitivity", "Sobol indices: which parameter matters for what"),
     "design": Entry("design_map", "which geometry and material conform to the standards"),
     "uncertainty": Entry("uncertainty", "how tolerances spread levels and conformity"),
+    "surrogate": Entry("surrogate", "what other studies ask instead of a slow model"),
     "fit": Entry("fit", "parameters of a model from a force or from levels", has_sets=False),
 }
 # Public names by the modules of this package.
@@ -52,8 +53,10 @@ PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
     "Parameter": "parameter",
     "Sensitivity": "sensitivity",
     "Study": "study",
+    "Surrogate": "emulation.surrogate",
     "Uncertainty": "uncertainty",
     "read_study": "kinds",
+    "read_surrogate": "emulation.surrogate",
     "read_sweep": "blocks",
 }
 
@@ -96,7 +99,8 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
     source
         Path of a TOML file, or what would stand in it; see docs/studies.md.
     kind
-        ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"`` or ``"fit"``.
+        ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"``, ``"surrogate"`` or
+        ``"fit"``.
 
     Returns
     -------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 import xarray as xr
@@ -33,6 +33,8 @@ INDICES = {
 }
 CONFIDENCE = 0.95
 RESAMPLES = 200
+# Variances below this are rounding errors, dB2.
+_ROUNDING = 1e-24
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,8 @@ class Sensitivity(Displayed):
         Every set of the study.
     indices : Dataset
         ``first_order`` and ``total`` index of each ``output`` and ``parameter``, and half widths
-        of their confidence intervals of 95 %. Outputs that do not vary have none: NaN.
+        of their confidence intervals of 95 %. Outputs that do not vary have none: NaN. Of a
+        surrogate also ``surrogate``, the variance of its errors over that of each output.
     left_out : int
         Base samples left out because one of their sets has no result.
     """
@@ -67,10 +70,15 @@ class Sensitivity(Displayed):
         """Return header and rows of text: total indices of each output."""
         parameters = [str(name) for name in self.indices["parameter"].values]
         rows = [("total index of", *parameters)]
+        if "surrogate" in self.indices:
+            rows = [(*rows[0], "error of the surrogate")]
         for output in self.indices["output"].values:
             row = self.indices.sel(output=output)
             pairs = zip(row["total"].values, row["total_interval"].values, strict=True)
-            rows.append((str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs)))
+            rest = [f"{float(row['surrogate']):.3f}"] if "surrogate" in row else []
+            rows.append(
+                (str(output), *(f"{total:.3f} ± {half:.3f}" for total, half in pairs), *rest)
+            )
         return rows
 
     def csv(self) -> bytes:
@@ -150,10 +158,25 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
         )
     rows = np.repeat(usable, dimension + 2)
     found = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]
-    variables = {
+    variables: dict[str, Any] = {
         name: (("output", "parameter"), np.stack(values), {"units": "1", "long_name": meaning})
         for (name, meaning), values in zip(INDICES.items(), zip(*found, strict=True), strict=True)
     }
+    if study.surrogate:
+        meaning = {"units": "1", "long_name": "variance of the surrogate's errors over that of all"}
+        known = np.concatenate(
+            [study.surrogate.mean_square(name) for name in (f"{force}_level", "contact_time", peak)]
+        )
+        # Levels are in dB; other quantities are compared in dB too.
+        spread = np.array(
+            [
+                np.var(v[rows] if i < levels.shape[1] else 20 * np.log10(v[rows]))
+                for i, v in enumerate(outputs.values())
+            ]
+        )
+        # As the indices, none where nothing varies.
+        spread[spread <= _ROUNDING] = np.nan
+        variables["surrogate"] = ("output", known / spread, meaning)
     names = {"output": list(outputs), "parameter": list(map(coordinate, study.parameters))}
     left_out = int((~usable).sum())
     return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)

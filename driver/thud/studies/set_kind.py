@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-import sys
 from abc import abstractmethod
 from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
-import numpy as np
-from tqdm import tqdm
-
-from thud._api import version
 from thud._schema import KEYS
 from thud.checks import refuse, require_choice
 from thud.keys import OF_FILES
-from thud.studies.backends import checked_backend, run_blocks
-from thud.studies.blocks import Blocks, read_identity, read_sweep, result_names
-from thud.studies.dataset import disk_space, grid_of, new_dataset
+from thud.studies.backends import checked_backend
+from thud.studies.blocks import read_identity, result_names
+from thud.studies.computing import compute_sets
+from thud.studies.dataset import disk_space
 from thud.studies.designs import read_design
 from thud.studies.directory import FORMATS
-from thud.studies.evaluation import Block
+from thud.studies.emulation.plan import read_plan
+from thud.studies.emulation.surrogate import Surrogate, read_surrogate
+from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
 from thud.studies.sets import SetStudy
@@ -29,7 +27,8 @@ from thud.studies.temperature import read_temperature
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    import os
+    from collections.abc import Mapping
     from pathlib import Path
 
     import xarray as xr
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from thud.keys import Value
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
-    from thud.studies.sets import Columns
     from thud.studies.study import Study
 
 R = TypeVar("R")
@@ -49,10 +47,10 @@ MAX_SETS = 100_000
 _FILE_FORMATS = ("auto", "netcdf", "zarr")
 
 
-class SetKind(Kind[SetStudy, R]):
-    """A kind of study that computes sets of drops."""
+class DropsKind(Kind[SetStudy, R]):
+    """A kind of study that needs drops around its case."""
 
-    words = ("format", "design", "temperature")
+    words: ClassVar[tuple[str, ...]] = ("format", "design", "temperature", "surrogate")
     # The designs that it takes, the default first.
     designs: ClassVar[tuple[str, ...]]
 
@@ -64,7 +62,7 @@ class SetKind(Kind[SetStudy, R]):
             refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all sets")
         return varied(name, given, case.model.name, centre)  # type: ignore[union-attr]
 
-    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:  # noqa: ARG002
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
         """Return a study with its design."""
         written = given.get("format", _FILE_FORMATS[0])
         require_choice("format", written, _FILE_FORMATS)
@@ -78,13 +76,21 @@ class SetKind(Kind[SetStudy, R]):
         if case.model and files:
             case = replace(case, model=replace(case.model, **files))  # type: ignore[arg-type]
         head = {**vars(study), "case": case}
-        return SetStudy(**head, **design, temperature=temperature, format=written)
+        found = SetStudy(**head, **design, temperature=temperature, format=written)
+        if "surrogate" not in given:
+            return found
+        plan = read_plan(table_of(given, "surrogate"), folder)
+        if isinstance(plan, Surrogate):
+            return self.with_surrogate(found, plan)
+        return replace(found, plan=plan)
 
-    def describe(self, study: SetStudy) -> str:
-        """Return how many sets a study has and how much disk it needs."""
-        space = disk_space(study) / 1e6
-        amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
-        return f"{study.name}: {study.count} sets of {study.model}, about {amount} on disk"
+    def with_surrogate(
+        self, study: SetStudy, given: Surrogate | str | os.PathLike[str]
+    ) -> SetStudy:
+        """Return a study whose sets a surrogate answers. Raises InputError where it cannot."""
+        surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
+        surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
+        return replace(study, plan=None, surrogate=surrogate)
 
     def require(self, study: SetStudy, **how: Unpack[How]) -> None:
         """Raise InputError where there are too many sets, or no such backend."""
@@ -92,17 +98,47 @@ class SetKind(Kind[SetStudy, R]):
             refuse(self.describe(study), f"up to {MAX_SETS} sets, more with yes=True (--yes)")
         checked_backend(how.get("backend"), how.get("workers"), how.get("scheduler"))
 
+    @abstractmethod
+    def draw(self, result: R) -> Figure:
+        """Return the figure of a result."""
+
+    def other_files(self, study: SetStudy) -> list[str]:
+        """Return the names of the figures, and of the surrogate that is trained."""
+        trained = [surrogate_name(study)] if study.plan else []
+        return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
+
+    def table(self, result: R, study: SetStudy) -> str:  # noqa: ARG002 - sets know their units
+        """Return the result as text."""
+        return format_rows(result.table())  # type: ignore[attr-defined]
+
+    def figures(self, result: R, study: SetStudy) -> dict[str, Figure]:
+        """Return the figure by the name of the study."""
+        return {study.name: self.draw(result)} if self.succeeded(result) else {}
+
+
+class SetKind(DropsKind[R]):
+    """A kind of study that computes sets of drops."""
+
+    def describe(self, study: SetStudy) -> str:
+        """Return how many sets a study has and how much disk it needs."""
+        space = disk_space(study) / 1e6
+        amount = f"{space / 1e3:.3g} GB" if space > 1e3 else f"{space:.2g} MB"  # noqa: PLR2004
+        by = ""
+        if study.plan:
+            by = f" by a surrogate, which is trained on up to {study.plan.size} drops"
+        elif study.surrogate:
+            by = f" by a surrogate of {len(study.surrogate.points)} drops"
+        return f"{study.name}: {study.count} sets of {study.model}{by}, about {amount} on disk"
+
     def compute(self, study: SetStudy, folder: Path | None, **how: Unpack[How]) -> R:
         """Return the result of all sets, computed or continued."""
+        if study.plan:
+            study = replace(study, surrogate=train(study, folder, how))
         return self.conclude(study, compute_sets(study, folder, how))
 
     @abstractmethod
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
         """Return the result of all sets."""
-
-    @abstractmethod
-    def draw(self, result: R) -> Figure:
-        """Return the figure of a result."""
 
     def results(self, study: SetStudy) -> list[str]:
         """Return the names of the dataset and of the directory of blocks."""
@@ -112,76 +148,24 @@ class SetKind(Kind[SetStudy, R]):
         """Return the identity of results."""
         return read_identity(path)
 
-    def other_files(self, study: SetStudy) -> list[str]:
-        """Return the names of the figures."""
-        return [f"{study.name}{ending}" for ending in FORMATS]
-
-    def table(self, result: R, study: SetStudy) -> str:  # noqa: ARG002 - sets know their units
-        """Return the result as text."""
-        return format_rows(result.table())  # type: ignore[attr-defined]
-
     def remarks(self, result: R) -> list[str]:
         """Return how many sets have no results, and why."""
         dataset = _sets(result)
         failed = dataset["status"].values != 0
-        if not failed.any():
-            return []
-        ((reason, _),) = Counter(dataset["reason"].values[failed]).most_common(1)
-        return [f"{failed.sum()} of {failed.size} sets have no results, such as: {reason}"]
+        found = []
+        if failed.any():
+            ((reason, _),) = Counter(dataset["reason"].values[failed]).most_common(1)
+            found = [f"{failed.sum()} of {failed.size} sets have no results, such as: {reason}"]
+        if "surrogate" in dataset.attrs:
+            doubtful = int(dataset["doubtful"].sum())
+            share = f"it leaves {doubtful} of {failed.size} verdicts in doubt"
+            found.append(f"{dataset.attrs['surrogate']}; {share}")
+        return found
 
     def succeeded(self, result: R) -> bool:
         """Return whether any set has results."""
         return bool((_sets(result)["status"] == 0).any())
 
-    def figures(self, result: R, study: SetStudy) -> dict[str, Figure]:
-        """Return the figure by the name of the study."""
-        return {study.name: self.draw(result)} if self.succeeded(result) else {}
-
 
 def _sets(result: Any) -> xr.Dataset:  # noqa: ANN401 - a dataset, or what has one
     return getattr(result, "dataset", result)  # type: ignore[no-any-return]
-
-
-def compute_sets(study: SetStudy, folder: Path | None, how: How) -> xr.Dataset:
-    """Compute or continue a study; without a folder its results are not written.
-
-    Raises NumericalError where the backend loses sets; sets that fail have a status and a reason.
-    """
-    size = study.block_size
-    blocks = Blocks(folder, study, size) if folder else None
-    memory: dict[int, Columns] = {}
-
-    def keep(block: Block, found: Columns) -> None:
-        if blocks:
-            blocks.keep(block, found)
-        else:
-            memory[block.start] = found
-        bar.update(len(found["status"]))
-
-    if not (blocks and blocks.complete):
-        if blocks:
-            blocks.open()
-        starts = range(0, study.count, size)
-        open_starts = [start for start in starts if not (blocks and blocks.has(start))]
-        done = study.count - sum(min(size, study.count - start) for start in open_starts)
-        with tqdm(
-            total=study.count,
-            initial=done,
-            unit="set",
-            disable=not how.get("progress", False),
-            file=sys.stderr,
-        ) as bar:
-            backend = how.get("backend"), how.get("workers"), how.get("scheduler")
-            run_blocks(_blocks(study, open_starts, size), keep, *backend)
-    if blocks:
-        blocks.finish()
-        return read_sweep(blocks.path)
-    parts = [memory[start] for start in sorted(memory)]
-    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))
-
-
-def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
-    for start in starts:
-        columns = study.parameter_columns(start, min(start + size, study.count))
-        yield Block(start, study.case, study.key_columns(columns), version())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from thud.studies.study import Study, wall_volume
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.studies.emulation.plan import Plan
+    from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.temperature import Temperature
 
     Columns = dict[str, NDArray[Any]]
@@ -23,6 +25,8 @@ if TYPE_CHECKING:
 
 # A block of sets should take about this time, s.
 _BLOCK_TIME = 0.5
+# Sets of a block that a surrogate answers, in about this time.
+_ANSWERED = 2**16
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,10 @@ class SetStudy(Study):
         Law of the material where the temperature varies.
     format : str
         ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
+    plan : Plan or None
+        How a surrogate is trained for its sets.
+    surrogate : Surrogate or None
+        What answers its sets instead of the model.
     """
 
     design: str = "grid"
@@ -46,6 +54,11 @@ class SetStudy(Study):
     seed: int = 0
     temperature: Temperature | None = None
     format: str = "auto"
+    plan: Plan | None = None
+    surrogate: Surrogate | None = None
+
+    # Whether the peaks of the judged force are counted in each set.
+    counts_peaks: ClassVar[bool] = False
 
     def own_identity(self) -> dict[str, str]:
         """Return design and temperature law."""
@@ -54,6 +67,10 @@ class SetStudy(Study):
             found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:
             found |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.given.items()}
+        if self.plan:
+            found |= self.plan.identity
+        elif self.surrogate:
+            found["surrogate"] = self.surrogate.digest
         return found
 
     @property
@@ -75,6 +92,8 @@ class SetStudy(Study):
     @property
     def block_size(self) -> int:
         """Number of sets that are computed together, the same for all backends."""
+        if self.plan or self.surrogate:
+            return _ANSWERED
         if self.design in {"grid", "list"}:
             # A grid may be larger than the memory; its ends do.
             first = {p.name: replace(p, count=min(p.count, 2)).grid()[:1] for p in self.parameters}

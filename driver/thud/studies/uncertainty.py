@@ -79,6 +79,18 @@ class Uncertainty(Displayed):
         found = binomtest(self.conforming, self.computed).proportion_ci(CONFIDENCE, "wilson")
         return found.low, found.high
 
+    @property
+    def surrogate_range(self) -> tuple[float, float] | None:
+        """Probability where the errors of the surrogate are all adverse, and all favourable.
+
+        None where the model itself was asked.
+        """
+        if "doubtful" not in self.dataset:
+            return None
+        conforms, doubtful = (self.dataset[name].values for name in ("conforms", "doubtful"))
+        counts = (conforms & ~doubtful).sum(), (conforms | doubtful).sum()
+        return float(counts[0] / self.computed), float(counts[1] / self.computed)
+
     def table(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         lower, upper = octave_limits(self.source)
@@ -95,7 +107,12 @@ class Uncertainty(Displayed):
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
         interval = f"{100 * low:.1f} to {100 * high:.1f} %"
         count = f"{self.conforming} of {self.computed}"
-        return [*rows, ("all criteria", *probability, interval, count)]
+        rows.append(("all criteria", *probability, interval, count))
+        if self.surrogate_range:
+            low, high = self.surrogate_range
+            share = f"{100 * low:.1f} to {100 * high:.1f} %"
+            rows.append(("  by errors of the surrogate", "", "", share, ""))
+        return rows
 
 
 class UncertaintyKind(SetKind[Uncertainty]):

@@ -1,0 +1,76 @@
+"""Sets of a study, computed in blocks by a backend, kept or continued in a directory."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import numpy as np
+from tqdm import tqdm
+
+from thud._api import version
+from thud.studies.backends import run_blocks
+from thud.studies.blocks import Blocks, read_sweep
+from thud.studies.dataset import grid_of, new_dataset
+from thud.studies.evaluation import Block
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    import xarray as xr
+
+    from thud.studies.kind import How
+    from thud.studies.sets import Columns, SetStudy
+
+
+def compute_sets(study: SetStudy, folder: Path | None, how: How) -> xr.Dataset:
+    """Compute or continue a study; without a folder its results are not written.
+
+    Raises NumericalError where the backend loses sets; sets that fail have a status and a reason.
+    """
+    size = study.block_size
+    blocks = Blocks(folder, study, size) if folder else None
+    memory: dict[int, Columns] = {}
+
+    def keep(block: Block, found: Columns) -> None:
+        if blocks:
+            blocks.keep(block, found)
+        else:
+            memory[block.start] = found
+        bar.update(len(found["status"]))
+
+    if not (blocks and blocks.complete):
+        if blocks:
+            blocks.open()
+        starts = range(0, study.count, size)
+        open_starts = [start for start in starts if not (blocks and blocks.has(start))]
+        done = study.count - sum(min(size, study.count - start) for start in open_starts)
+        with tqdm(
+            total=study.count,
+            initial=done,
+            unit="set",
+            disable=not how.get("progress", False),
+            file=sys.stderr,
+        ) as bar:
+            backend = how.get("backend"), how.get("workers"), how.get("scheduler")
+            run_blocks(_blocks(study, open_starts, size), keep, *backend)
+    if blocks:
+        blocks.finish()
+        return read_sweep(blocks.path)
+    parts = [memory[start] for start in sorted(memory)]
+    whole = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return grid_of(study, new_dataset(study, study.parameter_columns(0, study.count), whole))
+
+
+def _blocks(study: SetStudy, starts: list[int], size: int) -> Iterator[Block]:
+    for start in starts:
+        columns = study.parameter_columns(start, min(start + size, study.count))
+        yield Block(
+            start,
+            study.case,
+            study.key_columns(columns),
+            version(),
+            study.surrogate,
+            counts_peaks=study.counts_peaks,
+        )

@@ -1,0 +1,1 @@
+"""Surrogates: how they are trained, and what they answer."""

@@ -1,0 +1,112 @@
+"""Surrogates as a kind of study: a region of the parameters, learned once and used by others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, ClassVar, Unpack
+
+from thud.checks import refuse
+from thud.studies.emulation.surrogate import Surrogate, read_surrogate
+from thud.studies.emulation.training import surrogate_name, train
+from thud.studies.parameter import Parameter
+from thud.studies.set_kind import DropsKind
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from matplotlib.figure import Figure
+
+    from thud.case import Case
+    from thud.keys import Value
+    from thud.studies.kind import How
+    from thud.studies.sets import SetStudy
+    from thud.studies.study import Source, Study
+
+
+class SurrogateKind(DropsKind[Surrogate]):
+    """Surrogates as a kind of study."""
+
+    name = "surrogate"
+    words: ClassVar[tuple[str, ...]] = ("surrogate",)
+    designs = ("grid",)
+
+    def new_parameter(
+        self, name: str, given: object, case: Case, centre: Value | None
+    ) -> Parameter:
+        """Return a parameter that varies from a minimum to a maximum."""
+        found = super().new_parameter(name, given, case, centre)
+        if found.low is None or found.count or found.scale != Parameter.scale:
+            refuse(f"[parameters] {name} is not a range of a surrogate", "low, high and unit")
+        # The sets of the study are the corners of the region.
+        return replace(found, count=2)
+
+    def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
+        """Return a study with the plan of its training."""
+        found = super().complete(study, {"surrogate": {}, **given}, folder)
+        if found.plan is None:
+            refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
+        return found
+
+    def compute(self, study: SetStudy, folder: Path | None, **how: Unpack[How]) -> Surrogate:
+        """Return the surrogate, trained or read."""
+        return train(study, folder, how)
+
+    def describe(self, study: SetStudy) -> str:
+        """Return what is learned."""
+        names = ", ".join(p.name for p in study.parameters)
+        size = study.plan.size if study.plan else 0
+        return f"{study.name}: {study.model} by {names}, up to {size} drops"
+
+    def results(self, study: SetStudy) -> list[str]:
+        """Return the name of the file."""
+        return [surrogate_name(study)]
+
+    def identity_in(self, path: Path) -> dict[str, str]:
+        """Return the identity of results."""
+        return read_surrogate(path).identity
+
+    def remarks(self, result: Surrogate) -> list[str]:
+        """Return how close it is, and what it does not answer."""
+        return [result.sentence]
+
+    def succeeded(self, result: Surrogate) -> bool:  # noqa: ARG002
+        """Return that there is one: its training raises otherwise."""
+        return True
+
+    def draw(self, result: Surrogate) -> Figure:
+        """Return the errors of the held-out drops."""
+        from thud.plot import draw_surrogate  # noqa: PLC0415 - takes its time
+
+        return draw_surrogate(result)
+
+
+KIND = SurrogateKind()
+
+
+def surrogate(
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+) -> Surrogate:
+    """Train a surrogate: what studies may ask instead of the model.
+
+    Parameters
+    ----------
+    study
+        Path of a TOML file, or what would stand in it; each parameter has low and high.
+    output, **how
+        See `sweep`. The drops are kept; an interrupted training is continued.
+
+    Returns
+    -------
+    Surrogate
+        To be given to `sweep` and the others as `surrogate`, and saved by its `save`.
+
+    Raises
+    ------
+    InputError
+        As `sweep`; also where a drop has no result or the number of peaks differs among drops.
+    NumericalError
+        Where the error exceeds its bound with all the drops that are allowed.
+    """
+    return KIND.run(study, output, **how)

@@ -1,0 +1,403 @@
+"""Surrogates against the models they learn, against jumps, and against the exact verdict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+import thud
+from thud import cli
+from thud.studies.emulation.plan import Plan
+from thud.studies.emulation.training import regress
+from thud.studies.emulation.verdict import judge_many
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+pytest.importorskip("sklearn", reason="the extra surrogate is not installed")
+
+FIXED = {"model": "modal_ball", "damping_law": "rising", "loss_factor": 0.2}
+REGION: dict[str, Any] = {
+    "name": "region",
+    "fixed": FIXED,
+    "parameters": {
+        "height": {"low": 98, "high": 102, "unit": "cm"},
+        "youngs_modulus": {"low": 1.7, "high": 1.9, "unit": "MPa"},
+        "wall_thickness": {"low": 30, "high": 31, "unit": "mm"},
+    },
+}
+# Within the region, around a ball that conforms.
+TOLERANCES: dict[str, Any] = {
+    "name": "tolerances",
+    "fixed": {**FIXED, "youngs_modulus": 1.8e6},
+    "design": {"size": 100, "seed": 4},
+    "parameters": {
+        "height": {"low": 98.5, "high": 101.5, "unit": "cm"},
+        "wall_thickness": {"low": 30.2, "high": 30.8, "unit": "mm"},
+    },
+}
+# The contact time is given: it and the levels depend on mass and height by powers.
+LUMPED: dict[str, Any] = {
+    "name": "lumped",
+    "fixed": {"model": "hunt_crossley", "contact_time": 0.02, "restitution": 0.8},
+    "parameters": {"mass": {"low": 2.0, "high": 3.0}, "height": {"low": 0.5, "high": 2.0}},
+}
+
+
+@pytest.fixture(scope="module")
+def trained() -> thud.Surrogate:
+    """Return a surrogate of the modal ball."""
+    return thud.surrogate(REGION)
+
+
+@pytest.fixture(scope="module")
+def direct() -> thud.Uncertainty:
+    """Return what the model itself says of the tolerances."""
+    return thud.uncertainty(TOLERANCES)
+
+
+def test_held_out_drops_lie_within_the_stated_error(
+    trained: thud.Surrogate, direct: thud.Uncertainty
+) -> None:
+    answered = thud.uncertainty(TOLERANCES, surrogate=trained).dataset
+    found = np.abs(answered["floor_level"] - direct.dataset["floor_level"]).values
+    outside = (found > trained.error_of("floor_level")).sum(axis=0)
+    # 5 % of the drops may lie outside; as many as this by chance once in 1000 times.
+    assert (outside <= binom.ppf(0.999, len(found), 0.05)).all()
+    for name in ("contact_time", "restitution"):
+        ratio = 20 * np.abs(np.log10(answered[name] / direct.dataset[name])).values
+        outside = (ratio > trained.error_of(name)).sum()
+        assert outside <= binom.ppf(0.999, len(found), 0.05)
+        assert answered[name].attrs["surrogate_error"] == trained.error_of(name)
+    assert trained.worst[1] <= trained.bound == 0.1
+
+
+def test_probability_lies_in_the_range_that_is_stated(
+    trained: thud.Surrogate, direct: thud.Uncertainty
+) -> None:
+    result = thud.uncertainty(TOLERANCES, surrogate=trained)
+    assert direct.surrogate_range is None
+    assert result.surrogate_range
+    low, high = result.surrogate_range
+    assert low <= result.probability <= high
+    # Of the verdicts that are not in doubt, 5 % for each of seven quantities may err at most.
+    sure = ~result.dataset["doubtful"].values
+    wrong = (result.dataset["conforms"] != direct.dataset["conforms"]).values[sure].mean()
+    assert wrong <= 7 * 0.05
+    assert abs(result.probability - direct.probability) <= high - low + wrong
+    assert result.rows()[-1][0] == "  by errors of the surrogate"
+    assert "surrogate of" in result.dataset.attrs["surrogate"]
+
+
+def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -> None:
+    known = direct.dataset
+    values = (
+        known["floor_level"].values, known["contact_time"].values, known["restitution"].values,
+        np.array([1]), np.array([2.5]), known["height"].values,
+    )  # fmt: skip
+    none = (np.zeros((1, 5)), *[np.zeros(1)] * 5)
+    found = judge_many(values, none, "rubber_ball")
+    np.testing.assert_array_equal(found["margin"], known["margin"])
+    np.testing.assert_array_equal(found["conforms"], known["conforms"])
+    assert not found["doubtful"].any()
+    assert 0 < found["conforms"].sum() < len(known["height"])
+    # Errors of 1 cm put the verdict in doubt where the height is closer to its limits.
+    height = known["height"].values
+    by = (*none[:-1], np.full(1, 0.01))
+    close = np.minimum(np.abs(height - 0.99), np.abs(height - 1.01)) < 0.01
+    others = found["margin"] >= 0
+    np.testing.assert_array_equal(judge_many(values, by, "rubber_ball")["doubtful"], close & others)
+
+
+def test_powers_of_a_lumped_source_are_learned() -> None:
+    found = thud.sensitivity({**LUMPED, "design": {"size": 64}, "surrogate": {"error": 0.01}})
+    exact = thud.sensitivity({**LUMPED, "design": {"size": 64}})
+    assert "surrogate" not in exact.indices
+    share = found.indices["surrogate"].values[:5]
+    # What the errors explain of the variance is at most what the bound allows.
+    assert (share < (0.01 / 0.9) ** 2).all()
+    difference = np.abs(found.indices["total"] - exact.indices["total"]).isel(output=slice(0, 5))
+    assert (difference < 0.01).all()
+    assert found.table()[0][-1] == "error of the surrogate"
+
+
+def test_leave_one_out_is_what_it_says() -> None:
+    # The closed form against training without each point, with the same kernel.
+    points = np.random.default_rng(3).random((40, 2))
+    values = np.sin(5 * points[:, :1]) + points[:, 1:] ** 2
+    values += 0.05 * np.random.default_rng(4).normal(size=(40, 1))
+    whole = regress(points, values, np.array([True]))
+    from sklearn.gaussian_process.kernels import Matern, WhiteKernel  # noqa: PLC0415
+
+    # The noise follows from the weights: K w = z.
+    normal = (values - whole["mean"]) / whole["scale"]
+    shape = Matern(whole["length"], nu=2.5)(points)
+    amplitude, noise = np.linalg.lstsq(
+        np.column_stack([shape @ whole["weights"], whole["weights"]]), normal[:, 0], rcond=None
+    )[0]
+    # Weights hold the amplitude of the kernel.
+    assert amplitude == pytest.approx(1.0, rel=1e-6)
+    for i in (0, 17, 39):
+        rest = np.arange(40) != i
+        kernel = shape[np.ix_(rest, rest)] + noise * WhiteKernel(1.0)(points[rest])
+        predicted = shape[i, rest] @ np.linalg.solve(kernel, normal[rest])
+        residual = (predicted - normal[i])[0] * whole["scale"][0]
+        assert residual == pytest.approx(whole["residuals"][i, 0], rel=1e-4, abs=1e-9)
+
+
+def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from thud.studies import evaluation  # noqa: PLC0415 - to be changed
+
+    smooth = evaluation.solve_many
+
+    def jump(columns: dict[str, Any], *rest: Any, **words: Any) -> thud.Ensemble:  # noqa: ANN401
+        found = smooth(columns, *rest, **words)
+        levels = {key: v.copy() for key, v in found.levels.items()}
+        levels["floor", "octave"][:, 4] += columns["mass"] > 2.5
+        return replace(found, levels=levels)
+
+    study = {**LUMPED, "surrogate": {"size": 128}}
+    assert thud.surrogate(study).worst[1] < 0.01
+    monkeypatch.setattr(evaluation, "solve_many", jump)
+    words = (
+        r"surrogate's error of the floor level 500 Hz is 0\.\d+ dB with 64, .* with 128 drops; "
+        r"allowed: up to 0\.1 dB \(\[surrogate\] error\): narrower"
+    )
+    with pytest.raises(thud.NumericalError, match=words):
+        thud.surrogate(study)
+
+
+def test_drops_are_added_until_the_bound_holds() -> None:
+    assert Plan(size=400).stages == [
+        (0, 64), (64, 96), (96, 128), (128, 192), (192, 256), (256, 384), (384, 400)
+    ]  # fmt: skip
+    study = {**REGION, "fixed": {"model": "hollow_sphere"}}
+    first = thud.surrogate(study)
+    assert len(first.points) == 64
+    bound = 0.6 * first.worst[1]
+    found = thud.surrogate({**study, "surrogate": {"error": bound, "size": 2048}})
+    assert len(found.points) > 64
+    assert found.worst[1] <= bound
+    np.testing.assert_array_equal(found.points[:64], first.points)
+
+
+def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    from thud.studies import evaluation  # noqa: PLC0415 - to be changed
+
+    monkeypatch.setattr(evaluation, "peak_count", lambda force, _: 1 + (force.max() > 1500))
+    with pytest.raises(thud.InputError, match=r"number of peaks differs .*1 in \d+, 2 in \d+"):
+        thud.surrogate(LUMPED)
+
+
+def test_points_outside_the_region_are_refused(trained: thud.Surrogate) -> None:
+    wide = {**TOLERANCES, "parameters": {"height": {"values": [0.9, 1.0]}}}
+    study = {name: entry for name, entry in wide.items() if name != "design"}
+    study["fixed"] = {**study["fixed"], "wall_thickness": 0.0305}
+    found = thud.sweep(study, surrogate=trained)
+    assert found["status"].values.tolist() == [1, 0]
+    words = "height = 0.9 is outside the region of the surrogate; allowed: 0.98 <= height <= 1.02"
+    assert found["reason"].values.tolist() == [words, ""]
+    assert np.isnan(found["floor_level"].values[0]).all()
+    assert np.isnan(found["contact_time"].values[0])
+    assert not found["conforms"].values[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"fixed": {**FIXED, "loss_factor": 0.1}}, "loss_factor = 0.1: the surrogate was trained"),
+        ({"fixed": {"model": "hollow_sphere"}}, "trained on another model"),
+        ({"parameters": {"mass": {"low": 2.4, "high": 2.6}}}, "mass: the surrogate was not"),
+        (
+            {
+                "fixed": {"model": "modal_ball"},
+                "parameters": {"damping_law": {"values": ["rising"]}},
+            },
+            "damping_law: the surrogate was not trained on it; allowed: parameters among height",
+        ),
+    ],
+)
+def test_other_cases_are_refused(
+    trained: thud.Surrogate, change: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.uncertainty({**TOLERANCES, **change}, surrogate=trained)
+
+
+def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:
+    path = tmp_path / "ball.npz"
+    trained.save(path)
+    again = thud.read_surrogate(path)
+    assert again.digest == trained.digest
+    study = {**TOLERANCES, "surrogate": {"file": str(path)}}
+    one, other = thud.uncertainty(study), thud.uncertainty(TOLERANCES, surrogate=trained)
+    np.testing.assert_array_equal(one.levels, other.levels)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / "damaged.npz").write_bytes(content)
+    (tmp_path / "pickle.npz").write_bytes(b"")
+    np.savez(tmp_path / "pickle.npz", header=np.array([object()]), allow_pickle=True)
+    for name in ("damaged.npz", "pickle.npz", "missing.npz"):
+        with pytest.raises(thud.InputError, match=rf"{name} (cannot be read|is damaged)"):
+            thud.read_surrogate(tmp_path / name)
+    changed = replace(trained, mean=trained.mean + 0.1)
+    assert changed.digest != trained.digest
+
+
+def test_training_resumes_and_results_are_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "lumped.toml"
+    path.write_text(
+        "fixed = {model='hunt_crossley', contact_time=0.02, restitution=0.8}\n"
+        "parameters = {mass={low=2, high=3}, height={low=1, high=2}}\n"
+    )
+    command = ["surrogate", str(path), "--no-figures", "-o", str(tmp_path / "results")]
+    assert cli.main(["surrogate", str(path), "-o", str(tmp_path / "results")]) == 0
+    assert "floor level 500 Hz" in capsys.readouterr().out
+    folder = tmp_path / "results"
+    names = {entry.name for entry in folder.iterdir()}
+    assert names == {
+        "lumped_surrogate.npz", "lumped_training_64.nc", "lumped.png", "lumped.svg"
+    }  # fmt: skip
+    first = thud.read_surrogate(folder / "lumped_surrogate.npz")
+    drops = thud.read_sweep(folder / "lumped_training_64.nc")
+    assert (drops["peaks"] == 1).all()
+    # Without its result, the training takes the drops that are there.
+    before = (folder / "lumped_training_64.nc").stat().st_mtime_ns
+    (folder / "lumped_surrogate.npz").unlink()
+    assert cli.main(command) == 0
+    assert (folder / "lumped_training_64.nc").stat().st_mtime_ns == before
+    assert thud.read_surrogate(folder / "lumped_surrogate.npz").digest == first.digest
+    # Another region needs other drops, and the old ones are not removed without a word.
+    path.write_text(path.read_text().replace("high=3", "high=4"))
+    assert cli.main(command) == 1
+    assert "belongs to another version" in capsys.readouterr().err
+    assert cli.main([*command, "--replace"]) == 0
+    assert thud.read_surrogate(folder / "lumped_surrogate.npz").region.max() == 4
+
+
+def test_results_that_are_written_hold_the_errors(trained: thud.Surrogate, tmp_path: Path) -> None:
+    one = thud.uncertainty(TOLERANCES, surrogate=trained)
+    thud.uncertainty(TOLERANCES, tmp_path, surrogate=trained)
+    other = thud.read_sweep(tmp_path / "tolerances.nc")
+    np.testing.assert_array_equal(one.dataset["floor_level"], other["floor_level"])
+    np.testing.assert_array_equal(
+        other["floor_level"].attrs["surrogate_error"], trained.error_of("floor_level")
+    )
+    # The model itself has other results.
+    with pytest.raises(thud.InputError, match="belongs to another version"):
+        thud.uncertainty(TOLERANCES, tmp_path)
+
+
+def test_map_shows_verdicts_in_doubt(trained: thud.Surrogate) -> None:
+    study = {
+        "fixed": {**FIXED, "height": 1.0},
+        "parameters": {
+            "wall_thickness": {"low": 30, "high": 31, "count": 21, "unit": "mm"},
+            "youngs_modulus": {"low": 1.7, "high": 1.9, "count": 21, "unit": "MPa"},
+        },
+    }
+    found = thud.design_map(study, surrogate=trained)
+    doubtful = found.dataset["doubtful"]
+    # Verdicts are in doubt where the margin is within the error, and only near there.
+    margin = np.abs(found.dataset["margin"])
+    assert doubtful.any()
+    assert (margin.values[doubtful.values] <= trained.bound).all()
+    assert not doubtful.values[margin.values > trained.bound].any()
+    assert ("in doubt by the surrogate", f"{int(doubtful.sum())}") in found.table()
+    labels = [text.get_text() for text in thud.plot.draw_design_map(found).legends[0].get_texts()]
+    assert "In doubt by surrogate" in labels
+
+
+def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
+    figure = thud.plot.draw_surrogate(trained)
+    (axes,) = figure.axes
+    labels = [label.get_text() for label in axes.get_yticklabels()]
+    assert labels == [
+        "Contact time", "Restitution",
+        *(f"Level {band} Hz" for band in ("31.5", "63", "125", "250", "500")),
+    ]  # fmt: skip
+    shown = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) == 64]
+    np.testing.assert_array_equal(shown[-1], trained.residuals[:, trained.judged][:, -1])
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ({"error": 0}, r"\[surrogate\] error = 0 is not allowed; allowed: numbers above 0"),
+        ({"error": "x"}, r"\[surrogate\] error = 'x' is not allowed; allowed: finite numbers"),
+        ({"size": 10}, r"\[surrogate\] size = 10 is not allowed; .*from 64"),
+        ({"drops": 100}, r"\[surrogate\]: 'drops' is not known"),
+        ({"file": "none.npz"}, r"none\.npz cannot be read: No such file"),
+        ({"file": "none.npz", "size": 64}, r"\[surrogate\] with file: 'size' is not known"),
+    ],
+)
+def test_tables_are_checked(table: dict[str, Any], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.sweep({**LUMPED, "design": {"kind": "sobol", "size": 4}, "surrogate": table})
+
+
+def test_only_real_parameters_are_learned() -> None:
+    study = {**REGION, "design": {"kind": "random", "size": 8}, "surrogate": {}}
+    rate = {"sample_rate": {"values": [20000.0, 44100.0]}}
+    laws = {"damping_law": {"values": ["rising", "constant"]}}
+    for name, parameters in (("sample_rate", rate), ("damping_law", laws)):
+        with pytest.raises(thud.InputError, match=rf"cannot learn {name}; allowed: parameters of"):
+            thud.sweep({**study, "fixed": {"model": "modal_ball"}, "parameters": parameters})
+    with pytest.raises(thud.InputError, match="height is not a range of a surrogate; allowed: low"):
+        thud.surrogate({**REGION, "parameters": {"height": {"std": 0.1}}})
+
+
+def test_drops_without_result_are_refused() -> None:
+    study = {**LUMPED, "parameters": {**LUMPED["parameters"], "mass": {"low": -1, "high": 3}}}
+    with pytest.raises(thud.InputError, match=r"\d+ of 64 drops .*have no result \(.*mass.*\)"):
+        thud.surrogate(study)
+
+
+def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
+    truth = {"youngs_modulus": 1.77e6, "wall_thickness": 0.0304}
+    case = replace(
+        trained.case, ball=replace(trained.case.ball, **truth), drop=thud.Drop(height=1.0)
+    )
+    impact = thud.solve_case(case)
+    target = thud.LevelTarget(
+        impact.levels().tolist(), 0.05, contact_time=(impact.exact_contact_time, 2e-5)
+    )
+    starts = {"youngs_modulus": 1.85e6, "wall_thickness": 0.0307}
+    with pytest.warns(thud.FitWarning, match="errors of the surrogate are up to"):
+        found = thud.fit(target, starts, replace(case, ball=thud.Ball()), surrogate=trained)
+    assert found.converged
+    for name, value in truth.items():
+        # The target is exact: only the surrogate errs, whose share of the variances is small.
+        assert abs(found.values[name] - value) < found.standard_errors[name]
+    # The impact is that of the model.
+    np.testing.assert_array_equal(found.impact.floor_force, thud.solve_case(found.case).floor_force)
+    # Errors of the surrogate add to the uncertainties.
+    variance = 0.05**2 + trained.mean_square("floor_level")
+    np.testing.assert_allclose(found.misfit.deviation[:5] ** 2, variance)
+
+
+def test_fits_refuse_what_a_surrogate_does_not_know(trained: thud.Surrogate) -> None:
+    case = trained.case
+    levels = thud.LevelTarget([39, 31, 23, 17, 12.5], 0.5)
+    with pytest.raises(thud.InputError, match="surrogate is not allowed for a force"):
+        thud.fit(thud.solve_case(case), {"height": 1.0}, case, surrogate=trained)
+    with pytest.raises(thud.InputError, match="mass: the surrogate was not trained on it"):
+        thud.fit(levels, {"mass": 2.5}, case, surrogate=trained)
+    with pytest.raises(thud.InputError, match=r"height: start = 0\.9 is outside the region"):
+        thud.fit(levels, {"height": 0.9}, case, surrogate=trained)
+    with pytest.raises(thud.InputError, match="has no file; allowed: file"):
+        thud.read_study(
+            {
+                "fixed": FIXED,
+                "target": {"levels": [39, 31, 23, 17, 12.5]},
+                "parameters": {"height": {}},
+                "surrogate": {},
+            },
+            "fit",
+        )
