@@ -82,12 +82,11 @@ def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
 
 
 def test_slow_impact_loses_what_the_modal_ball_of_the_same_law_loses() -> None:
-    # As above. The modal ball steps each mode exactly, by other equations. Nodes of the coarse mesh
-    # take energy when they are stopped, the same for every law: restitution 0.014 lower.
+    # As above. The modal ball steps each mode exactly, by other equations. Large strain, the coarse
+    # mesh and nodes that are stopped leave 0.002 of a restitution that the laws change by 0.08.
     gravity = 1e-3
     drop = thud.Drop(0.2**2 / (2 * gravity), gravity)
     ball = thud.Ball(poisson_ratio=0.495)
-    low = []
     for order in (0.15, 0.3, 1.0):
         law = {"fractional_order": order, "loss_factor": 0.13}
         linear = thud.solve(
@@ -98,10 +97,7 @@ def test_slow_impact_loses_what_the_modal_ball_of_the_same_law_loses() -> None:
             radial_elements=4, polar_elements=32, duration=0.06, **law,
         )  # fmt: skip
         assert finite.contact_time == pytest.approx(linear.contact_time, rel=0.025)
-        low.append(linear.restitution - finite.restitution)
-    # The laws themselves differ by 0.08.
-    assert np.ptp(low) < 0.002
-    assert max(low) < 0.016
+        assert finite.restitution == pytest.approx(linear.restitution, abs=0.004)
 
 
 def test_undamped_ball_is_that_of_calculix() -> None:
