@@ -32,6 +32,9 @@ module thud_finite_element
    !> Residual of the energy at which a run is stopped as unstable.
    real(wp), parameter :: unstable_residual = 0.05_wp
 
+   !> Part of the wall that the surface may sink into the layer on the floor: the layer is thin.
+   real(wp), parameter :: max_sink = 0.1_wp
+
    !> Maximum number of steps of elements in a run; they take about half an hour.
    real(wp), parameter :: max_work = 2.0e10_wp
 
@@ -347,6 +350,10 @@ contains
       else if (run%state%failure /= no_failure) then
          error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
             //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
+      else if (run%sink > max_sink*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
+         error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
+            //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%sink)//' mm into the layer; allowed: up to ' &
+            //to_text(max_sink)//' of the wall, by a higher layer_stiffness')
       else
          residual = abs(get_energy(run) - first_energy)/(sum(run%mass(:, :, 2))/2*history%impact_velocity**2)
          if (.not. residual < unstable_residual) then

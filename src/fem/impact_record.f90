@@ -21,9 +21,6 @@ module thud_impact_record
    !> Maximum error of the impulse of the record, over the change of momentum.
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
-   !> Part of the wall that the surface may sink into the layer on the floor: the layer is thin.
-   real(wp), parameter :: max_sink = 0.1_wp
-
    !> Columns of the channels.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
 
@@ -133,9 +130,6 @@ contains
          error = numerical_error('&finite_element: the balance of energy misses by ' &
             //to_text(history%energy_residual)//' of the energy at first touch; allowed: up to ' &
             //to_text(max_energy_residual)//', a smaller step_safety helps')
-      else if (run%sink > max_sink*ball%wall_thickness) then
-         error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink) &
-            //' mm into the layer; allowed: up to '//to_text(max_sink)//' of the wall, a higher layer_stiffness helps')
       end if
    end subroutine finish_record
 

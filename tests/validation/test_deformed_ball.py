@@ -101,11 +101,11 @@ def test_slow_impact_loses_what_the_modal_ball_of_the_same_law_loses() -> None:
 
 
 def test_undamped_ball_is_that_of_calculix() -> None:
-    # CalculiX 2.20, 5 x 64 quadratic elements, increment 0.05 ms, penalty 4e9 Pa/m, without gas and
-    # gravity (tests/bench/competitor_impact.py): 22.20 ms, e 0.9805 and these levels. At 250 and
+    # CalculiX 2.20, 6 x 80 quadratic elements, increment 0.05 ms, penalty 4e9 Pa/m, without gas and
+    # gravity (tests/bench/competitor_impact.py): 22.25 ms, e 0.9805 and these levels. At 250 and
     # 500 Hz 12 x 96 linear elements are 0.4 and 0.5 dB below their limit, and increments of 0.02 ms
     # raise CalculiX by 0.1 dB.
-    reference = np.array([37.79, 26.38, 21.25, 20.72, 13.00])
+    reference = np.array([37.79, 26.38, 21.24, 20.67, 12.92])
     gravity = 1e-3
     drop = thud.Drop(9.81 / gravity, gravity)
     ball = thud.Ball(poisson_ratio=0.49, ambient_pressure=0)
@@ -114,6 +114,6 @@ def test_undamped_ball_is_that_of_calculix() -> None:
         radial_elements=12, polar_elements=96, layer_stiffness=4e9,
     )  # fmt: skip
     # Release is a glancing contact.
-    assert impact.contact_time == pytest.approx(22.2e-3, rel=0.01)
+    assert impact.contact_time == pytest.approx(22.25e-3, rel=0.01)
     assert impact.restitution == pytest.approx(0.9805, abs=0.002)
-    assert (abs(impact.levels() - reference) <= [0.1, 0.1, 0.1, 0.5, 0.65]).all()
+    assert (abs(impact.levels() - reference) <= [0.1, 0.1, 0.1, 0.5, 0.6]).all()
