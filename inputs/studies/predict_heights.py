@@ -46,7 +46,9 @@ def main() -> None:
         for folder in map(Path, sys.argv[1:]):
             found = json.loads((folder / "fit.json").read_text(encoding="utf-8"))
             case = thud.read_case(folder / "fitted.nml")
-            names = [name for name in found["parameters"] if name != "time_shift"]
+            names = [
+                name for name in found["parameters"] if not name.startswith(("time_shift", "gain"))
+            ]
             values = np.array([found["parameters"][name]["value"] for name in names])
             covariance = np.array(found["covariance"], dtype=float)[: len(names), : len(names)]
             slopes = np.column_stack(
