@@ -55,16 +55,27 @@ def solve(
 STANDARD_BALL = '''
     @classmethod
     def standard(cls) -> Self:
-        """Return the ball that conforms to the standards by finite elements.
+        """Return the standard rubber ball for finite elements.
 
         With its modulus, 2.08 MPa, the first free modes are those that the paper computed by finite
-        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. The call that conforms
-        is ``thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt",
-        loss_factor=0.2, loss_frequency=74.0)``; the shell model has another modulus, the default.
+        elements, 74, 118 and 168 Hz: it is inferred from them, not measured. By
+        ``thud.solve(thud.Ball.standard(), model="finite_element")`` it conforms to the standards up
+        to 250 Hz; the octave of 500 Hz depends on the law of the loss (docs/finite_elements.md).
+        The shell model has another modulus, the default.
         """
         return cls(youngs_modulus=2.08e6)
 '''
 EXTRAS = {"ball": STANDARD_BALL}
+# Groups that a case may ask for.
+OPTIONAL = {
+    "modes": "Free modes that are asked for.",
+    "compression": "Slow compression that is asked for.",
+    "floor": "Floor over the room below: a homogeneous plate.",
+    "room": "Room below the floor.",
+}
+# What uses the keys of such an owner.
+USERS = {"modes": "free modes", "compression": "a slow compression"}
+USERS["floor"] = USERS["room"] = "the level in the room below"
 INDENT = " " * 8
 LONGEST = 100
 PAGE = """# Keys of an input file
@@ -151,7 +162,9 @@ def python_module(schema: Entry) -> str:
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
     names = list(map(class_name, models))
-    public = sorted([*map(class_name, [*groups, "modes"]), *names, "ModelName", "ModelOptions"])
+    optional = list(dict.fromkeys(key["owner"] for key in keys if key["owner"]))
+    optional = [owner for owner in optional if owner not in models]
+    public = sorted([*map(class_name, [*groups, *optional]), *names, "ModelName", "ModelOptions"])
     choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
     choices.append(literal("BandSet", schema["band_sets"]))
     quoted_names = "".join(f"    {quoted(name)},\n" for name in public)
@@ -159,8 +172,9 @@ def python_module(schema: Entry) -> str:
     for group in groups:
         members = [key for key in shared if key["group"] == group]
         parts.append(python_class(f"Group ``&{group}``.", members, group))
-    members = [key for key in keys if key["owner"] == "modes"]
-    parts.append(python_class("Free modes that are asked for.", members, "modes"))
+    for owner in optional:
+        members = [key for key in keys if key["owner"] == owner]
+        parts.append(python_class(OPTIONAL[owner], members, owner))
     for model in models:
         members = [key for key in keys if key["owner"] == model]
         title = f"Options of the source model ``{model}``."
@@ -187,7 +201,7 @@ def python_calls(schema: Entry) -> str:
     """Return the text of ``_solve.pyi``."""
     keys, models = schema["keys"], schema["models"]
     owned = {model: [key for key in keys if key["owner"] == model] for model in models}
-    choices = {choice_name(key) for key in keys if key["owner"] and key["choices"]}
+    choices = {choice_name(key) for key in keys if key["owner"] in models and key["choices"]}
     names = sorted({"Ball", "Drop", "ModelName", "ModelOptions", *choices})
     parts = [SOLVE.format(names="".join(f"    {name},\n" for name in names))]
     shared = [key for key in keys if key["group"] == "sampling"]
@@ -241,7 +255,7 @@ def page(schema: Entry) -> str:
         if key["group"] != group:
             group = key["group"]
             owners = sorted({k["owner"] for k in schema["keys"] if k["group"] == group} - {""})
-            users = [("free modes" if owner == "modes" else f"`{owner}`") for owner in owners]
+            users = [USERS.get(owner, f"`{owner}`") for owner in owners]
             used = f"Used by {' and '.join(users)}.\n\n" if users else ""
             text += f"\n## `&{group}`\n\n{used}"
             text += "| key | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"

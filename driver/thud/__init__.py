@@ -16,6 +16,7 @@ from thud._schema import *  # noqa: F403 - the groups and models that the librar
 from thud._schema import __all__ as _groups
 from thud.case import Case, read_case, write_case
 from thud.checks import suggestion
+from thud.compression import CompressionCurve, compress
 from thud.criteria import Conformity, Criterion
 from thud.display import MAKERS
 from thud.ensemble import solve_many
@@ -39,8 +40,17 @@ if TYPE_CHECKING:
     from thud.comparison import Comparison as Comparison
     from thud.comparison import compare as compare
     from thud.comparison import read_all as read_all
+    from thud.compression_fit import CompressionFit as CompressionFit
+    from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.prediction import RoomPrediction as RoomPrediction
+    from thud.floors.prediction import predict_level as predict_level
+    from thud.floors.rating import Rating as Rating
+    from thud.floors.rating import rating as rating
+    from thud.floors.rating import standardised_level as standardised_level
+    from thud.floors.survey import RoomLevels as RoomLevels
+    from thud.floors.survey import read_room_levels as read_room_levels
+    from thud.recordings.read_recording import read_recording as read_recording
     from thud.recordings.recording import Recording as Recording
-    from thud.recordings.recording import read_recording as read_recording
     from thud.studies.blocks import read_sweep as read_sweep
     from thud.studies.design_map import DesignMap as DesignMap
     from thud.studies.design_map import design_map as design_map
@@ -71,10 +81,19 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "CompressionFit": "compression_fit",
+    "fit_compression": "compression_fit",
     "read_all": "comparison",
+    "Rating": "floors.rating",
     "Recording": "recordings.recording",
+    "RoomLevels": "floors.survey",
+    "RoomPrediction": "floors.prediction",
+    "predict_level": "floors.prediction",
     "quantity": "units",
-    "read_recording": "recordings.recording",
+    "rating": "floors.rating",
+    "read_recording": "recordings.read_recording",
+    "read_room_levels": "floors.survey",
+    "standardised_level": "floors.rating",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
@@ -82,6 +101,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     *kinds.PUBLIC,
     "Bands",
     "Case",
+    "CompressionCurve",
     "Conformity",
     "Criterion",
     "Ensemble",
@@ -93,6 +113,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "NumericalError",
     "PlausibilityWarning",
     "ThudError",
+    "compress",
     "force_exposure_levels",
     "free_modes",
     "get_bands",
@@ -137,8 +158,12 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
+    compression=_maker("plot.compression", "compression"),
+    compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    prediction=_maker("plot.prediction", "draw_prediction"),
+    room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),
 )

@@ -10,10 +10,10 @@ from thud._schema import (
     Ball,
     Drop,
     FiniteElementLaw,
-    FiniteElementTreatment,
     FiniteElementViscosity,
     HollowSphereMomentumFlux,
     ModalBallDampingLaw,
+    ModalBallFloorFriction,
     ModelName,
     ModelOptions,
 )
@@ -35,7 +35,10 @@ class ModalBallOptions(SamplingOptions, total=False):
     damping_law: ModalBallDampingLaw
     loss_factor: float
     loss_frequency: float
+    fractional_order: float
     cavity_gas: bool
+    contact_gravity: bool
+    floor_friction: ModalBallFloorFriction
     static_families: Sequence[int]
 
 class FiniteElementOptions(SamplingOptions, total=False):
@@ -51,10 +54,11 @@ class FiniteElementOptions(SamplingOptions, total=False):
     viscosity: FiniteElementViscosity
     loss_factor: float
     loss_frequency: float
+    fractional_order: float
     prony_share: Sequence[float]
     prony_time: Sequence[float]
-    treatment: FiniteElementTreatment
-    penalty_ratio: float
+    friction: float
+    layer_stiffness: float
     snapshot_interval: float
 
 class MeasuredModesOptions(SamplingOptions, total=False):
@@ -69,6 +73,16 @@ class HuntCrossleyOptions(SamplingOptions, total=False):
     exponent: float
     damping: float
     restitution: float
+
+class TwoMassOptions(SamplingOptions, total=False):
+    belt_mass: float
+    inflation_pressure: float
+    area_growth: float
+    carcass_stiffness: float
+    carcass_exponent: float
+    contact_damping: float
+    belt_frequency: float
+    belt_damping: float
 
 @overload
 def solve(
@@ -132,6 +146,20 @@ def solve(
     **options: Unpack[HuntCrossleyOptions],
 ) -> Impact:
     """Drop a ball on a rigid floor by the model ``hunt_crossley``."""
+
+@overload
+def solve(
+    ball: Ball | None, drop: Drop | None, model: Literal["two_mass"],
+    **options: Unpack[TwoMassOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``two_mass``."""
+
+@overload
+def solve(
+    ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["two_mass"],
+    **options: Unpack[TwoMassOptions],
+) -> Impact:
+    """Drop a ball on a rigid floor by the model ``two_mass``."""
 
 @overload
 def solve(

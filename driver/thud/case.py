@@ -15,12 +15,15 @@ from thud._schema import (
     KEYS,
     MODELS,
     Ball,
+    Compression,
     Drop,
+    Floor,
     HollowSphere,
     Levels,
     Limits,
     ModelOptions,
     Modes,
+    Room,
     Sampling,
 )
 from thud.checks import LARGEST, refuse, require_choice, require_kind, shown
@@ -38,6 +41,9 @@ if TYPE_CHECKING:
 Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
+# Groups that an impact may have, and all that a case may ask for.
+FURTHER: dict[str, type[Group]] = {"compression": Compression, "floor": Floor, "room": Room}
+OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **FURTHER}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
 
@@ -68,10 +74,14 @@ class Case(Group, Displayed):
     ----------
     name : str
         Name of the case, also of its output directory.
-    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley or None
+    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
+    floor, room : Floor and Room, or None
+        Floor and room below; None: no level in a room.
+    compression : Compression or None
+        Options of the slow compression by the source model; None: no compression.
     ball, drop, sampling, levels, limits
         The other namelist groups.
     """
@@ -84,12 +94,17 @@ class Case(Group, Displayed):
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
     modes: Modes | None = None
+    floor: Floor | None = None
+    room: Room | None = None
+    compression: Compression | None = None
 
     def __repr__(self) -> str:
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
-        return f"<Case {self.name}: {', '.join(filter(None, (model, modes)))}>"
+        room = "room below" if self.room else ""
+        press = "slow compression" if self.compression else ""
+        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, room, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -113,7 +128,8 @@ class Case(Group, Displayed):
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
-        require_kind("modes", self.modes, Modes | None)
+        for group, optional in OPTIONAL.items():
+            require_kind(group, getattr(self, group), optional | None)
         groups: dict[str, dict[str, object]] = {
             "case": {"name": self.name},
             "ball": vars(self.ball),
@@ -134,6 +150,7 @@ class Case(Group, Displayed):
                     )
                     raise InputError(message)
                 values[option.name] = value
+        groups |= {group: vars(given) for group in FURTHER if (given := getattr(self, group))}
         namelist = f90nml.Namelist()
         for group, options in groups.items():
             plain = {key: _plain(group, key, value) for key, value in options.items()}
@@ -162,13 +179,23 @@ class Case(Group, Displayed):
             for option in fields(MODELS[name]):
                 given = content.get(group_of(name, option), {})
                 if option.name in given:
-                    entries = given[option.name]
-                    if option.name in LISTS:
-                        entries = tuple(entries) if isinstance(entries, list) else (entries,)
-                    options[option.name] = entries
-            model = MODELS[name](**options)
+                    options[option.name] = given[option.name]
+            model = MODELS[name](**_with_lists(options))
+        further: dict[str, Any] = {
+            group: kind(**_with_lists(content[group]))
+            for group, kind in FURTHER.items()
+            if group in content
+        }
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, **groups)
+        return cls(name=title, model=model, modes=modes, **groups, **further)
+
+
+def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of keys as `f90nml` reads them, lists of one entry as lists."""
+    return {
+        key: (tuple(value) if isinstance(value, list) else (value,)) if key in LISTS else value
+        for key, value in values.items()
+    }
 
 
 def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:

@@ -25,7 +25,8 @@ from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 from thud.plot.levels import common_source
 from thud.plot.look import save_all
-from thud.recordings.recording import Recording, read_recording
+from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

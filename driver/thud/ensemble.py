@@ -26,6 +26,10 @@ from thud.keys import find_key
 from thud.levels import BANDWIDTHS, get_bands
 from thud.outcomes import Ensemble
 
+# Not empty in a forked process.
+_FORKED: list[bool] = []
+os.register_at_fork(after_in_child=lambda: _FORKED.append(True))
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -74,7 +78,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     model
         Source model; with its default options unless it is that of the case.
     threads
-        Threads to use; all processors by default.
+        Threads to use; all processors by default. A forked process has one: the threads that its
+        parent had started are not there.
     levels
         Compute levels and verdicts too; without them it is faster.
     bands
@@ -113,6 +118,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     base = replace(
         base,
         modes=None,
+        compression=None,
         sampling=Sampling(
             sampling.sample_rate if sample_rate is None else sample_rate,
             sampling.duration if duration is None else duration,
@@ -141,6 +147,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     sizes = _sizes(content, columns)
     width = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
     require_whole("threads", width, 1, MAX_THREADS)
+    width = 1 if _FORKED else width
     work = int(np.clip(_CALL_TIME * width / sizes["cost"], 1, _MAX_CALL))
     parts = []
     try:

@@ -20,6 +20,7 @@ from thud.studies.parameter import Parameter
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.compression import CompressionCurve
     from thud.outcomes import Ensemble
 
 # Name and unit of a history.
@@ -55,6 +56,11 @@ def _of_impact(impact: Impact) -> xr.Dataset:
 def table(impact: Impact) -> pd.DataFrame:
     """Return the table of an impact, see `Impact.to_dataframe`."""
     return pd.DataFrame(_columns(impact), index=pd.Index(impact.time, name="time_s"))
+
+
+def compression_table(curve: CompressionCurve) -> pd.DataFrame:
+    """Return the table of a compression, see `CompressionCurve.to_dataframe`."""
+    return pd.DataFrame({"deflection_m": curve.deflection, "force_N": curve.force})
 
 
 def _columns(impact: Impact) -> dict[str, NDArray[np.float64]]:

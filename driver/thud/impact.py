@@ -254,8 +254,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         By default the rubber ball of the paper, from 1 m.
     model
         ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
-        one), ``"finite_element"``, ``"measured_modes"`` or ``"hunt_crossley"``; or an object of
-        the classes below, which holds the options.
+        one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``;
+        or an object of the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.
     duration
@@ -263,8 +263,8 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     **options
-        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`
-        and `HuntCrossley`; such as ``momentum_flux="retarding"``.
+        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
+        `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
 
     Returns
     -------
@@ -309,8 +309,9 @@ def compute(case: Case) -> Impact:
     if case.model is None:
         message = "&model is missing; allowed: a case with a source model"
         raise InputError(message)
-    # Free modes of the case have their own function.
-    return new_impact(case, call(api.solve, case_text(replace(case, modes=None))))
+    # Free modes and compression of the case have their own functions.
+    plain = replace(case, modes=None, compression=None)
+    return new_impact(case, call(api.solve, case_text(plain)))
 
 
 def new_impact(case: Case, found: Bundle) -> Impact:

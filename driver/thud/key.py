@@ -26,7 +26,8 @@ class Key:
     Attributes
     ----------
     owner : str
-        The source model, or ``"modes"``, that uses it; empty for keys of every impact.
+        What uses it: a source model, ``"modes"``, ``"compression"``, ``"floor"`` or ``"room"``;
+        empty for keys of every impact.
     group, name : str
         Namelist group and name.
     kind : str

@@ -30,6 +30,8 @@ class Motion:
         Velocities of the nodes, m/s.
     contact_pressure : ndarray, shape (n_snapshot, n_line)
         Pressure on the floor at the nodes of the outer surface, Pa.
+    contact_shear : ndarray, shape (n_snapshot, n_line)
+        Radial stress of the floor on the same nodes, positive outwards, Pa.
     cavity_pressure : ndarray, shape (n_snapshot,)
         Overpressure of the gas in the ball, Pa.
     """
@@ -39,6 +41,7 @@ class Motion:
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
     contact_pressure: NDArray[np.float64]
+    contact_shear: NDArray[np.float64]
     cavity_pressure: NDArray[np.float64]
 
     def __repr__(self) -> str:

@@ -95,12 +95,17 @@ def _read_motion(folder: Path) -> Motion:
         name: np.stack([shot[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for shot in shots])
         for name in ("Points", "displacement", "velocity")
     }
+    outer = {
+        name: np.stack([shot[name].reshape(size)[-1] for shot in shots])
+        for name in ("contact_pressure", "contact_shear")
+    }
     return Motion(
         np.array([float(time) for time, _ in entries]),
         plane["Points"][0] - plane["displacement"][0],
         plane["Points"],
         plane["velocity"],
-        np.stack([shot["contact_pressure"].reshape(size)[-1] for shot in shots]),
+        outer["contact_pressure"],
+        outer["contact_shear"],
         np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
     )
 

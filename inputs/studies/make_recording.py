@@ -2,8 +2,8 @@
 
 .venv/bin/python inputs/studies/make_recording.py
 
-writes fit_recording.wav: the force of the ball of inputs/rubber_ball_fe.nml with the faults of a
-force plate; the noise comes from NumPy's default generator with the seed below.
+writes fit_recording.wav: the force of the ball of inputs/rubber_ball_fe_viscous.nml with the faults
+of a force plate; the noise comes from NumPy's default generator with the seed below.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ LENGTH, TOUCH = 0.25, 0.11  # s
 NOISE = 5.0  # N
 OFFSET, DRIFT = 12.0, -8.0  # N, N/s
 HUM, MAINS = 2.0, 50.0  # N, Hz
-TRUTH = Path(__file__).parents[1] / "rubber_ball_fe.nml"
+TRUTH = Path(__file__).parents[1] / "rubber_ball_fe_viscous.nml"
 
 
 def main() -> None:

@@ -21,7 +21,7 @@ from thud.impact import compute
 HEIGHTS = (0.1, 1.0, 1.6)  # m
 # Relative step of the derivatives: it averages over the release of single nodes of the mesh.
 STEP = 5e-3
-TRUTH = Path(__file__).parents[1] / "rubber_ball_fe.nml"
+TRUTH = Path(__file__).parents[1] / "rubber_ball_fe_viscous.nml"
 
 
 def levels(case: thud.Case, height: float, factors: dict[str, float] | None = None) -> np.ndarray:

@@ -5,23 +5,28 @@
 !> it over and frees it. `status` is 0, or the code of the error whose sentence is the text `message` of the bundle.
 !> Procedures marked `threadsafe` let other Python threads run meanwhile.
 module thud_api
+   use thud_band, only: band_type
    use thud_bundle, only: bundle_type, leave, take
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, results_type
+   use thud_compression, only: compression_type
+   use thud_compute, only: compress_case, compute_case, results_type
    use thud_constants, only: compiler, version
    use thud_error, only: error_type
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: int64, int8, wp
+   use thud_plate, only: get_resistance
    use thud_progress_line, only: begin_progress, end_progress
+   use thud_room, only: get_room_bands, get_room_level, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
    use thud_system, only: begin_call, end_call, end_all_calls => end_calls
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: check_text, collect, describe_library, effective_case, end_calls, free_modes, loss_factors, run, solve
+   public :: check_text, collect, compress, describe_library, effective_case, end_calls, free_modes, loss_factors
+   public :: predict_room, run, solve
 
 contains
 
@@ -133,6 +138,7 @@ contains
 
       if (case%has_impact) call add_history(bundle, results%history)
       if (case%has_modes) call add_modes(bundle, results%modes)
+      if (case%has_compression) call add_compression(bundle, results%compression)
       do i = 1, size(results%remark)
          call bundle%add_text('remarks.'//to_text(i), trim(results%remark(i)))
       end do
@@ -173,6 +179,7 @@ contains
          call bundle%add_array('motion.position', [shape(motion%start), n_frame], motion%position)
          call bundle%add_array('motion.velocity', [shape(motion%start), n_frame], motion%velocity)
          call bundle%add_array('motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
+         call bundle%add_array('motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
          call bundle%add_array('motion.cavity_pressure', [n_frame], motion%cavity_pressure)
       end associate
    end subroutine add_history
@@ -213,6 +220,37 @@ contains
       call bundle%add_array('modes.z', shape(modes%mesh%z), modes%mesh%z)
       call bundle%add_array('modes.shape', shape(modes%shape), modes%shape)
    end subroutine add_modes
+
+   !> Slow compression of the ball of a case.
+   subroutine compress(text, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !> Text of a namelist file with the group `&compression`.
+      character(len=*), intent(in) :: text
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(compression_type) :: compression
+      type(error_type), allocatable :: error
+
+      allocate (bundle)
+      call begin_call()
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call compress_case(case, compression, error)
+      if (.not. allocated(error)) call add_compression(bundle, compression)
+      call end_call()
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine compress
+
+   !> Adds a slow compression to a bundle.
+   subroutine add_compression(bundle, compression)
+      type(bundle_type), intent(inout) :: bundle
+      type(compression_type), intent(in) :: compression
+
+      call bundle%add_array('compression.deflection', shape(compression%deflection), compression%deflection)
+      call bundle%add_array('compression.force', shape(compression%force), compression%force)
+   end subroutine add_compression
 
    !> Loss factor of the material of a case against frequency.
    subroutine loss_factors(text, frequency, n, status, handle, n_byte, n_value)
@@ -280,5 +318,44 @@ contains
       call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine run
+
+   !> Level that a force causes in the room below.
+   subroutine predict_room(text, level, n_band, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(level) :: n_band = len(level)
+      !> Text of a namelist file with floor and room.
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: n_band
+      !> Force exposure levels of the thirds that a rating is made of, see `get_rated`, dB: [n_band].
+      real(wp), intent(in) :: level(n_band)
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(room_level_type) :: prediction
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
+      integer :: n(1)
+
+      allocate (bundle)
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call get_room_bands(bands, error)
+      if (.not. allocated(error)) then
+         call get_room_level(case%floor, case%room, bands, level, prediction)
+         n = n_band
+         call bundle%add_number('resistance', get_resistance(case%floor))
+         call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
+         call bundle%add_array('bands.energy', n, prediction%energy)
+         call bundle%add_array('bands.radiation_factor', n, prediction%radiation_factor)
+         call bundle%add_array('bands.loss_factor', n, prediction%loss_factor)
+         call bundle%add_array('bands.reverberation_time', n, prediction%reverberation_time)
+         call bundle%add_array('bands.floor_modes', n, prediction%floor_modes)
+         call bundle%add_array('bands.room_modes', n, prediction%room_modes)
+         call bundle%add_array('bands.level', n, prediction%level)
+         call bundle%add_array('bands.time', n, prediction%time)
+      end if
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine predict_room
 
 end module thud_api

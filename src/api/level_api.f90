@@ -1,10 +1,12 @@
 !> The flat API for Python to levels and verdicts; see `thud_api`.
 module thud_level_api
-   use thud_band, only: band_set_names, band_type, find_bands, get_set_bands => get_bands
+   use thud_band, only: band_set_names, band_type, find_bands, get_set_bands => get_bands, octave_set
    use thud_constants, only: recorded_band
    use thud_error, only: error_type, get_status
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
+   use thud_rating, only: correct_for_background, find_rated_bands, get_a_weighted_level, get_grade, get_legacy_rating, &
+      get_rounded, get_standardisation
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type, source_names
    use thud_system, only: begin_call, end_call
@@ -12,7 +14,8 @@ module thud_level_api
    implicit none (type, external)
    private
 
-   public :: count_bands, count_names, count_peaks, force_exposure, get_bands, get_names, judge, record_force
+   public :: count_bands, count_names, count_peaks, count_rated, force_exposure, get_bands, get_names, get_rated, judge
+   public :: rate, record_force, remove_background, standardise
 
 contains
 
@@ -173,5 +176,99 @@ contains
       met = merge(1, 0, conforms(criteria))
       call get_status(error, status, message)
    end subroutine judge
+
+   !> Number of bands that a rating is made of.
+   subroutine count_rated(set, n_band, status, message)
+      !f2py threadsafe
+      character(len=*), intent(in) :: set
+      integer, intent(out) :: n_band
+      !> Code of the error, or 0, and its sentence.
+      integer, intent(out) :: status
+      character(len=1024), intent(out) :: message
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
+
+      call find_rated_bands(set, bands, error)
+      n_band = size(bands)
+      call get_status(error, status, message)
+   end subroutine count_rated
+
+   !> Bands that a rating is made of.
+   subroutine get_rated(set, n_band, nominal)
+      !f2py threadsafe
+      character(len=*), intent(in) :: set
+      !> Number of bands, from `count_rated`.
+      integer, intent(in) :: n_band
+      !> Rounded mid frequencies, Hz: [n_band].
+      real(wp), intent(out) :: nominal(n_band)
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
+
+      call find_rated_bands(set, bands, error)
+      nominal = bands%nominal
+   end subroutine get_rated
+
+   !> Levels standardised to the reference room.
+   subroutine standardise(level, n_band, reverberation_time, volume, standardised)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(level) :: n_band = len(level)
+      integer, intent(in) :: n_band
+      !> Levels, dB, and reverberation times, s: [n_band].
+      real(wp), intent(in) :: level(n_band), reverberation_time(n_band)
+      !> Volume of the room, m3.
+      real(wp), intent(in) :: volume
+      !> The standardised levels, dB: [n_band].
+      real(wp), intent(out) :: standardised(n_band)
+
+      standardised = level + get_standardisation(reverberation_time, volume)
+   end subroutine standardise
+
+   !> Levels without the background.
+   subroutine remove_background(level, n_band, background, corrected, is_maximum)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(level) :: n_band = len(level)
+      integer, intent(in) :: n_band
+      !> Levels with and of the background, dB: [n_band].
+      real(wp), intent(in) :: level(n_band), background(n_band)
+      !> Levels without it, dB: [n_band].
+      real(wp), intent(out) :: corrected(n_band)
+      !> 1 where the true level is at most that, else 0: [n_band].
+      integer, intent(out) :: is_maximum(n_band)
+      logical :: less(n_band)
+
+      call correct_for_background(level, background, corrected, less)
+      is_maximum = merge(1, 0, less)
+   end subroutine remove_background
+
+   !> Single numbers of the levels in a room.
+   subroutine rate(set, level, n_band, a_weighted, rounded, grade, legacy, status, message)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(level) :: n_band = len(level)
+      character(len=*), intent(in) :: set
+      integer, intent(in) :: n_band
+      !> Levels of the rated bands, dB: [n_band].
+      real(wp), intent(in) :: level(n_band)
+      !> A-weighted maximum level, dB.
+      real(wp), intent(out) :: a_weighted
+      !> The same as it is stated, dB; its class, 0 for none; rating by the reference curve, dB, of octaves only.
+      integer, intent(out) :: rounded, grade, legacy
+      !> Code of the error, or 0, and its sentence.
+      integer, intent(out) :: status
+      character(len=1024), intent(out) :: message
+      type(band_type), allocatable :: bands(:)
+      type(error_type), allocatable :: error
+
+      a_weighted = 0.0_wp
+      rounded = 0
+      grade = 0
+      legacy = 0
+      call find_rated_bands(set, bands, error)
+      call get_status(error, status, message)
+      if (status /= 0) return
+      a_weighted = get_a_weighted_level(set, level)
+      rounded = get_rounded(a_weighted)
+      grade = get_grade(a_weighted)
+      if (set == octave_set) legacy = get_legacy_rating(level)
+   end subroutine rate
 
 end module thud_level_api

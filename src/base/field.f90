@@ -5,7 +5,7 @@ module thud_field
    use thud_interval, only: get_range_text, interval_type, new_interval
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, lower_case, quoted, to_text
+   use thud_text, only: join_quoted, lower_case, quoted, shortened, to_text
    implicit none (type, external)
    private
 
@@ -40,7 +40,7 @@ module thud_field
       character(len=key_length) :: group = ''
       !> Key within the group.
       character(len=key_length) :: key = ''
-      !> What uses it: a source model, `modes` for the free modes, blank for every impact.
+      !> What uses it: a source model, `modes` for the free modes, `compression`, blank for every impact.
       character(len=key_length) :: owner = ''
       !> SI unit, empty for pure numbers and text.
       character(len=8) :: unit = ''
@@ -177,7 +177,8 @@ contains
          line = '&text_group word = '//text//' /'
          word = ''
          if (scan(text(1:1), '''"') == 1) read (line, nml=text_group, iostat=status, iomsg=message)
-         if (status == 0) status = merge(0, 1, len_trim(word) <= name_length)
+         ! A longer constant would be cut.
+         if (status == 0) status = merge(0, 1, len_trim(text) <= len(word) + 2 .and. len_trim(word) <= name_length)
          if (status == 0) self%text_value = word(:name_length)
          if (status == 0 .and. self%n_choice > 0) self%text_value = lower_case(self%text_value)
       end if
@@ -282,7 +283,7 @@ contains
       character(len=:), allocatable :: allowed
 
       call self%get_allowed(allowed, interval)
-      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//value//' '//what &
+      error = input_error('&'//trim(self%group)//': '//trim(self%key)//' = '//shortened(value)//' '//what &
          //'; allowed: '//allowed)
    end function get_error
 

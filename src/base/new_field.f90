@@ -99,7 +99,7 @@ contains
 
    !> Sets the user of keys.
    function owned_by(owner, fields) result(owned)
-      !> A source model or `modes`.
+      !> A source model, `modes` or `compression`.
       character(len=*), intent(in) :: owner
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)

@@ -8,7 +8,10 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, join_quoted, lower_case, newline, quoted, replaced, split, to_text
+   public :: fixed, join_quoted, lower_case, newline, quoted, replaced, shortened, split, to_text
+
+   !> Maximum length of a value in a message.
+   integer, parameter :: longest_shown = 80
 
    !> Line feed, the line end of every file that thud writes.
    character(len=*), parameter :: newline = new_line('a')
@@ -163,6 +166,16 @@ contains
          if (scan(text(i:i), set) > 0) changed(i:i) = new
       end do
    end function replaced
+
+   !> A text for a message: longer ones end in dots.
+   pure function shortened(text) result(short)
+      !> Any text.
+      character(len=*), intent(in) :: text
+      character(len=min(len(text), longest_shown)) :: short
+
+      short = text
+      if (len(text) > longest_shown) short(longest_shown - 2:) = '...'
+   end function shortened
 
    !> Text as a namelist character constant: quotes inside are doubled.
    pure function quoted(text) result(constant)

@@ -2,13 +2,16 @@
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
    use thud_band, only: band_choices
+   use thud_compression, only: check_compression, compression_options_type, get_compression_fields
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
    use thud_new_field, only: choice_field, in_group, owned_by, text_field
+   use thud_plate, only: get_plate_fields, plate_type
    use thud_registry, only: model_names, model_slot_type, new_models
+   use thud_room, only: check_room, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
    use thud_text, only: quoted, to_text
@@ -27,8 +30,14 @@ module thud_case
       logical :: has_impact = .true.
       !> Free modes are asked for, by the group `&modes`.
       logical :: has_modes = .false.
+      !> The level in the room below is asked for, by the groups `&floor` and `&room`.
+      logical :: has_room = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
+      !> A slow compression is asked for, by the group `&compression`.
+      logical :: has_compression = .false.
+      !> How far, in how many points, and what the gas does.
+      type(compression_options_type) :: compression
       type(ball_type) :: ball
       type(drop_type) :: drop
       !> Source model, one of `model_names`.
@@ -44,6 +53,9 @@ module thud_case
       character(len=name_length) :: level_force = 'floor'
       !> Source whose limits apply.
       character(len=name_length) :: source = 'rubber_ball'
+      !> Floor and room below.
+      type(plate_type) :: floor
+      type(room_type) :: room
    end type case_type
 
 contains
@@ -76,6 +88,7 @@ contains
          in_group('case', [text_field('name', case%name, 'name of the case, also of its output directory')]), &
          in_group('ball', get_ball_fields(case%ball)), &
          owned_by('modes', get_modes_fields(case%modes)), &
+         owned_by('compression', in_group('compression', get_compression_fields(case%compression))), &
          in_group('drop', get_drop_fields(case%drop)), &
          in_group('model', [choice_field('name', case%model, 'source model', model_names)])]
       do i = 1, size(case%models)
@@ -88,10 +101,12 @@ contains
          choice_field('bands', case%bands, 'bands of levels.csv', band_choices), &
          choice_field('force', case%level_force, 'force whose levels, peak and verdict count', &
          [character(len=8) :: 'floor', 'elastic'])]), &
-         in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)])]
+         in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
+         owned_by('floor', in_group('floor', get_plate_fields(case%floor))), &
+         owned_by('room', in_group('room', get_room_fields(case%room)))]
    end function get_fields
 
-   !> Whether a key does something: for the impact, its model, or the free modes.
+   !> Whether a key does something: for the impact, its model, the free modes, the slow compression, or the room below.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -99,6 +114,10 @@ contains
 
       if (field%owner == 'modes') then
          used = case%has_modes
+      else if (field%owner == 'floor' .or. field%owner == 'room') then
+         used = case%has_impact .and. case%has_room
+      else if (field%owner == 'compression') then
+         used = case%has_compression .and. case%has_impact
       else if (case%has_impact) then
          used = field%owner == '' .or. field%owner == case%model
       else
@@ -130,6 +149,9 @@ contains
       if (allocated(error)) return
       if (case%has_modes) call check_modes(case%modes, error)
       if (allocated(error) .or. .not. case%has_impact) return
+      if (case%has_compression) call check_compression(case%compression, case%ball, error)
+      if (case%has_room .and. .not. allocated(error)) call check_room(case%room, error)
+      if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
          call model%check(case%ball, case%sampling, error)
       end associate
@@ -142,14 +164,14 @@ contains
       logical :: usable
       integer :: i
 
-      usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/') == 0 &
+      usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/\') == 0 &
          .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
             //' characters, without it the name of the file')
       else if (.not. usable) then
          error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory, ' &
-            //"without '/', of up to "//to_text(name_length)//' characters')
+            //"without '/' and '\', of up to "//to_text(name_length)//' characters')
       end if
    end subroutine check_name
 

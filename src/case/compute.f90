@@ -1,19 +1,21 @@
-!> Computes a case: free modes, the force history of its model, levels and verdict. It knows no files.
+!> Computes a case: free modes, slow compression, the force history of its model, levels and verdict. It knows no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
    use thud_case, only: case_type, get_model_number
+   use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
    use thud_remarks, only: get_remarks, remark_length
+   use thud_room, only: get_room_bands, get_room_level, room_level_type
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    implicit none (type, external)
    private
 
-   public :: compute_case, get_judged_force, is_conforming, judge_case, results_type
+   public :: compress_case, compute_case, get_judged_force, is_conforming, judge_case, predict_room, results_type
    public :: verdict_type
 
    !> Levels and criteria of an impact.
@@ -36,6 +38,10 @@ module thud_compute
       type(verdict_type) :: verdict
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
+      !> Level in the room below, where it is asked for.
+      type(room_level_type) :: room
+      !> Slow compression, where it is asked for.
+      type(compression_type) :: compression
       !> What is possible but not plausible: [n_remark].
       character(len=remark_length), allocatable :: remark(:)
    end type results_type
@@ -51,6 +57,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (case%has_modes) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, results%modes, error)
+      if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
       if (allocated(error)) return
       if (case%has_impact) then
          associate (model => case%models(get_model_number(case))%model)
@@ -59,6 +66,20 @@ contains
       end if
       if (.not. allocated(error)) call get_remarks(case, results%history, results%remark)
    end subroutine compute_case
+
+   !> Slow compression of the ball of a case by its model.
+   subroutine compress_case(case, compression, error)
+      type(case_type), intent(in) :: case
+      type(compression_type), intent(out) :: compression
+      !> The model has none, or the ball cannot be pressed so far.
+      type(error_type), allocatable, intent(out) :: error
+
+      allocate (compression%deflection, source=get_deflections(case%compression))
+      allocate (compression%force, mold=compression%deflection)
+      associate (model => case%models(get_model_number(case))%model)
+         call model%compress(get_pressed_ball(case%compression, case%ball), compression%deflection, compression%force, error)
+      end associate
+   end subroutine compress_case
 
    !> Levels and criteria of the force history of a case.
    subroutine judge_case(case, history, verdict, error)
@@ -107,6 +128,27 @@ contains
       criteria = get_criteria(limits, level(:octave_count), history%contact_time, history%restitution, &
          get_peak_count(force, history%sample_rate), case%ball%mass, case%drop%height)
    end subroutine judge_force
+
+   !> Level that a force causes in the room below.
+   subroutine predict_room(case, force, sample_rate, prediction, error)
+      !> The case, with floor and room.
+      type(case_type), intent(in) :: case
+      !> Force on the floor, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      type(room_level_type), intent(out) :: prediction
+      !> A level cannot be computed.
+      type(error_type), allocatable, intent(out) :: error
+      type(band_type), allocatable :: bands(:)
+      real(wp), allocatable :: level(:)
+
+      call get_room_bands(bands, error)
+      if (allocated(error)) return
+      allocate (level(size(bands)))
+      call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
+      if (.not. allocated(error)) call get_room_level(case%floor, case%room, bands, level, prediction)
+   end subroutine predict_room
 
    !> Number of the force that the verdict is on.
    pure function get_judged_force(case) result(number)

@@ -25,8 +25,8 @@ module thud_many
    public :: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
 
    !> Groups in whose keys drops may not differ: names, and what a run writes.
-   character(len=key_length), parameter :: common_groups(4) = [character(len=key_length) :: &
-      'case', 'model', 'modes', 'output']
+   character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
+      'case', 'model', 'modes', 'compression', 'output']
 
    !> Approximate time of one drop in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-5_wp
@@ -243,8 +243,9 @@ contains
 
          own = case
          allocate (fields, source=get_active_fields(own))
-         ! Nobody reads the free modes of a drop.
+         ! Nobody reads the free modes or the compression of a drop.
          own%has_modes = .false.
+         own%has_compression = .false.
          !$omp do schedule(dynamic)
          do drop = 1, size(left)
             if (.not. is_interrupted()) call solve_one(own, fields, columns, values(:, left(drop)), left(drop), many)
@@ -269,6 +270,10 @@ contains
 
       if (.not. case%has_impact) then
          error = input_error('the case computes no impact; allowed: a case with &model')
+         return
+      end if
+      if (case%has_room) then
+         error = input_error('&floor and &room: many drops have no level in a room; allowed: a case without these groups')
          return
       end if
       allocate (fields, source=get_active_fields(case))

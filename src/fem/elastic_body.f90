@@ -97,7 +97,7 @@ contains
       real(wp) :: stress(body%mesh%n_polar, n_component, n_point), cofactor(body%mesh%n_polar, n_component, n_point)
       real(wp) :: volume
       real(wp) :: jacobian(body%mesh%n_polar, n_point)
-      integer :: i, k, n
+      integer :: i, n
 
       n = body%mesh%n_polar
       force = 0.0_wp
@@ -117,10 +117,9 @@ contains
                call add_viscous_stress(n, material%viscosity, row%weight, rate, cofactor, jacobian, stress, &
                   state%dissipation)
             end if
-            do k = 1, size(material%branch_time)
-               call add_branch_stress(n, material%branch_modulus(k), material%branch_time(k), interval, keep, row%weight, &
-                  f, cofactor, jacobian, body%flow(:, :, :, k, i), stress, state%strain_energy, state%dissipation)
-            end do
+            if (size(material%branch_time) > 0) call add_branch_stress(n, material%branch_modulus, material%branch_time, &
+               interval, keep, row%weight, f, cofactor, jacobian, body%flow(:, :, :, :, i), stress, state%strain_energy, &
+               state%dissipation)
             call add_nodal_forces(row, n, stress, force(:, i - 1:i, 1), force(:, i - 1:i, 2))
          end associate
       end do

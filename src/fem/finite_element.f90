@@ -8,6 +8,7 @@ module thud_finite_element
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
+   use thud_field, only: name_length
    use thud_finite_element_options, only: finite_element_options_type, get_frame_count, get_stride
    use thud_force_history, only: force_history_type
    use thud_impact_record, only: continue_flight, finish_record, new_impact_record, record_sample
@@ -16,8 +17,10 @@ module thud_finite_element
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_material, only: get_material_loss_factor, material_type, new_material
+   use thud_mesh, only: new_mesh
    use thud_motion, only: new_motion, take_snapshot
    use thud_nodal_areas, only: get_nodal_areas
+   use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
@@ -54,6 +57,7 @@ module thud_finite_element
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
       procedure, pass(options) :: get_loss_factors
+      procedure, pass(options) :: compress
    end type finite_element_type
 
 contains
@@ -65,7 +69,11 @@ contains
       real(wp) :: cost
 
       ! The number of elements, and of steps, which grows as they shrink.
-      cost = 0.25_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
+      cost = 0.3_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
+      ! Branches cost more than all the rest.
+      if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) then
+         cost = 2.5_wp*cost
+      end if
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).
@@ -95,6 +103,33 @@ contains
       if (allocated(error)) return
       loss_factor = [(get_material_loss_factor(material, frequency(i)), i=1, size(frequency))]
    end subroutine get_loss_factors
+
+   !> Force on each of two plates that press the ball slowly, at its long-term modulus.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> Mesh and material.
+      class(finite_element_type), intent(in) :: options
+      !> Approach of the plates, ascending from 0, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> No Prony series fits the loss factor, or no state of rest was found.
+      type(error_type), allocatable, intent(out) :: error
+      type(material_type) :: material
+      type(pressed_ball_type) :: pressed
+      integer :: i
+
+      force = 0.0_wp
+      call new_material(options%material, ball, material, error)
+      if (allocated(error)) return
+      pressed = new_pressed_ball(ball, new_mesh(ball, options%mesh, 1), material)
+      do i = 1, size(deflection)
+         call press(pressed, deflection(i), error)
+         if (allocated(error)) return
+         force(i) = pressed%force
+      end do
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
@@ -145,12 +180,11 @@ contains
       !> The ball cannot be computed, or the record is too short.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: interval, time, first_energy
-      integer :: i, k, n_step, n_sample, stride, look, latest, last
+      integer :: i, k, n_step, n_sample, stride, look, latest
 
       n_sample = size(history%floor_force)
       interval = 1/sampling%sample_rate
       n_step = 0
-      last = ubound(run%position, 2)
       look = max(1, nint(look_interval*sampling%sample_rate))
       stride = huge(stride)
       if (size(history%motion%time) > 0) stride = get_stride(options, sampling)
@@ -171,8 +205,7 @@ contains
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
                if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
-                  run%node_impulse/interval/get_nodal_areas(run%position(:, last, 1), run%position(:, last, 2)), &
-                  run%state%gas_pressure)
+                  get_contact_stress(run, interval), run%state%gas_pressure)
                run%node_impulse = 0.0_wp
             end if
             call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
@@ -243,9 +276,23 @@ contains
       logical :: touches
 
       associate (last => ubound(run%position, 2))
-         touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity)) < 0.0_wp
+         touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity) &
+            - run%contact%edge_height) < 0.0_wp
       end associate
    end function will_touch
+
+   !> Stress of the floor on the deformed surface, its mean since the latest sample.
+   pure function get_contact_stress(run, interval) result(stress)
+      type(impact_run_type), intent(in) :: run
+      !> Sampling interval, s.
+      real(wp), intent(in) :: interval
+      !> Outwards and upwards, Pa: [0:n_polar, 2].
+      real(wp) :: stress(0:ubound(run%position, 1), 2)
+
+      associate (surface => run%position(:, ubound(run%position, 2), :))
+         stress = run%node_impulse/interval/spread(get_nodal_areas(surface(:, 1), surface(:, 2)), 2, 2)
+      end associate
+   end function get_contact_stress
 
    !> Beginning of a sentence with the time of an event.
    function place(time) result(text)

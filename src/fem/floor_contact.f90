@@ -1,37 +1,47 @@
-!> Contact of the ball's surface with the rigid floor at height 0, without friction, at every node of
-!> the surface, the pole included.
+!> Contact of the ball's surface with the floor at height 0, at every node of the surface, the pole
+!> included: what holds the ball up, and Coulomb's friction.
 !>
-!> `penalty`: a spring for each node takes its share of the surface; it keeps energy and lets the
-!> surface sink in a little. `impulse`: nodes that would pass the floor in a step are stopped at it
-!> (forward increments of Lagrange multipliers, Carpenter, Taylor and Katona 1991, Int. J. Numer.
-!> Methods Eng. 32, 103-128); nothing sinks in, and the energy of what is stopped is lost.
+!> Hard floor: nodes that would pass it in a step are stopped (forward increments of Lagrange
+!> multipliers, Carpenter, Taylor and Katona 1991, Int. J. Numer. Methods Eng. 32, 103-128); nothing
+!> sinks in, and the energy of what is stopped is lost. With a layer: linear springs of the floor
+!> (Winkler), lossless and without mass, that push normal to the surface of the ball.
+!>
+!> The edge of the contact lies between two nodes, and the one outside takes its share of the pressure
+!> before it touches; without that share the force jumps from ring to ring. Beside the edge, at the
+!> radius a, a smooth frictionless contact has the pressure p = C sqrt(s) at the distance s inside and the
+!> gap 4/3 C/E* s**(3/2) outside (Johnson 1985, Contact Mechanics, section 5.1), with C = 2 E* sqrt(2 a)/(pi R)
+!> by Hertz. With an edge at the distance e from the inner neighbour, a linear shape function of the
+!> width h gives the node the force per area 4/15 C e**(5/2)/h**2 at the gap 4/3 C/E* (h - e)**(3/2). A parabola of the
+!> same force at the floor, 4/15 C sqrt(h), and the same work, 0.1840 times that force and the gap of e = 0,
+!> replaces this relation, with a in the middle of the element. Both vanish with the elements.
 module thud_floor_contact
-   use thud_field, only: field_type, name_length
+   use thud_ball, only: ball_type
+   use thud_constants, only: pi
+   use thud_field, only: field_type
    use thud_kinds, only: wp
-   use thud_material, only: material_type
    use thud_mesh, only: mesh_type
-   use thud_new_field, only: choice_field, real_field
+   use thud_new_field, only: real_field
    use thud_nodal_areas, only: get_nodal_areas
    implicit none (type, external)
    private
 
-   public :: contact_options_type, floor_contact_type, get_contact_fields, get_penalty_forces, new_floor_contact, &
-      stop_at_floor
+   public :: contact_options_type, floor_contact_type, get_contact_fields, get_contact_forces, get_contact_stiffness, &
+      new_floor_contact, slow_by_friction, stop_at_floor
 
    !> What the group asks for.
    type :: contact_options_type
-      !> `penalty` or `impulse`.
-      character(len=name_length) :: treatment = 'impulse'
-      !> Stiffness of the penalty over that of the elements above it, both per area.
-      real(wp) :: penalty_ratio = 3.0_wp
+      !> Coefficient of friction between ball and floor.
+      real(wp) :: friction = 0.0_wp
+      !> Stiffness of a layer on the floor, N/m3; 0 for none.
+      real(wp) :: layer_stiffness = 0.0_wp
    end type contact_options_type
 
-   !> The contact.
-   type :: floor_contact_type
-      !> Nodes are stopped instead of pushed.
-      logical :: stops = .false.
-      !> Stiffness of each node, N/m: [0:n_polar].
-      real(wp), allocatable :: stiffness(:)
+   !> The contact; arrays over the nodes of the outer surface are [0:n_polar].
+   type, extends(contact_options_type) :: floor_contact_type
+      !> Force on a node at the edge that reaches the floor, N.
+      real(wp), allocatable :: edge_force(:)
+      !> Height at which that force begins, m.
+      real(wp), allocatable :: edge_height(:)
    end type floor_contact_type
 
 contains
@@ -44,48 +54,110 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         choice_field('treatment', options%treatment, 'how the floor holds the ball', &
-         [character(len=8) :: 'penalty', 'impulse']), &
-         real_field('penalty_ratio', options%penalty_ratio, '', &
-         'stiffness of the penalty over that of the elements above it, per area', '[0.01, 100]')]
+         real_field('friction', options%friction, '', 'coefficient of friction between ball and floor', '[0, 100]'), &
+         real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
+         'stiffness per area of a thin layer on the floor; 0: none, the floor is hard', '[0, 1e13]')]
    end function get_contact_fields
 
    !> The contact of a ball.
-   pure function new_floor_contact(options, mesh, material) result(contact)
+   pure function new_floor_contact(options, ball, mesh) result(contact)
       type(contact_options_type), intent(in) :: options
+      type(ball_type), intent(in) :: ball
       !> Mesh of order 1, undeformed.
       type(mesh_type), intent(in) :: mesh
-      type(material_type), intent(in) :: material
       type(floor_contact_type) :: contact
-      real(wp) :: modulus
+      !> Work of the relation between force and gap, over their maxima: 1.5 B(1.5, 3.5).
+      real(wp), parameter :: fullness = 0.1840776945462769_wp
+      real(wp) :: area(0:mesh%n_polar)
+      real(wp) :: modulus, width, strength
+      integer :: j
 
+      contact%contact_options_type = options
+      allocate (contact%edge_force(0:mesh%n_polar), contact%edge_height(0:mesh%n_polar), source=0.0_wp)
+      modulus = ball%youngs_modulus/(1 - ball%poisson_ratio**2)
       associate (last => mesh%n_radial)
-         contact%stops = options%treatment == 'impulse'
-         modulus = material%bulk_modulus + 4*(material%shear_modulus + sum(material%branch_modulus))/3
-         allocate (contact%stiffness(0:mesh%n_polar))
-         contact%stiffness = options%penalty_ratio*modulus*get_nodal_areas(mesh%r(:, last), mesh%z(:, last)) &
-            /hypot(mesh%r(:, last) - mesh%r(:, last - 1), mesh%z(:, last) - mesh%z(:, last - 1))
+         area = get_nodal_areas(mesh%r(:, last), mesh%z(:, last))
+         ! Hertz's edge is straight, far from the axis: not in the first element.
+         do j = 2, mesh%n_polar - 1
+            width = hypot(mesh%r(j, last) - mesh%r(j - 1, last), mesh%z(j, last) - mesh%z(j - 1, last))
+            strength = 2*modulus*sqrt(mesh%r(j, last) + mesh%r(j - 1, last))/(pi*ball%outer_radius)
+            contact%edge_force(j) = 4*strength*sqrt(width)/15*area(j)
+            ! The work of a parabola is a third of force and height.
+            contact%edge_height(j) = 3*fullness*4*strength*width**1.5_wp/(3*modulus)
+            if (.not. options%layer_stiffness > 0.0_wp) cycle
+            ! A layer gives way first, the more the softer it is to the element's edge.
+            contact%edge_force(j) = contact%edge_force(j)/(1 + modulus/(width*options%layer_stiffness))
+         end do
       end associate
    end function new_floor_contact
 
-   !> Forces of the penalty.
-   pure subroutine get_penalty_forces(contact, height, force, energy)
+   !> Forces of the floor that depend on where the nodes are: those of its layer and at the edge of the contact.
+   pure subroutine get_contact_forces(contact, position, force, energy)
       type(floor_contact_type), intent(in) :: contact
-      !> Heights of the nodes of the outer surface over the floor, m: [0:n_polar].
-      real(wp), intent(in) :: height(0:)
-      !> Forces of the floor upwards, N: [0:n_polar].
-      real(wp), intent(out) :: force(0:)
-      !> Energy that the springs hold, J.
+      !> Positions of the nodes of the outer surface over the floor, m: [0:n_polar, 2].
+      real(wp), intent(in) :: position(0:, :)
+      !> Forces of the floor on the nodes, N: [0:n_polar, 2].
+      real(wp), intent(out) :: force(0:, :)
+      !> Energy that they hold, J.
       real(wp), intent(out) :: energy
+      real(wp) :: part
+      integer :: j, n
 
       force = 0.0_wp
       energy = 0.0_wp
-      if (contact%stops .or. minval(height) >= 0.0_wp) return
-      force = contact%stiffness*max(0.0_wp, -height)
-      energy = dot_product(contact%stiffness, min(0.0_wp, height)**2)/2
-   end subroutine get_penalty_forces
+      if (minval(position(:, 2) - contact%edge_height) >= 0.0_wp) return
+      n = ubound(force, 1)
+      do j = 0, n - 1
+         associate (z => position(j, 2), begin => contact%edge_height(j), edge_force => contact%edge_force(j))
+            if (z >= begin) cycle
+            part = 1.0_wp
+            if (z > 0.0_wp) part = 1 - z/begin
+            force(j, 2) = edge_force*part**2
+            energy = energy + edge_force*(begin*part**3/3 + max(-z, 0.0_wp))
+         end associate
+      end do
+      if (contact%layer_stiffness > 0.0_wp) call add_layer_forces(contact%layer_stiffness, position(:, 1), &
+         max(-position(:, 2), 0.0_wp), force(:, 1), force(:, 2), energy)
+   end subroutine get_contact_forces
 
-   !> Stops the nodes that would pass the floor in the next step.
+   !> Adds what the layer does: the derivatives of its energy, half of the stiffness times area and squared sink. The
+   !> areas are those of the rings that the nodes stand for on the floor.
+   pure subroutine add_layer_forces(stiffness, r, sink, outwards, upwards, energy)
+      !> Stiffness per area, N/m3.
+      real(wp), intent(in) :: stiffness
+      !> Distances of the nodes from the axis, m: [0:n_polar].
+      real(wp), intent(in) :: r(0:)
+      !> Depths of the nodes in the layer, 0 above it, m: [0:n_polar].
+      real(wp), intent(in) :: sink(0:)
+      !> Forces, N: [0:n_polar].
+      real(wp), intent(inout) :: outwards(0:), upwards(0:)
+      !> Energy, J.
+      real(wp), intent(inout) :: energy
+      real(wp) :: area(0:ubound(r, 1))
+      integer :: n
+
+      n = ubound(r, 1)
+      area = get_nodal_areas(r, 0*r)
+      upwards = upwards + stiffness*area*sink
+      energy = energy + stiffness*dot_product(area, sink**2)/2
+      associate (inner => r(:n - 2), here => r(1:n - 1), outer => r(2:))
+         outwards(1:n - 1) = outwards(1:n - 1) - stiffness*pi/6*(sink(1:n - 1)**2*(outer - inner) &
+            + sink(:n - 2)**2*(2*here + inner) - sink(2:)**2*(2*here + outer))
+      end associate
+   end subroutine add_layer_forces
+
+   !> Stiffness of the floor under each node, at most, N/m: [0:n_polar].
+   pure function get_contact_stiffness(contact, r) result(stiffness)
+      type(floor_contact_type), intent(in) :: contact
+      !> Distances of the nodes of the outer surface from the axis, m: [0:n_polar].
+      real(wp), intent(in) :: r(0:)
+      real(wp) :: stiffness(0:ubound(r, 1))
+
+      stiffness = contact%layer_stiffness*get_nodal_areas(r, 0*r)
+      where (contact%edge_height > 0.0_wp) stiffness = stiffness + 2*contact%edge_force/contact%edge_height
+   end function get_contact_stiffness
+
+   !> Stops the nodes that would pass the hard floor in the next step.
    pure subroutine stop_at_floor(contact, mass, height, interval, velocity, impulse)
       type(floor_contact_type), intent(in) :: contact
       !> Masses of the nodes, kg: [0:n_polar].
@@ -96,13 +168,30 @@ contains
       real(wp), intent(in) :: interval
       !> Velocities upwards, m/s: [0:n_polar].
       real(wp), intent(inout) :: velocity(0:)
-      !> Impulses of the floor, N s: [0:n_polar].
+      !> Impulses of the floor upwards, N s: [0:n_polar].
       real(wp), intent(out) :: impulse(0:)
 
       impulse = 0.0_wp
-      if (.not. contact%stops) return
+      if (contact%layer_stiffness > 0.0_wp) return
       impulse = mass*max(0.0_wp, -height/interval - velocity)
       velocity = max(velocity, -height/interval)
    end subroutine stop_at_floor
+
+   !> Coulomb's friction: nodes stick where an impulse of at most the coefficient times that of the floor
+   !> upwards holds them, and slip against the largest one otherwise.
+   pure subroutine slow_by_friction(contact, mass, normal_impulse, velocity, impulse)
+      type(floor_contact_type), intent(in) :: contact
+      !> Masses of the nodes, kg: [0:n_polar].
+      real(wp), intent(in) :: mass(0:)
+      !> Impulses of the floor upwards, N s: [0:n_polar].
+      real(wp), intent(in) :: normal_impulse(0:)
+      !> Velocities outwards, m/s: [0:n_polar].
+      real(wp), intent(inout) :: velocity(0:)
+      !> Impulses of the floor outwards, N s: [0:n_polar].
+      real(wp), intent(out) :: impulse(0:)
+
+      impulse = -sign(min(mass*abs(velocity), contact%friction*normal_impulse), velocity)
+      velocity = velocity + impulse/mass
+   end subroutine slow_by_friction
 
 end module thud_floor_contact

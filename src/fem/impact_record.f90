@@ -21,8 +21,8 @@ module thud_impact_record
    !> Maximum error of the impulse of the record, over the change of momentum.
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
-   !> Part of the wall that the surface may sink into the floor.
-   real(wp), parameter :: max_sink = 0.01_wp
+   !> Part of the wall that the surface may sink into the layer on the floor: the layer is thin.
+   real(wp), parameter :: max_sink = 0.1_wp
 
    !> Columns of the channels.
    integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
@@ -39,8 +39,8 @@ contains
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
       history%impact_velocity = impact_velocity
       history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
-         'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'dissipated_energy_J', &
-         'minimum_volume_ratio']
+         'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'friction_energy_J', &
+         'dissipated_energy_J', 'minimum_volume_ratio']
       allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
    end function new_impact_record
 
@@ -57,11 +57,12 @@ contains
       history%deflection(i) = start - get_mean_height(run)
       history%velocity(i) = -get_mean_velocity(run)
       associate (r => run%position(:, ubound(run%position, 2), 1))
-         history%channel(i, at_radius) = maxval(r, mask=run%floor_force > 0.0_wp)
-         if (.not. any(run%floor_force > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
+         history%channel(i, at_radius) = maxval(r, mask=run%floor_force(:, 2) > 0.0_wp)
+         if (.not. any(run%floor_force(:, 2) > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
       end associate
       history%channel(i, at_pressure:) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
-         run%state%gas_energy, run%potential, run%spring + run%stopped, run%dissipated, run%state%min_jacobian]
+         run%state%gas_energy, run%potential, run%spring + run%stopped, run%rubbed, run%dissipated, &
+         run%state%min_jacobian]
    end subroutine record_sample
 
    !> Goes on after the computation as free flight without further vibration, up to the next touch.
@@ -134,7 +135,7 @@ contains
             //to_text(max_energy_residual)//', a smaller step_safety helps')
       else if (run%sink > max_sink*ball%wall_thickness) then
          error = numerical_error('&contact: the surface sinks '//to_text(1.0e3_wp*run%sink) &
-            //' mm into the floor; allowed: up to '//to_text(max_sink)//' of the wall, a higher penalty_ratio helps')
+            //' mm into the layer; allowed: up to '//to_text(max_sink)//' of the wall, a higher layer_stiffness helps')
       end if
    end subroutine finish_record
 

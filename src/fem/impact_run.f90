@@ -5,7 +5,7 @@ module thud_impact_run
    use thud_constants, only: pi
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
    use thud_finite_element_options, only: finite_element_options_type
-   use thud_floor_contact, only: floor_contact_type, get_penalty_forces, new_floor_contact, stop_at_floor
+   use thud_floor_contact, only: floor_contact_type, get_contact_forces, new_floor_contact, slow_by_friction, stop_at_floor
    use thud_kinds, only: wp
    use thud_material, only: material_type
    use thud_mesh, only: new_mesh
@@ -36,22 +36,22 @@ module thud_impact_run
       real(wp), allocatable :: mass(:, :, :)
       !> Direction of the fastest motion.
       real(wp), allocatable :: direction(:, :, :)
-      !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar].
-      real(wp), allocatable :: floor_force(:)
-      !> Impulse of the floor in the latest step, N s.
+      !> Forces of the floor on the nodes of the outer surface in the latest step, N: [0:n_polar, 2].
+      real(wp), allocatable :: floor_force(:, :)
+      !> Impulse of the floor upwards in the latest step, N s.
       real(wp) :: impulse = 0.0_wp
       !> Energies, power and failure of the latest step.
       type(body_state_type) :: state
-      !> Energies of the latest step: of motion, in the springs of the floor, in the field of gravity, J.
+      !> Energies of the latest step: of motion, in what the floor does by its place, in the field of gravity, J.
       real(wp) :: kinetic = 0.0_wp, spring = 0.0_wp, potential = 0.0_wp
-      !> Energies lost so far: by viscosity, and by nodes that the floor stopped, J.
-      real(wp) :: dissipated = 0.0_wp, stopped = 0.0_wp
+      !> Energies lost so far: by viscosity, by nodes that the floor stopped, and by friction, J.
+      real(wp) :: dissipated = 0.0_wp, stopped = 0.0_wp, rubbed = 0.0_wp
       !> Time that the velocities have been driven for, s.
       real(wp) :: time = 0.0_wp
-      !> Energy lost by stopped nodes that the next step adds, J.
-      real(wp) :: half_stop = 0.0_wp
-      !> Impulses of the floor on the nodes of the outer surface since the latest sample, N s: [0:n_polar].
-      real(wp), allocatable :: node_impulse(:)
+      !> Energies lost by stopped nodes and by friction that the next step adds, J.
+      real(wp) :: half_stop = 0.0_wp, half_rub = 0.0_wp
+      !> Impulses of the floor on the nodes of the outer surface since the latest sample, N s: [0:n_polar, 2].
+      real(wp), allocatable :: node_impulse(:, :)
       !> Length of the step before, s; 0 at the start.
       real(wp) :: last_interval = 0.0_wp
       !> Shortest step, s.
@@ -73,7 +73,7 @@ contains
       type(impact_run_type) :: run
 
       run%body = new_elastic_body(ball, new_mesh(ball, options%mesh, 1), material)
-      run%contact = new_floor_contact(options%contact, run%body%mesh, material)
+      run%contact = new_floor_contact(options%contact, ball, run%body%mesh)
       run%gravity = gravity
       associate (mesh => run%body%mesh)
          allocate (run%position(0:mesh%n_polar, 0:mesh%n_radial, 2), run%velocity(0:mesh%n_polar, 0:mesh%n_radial, 2))
@@ -83,11 +83,11 @@ contains
          run%velocity(:, :, 2) = -speed
          allocate (run%mass(0:mesh%n_polar, 0:mesh%n_radial, 2), source=spread(run%body%mass, 3, 2))
          allocate (run%direction(0:mesh%n_polar, 0:mesh%n_radial, 2), source=get_first_direction(run%body))
-         allocate (run%floor_force(0:mesh%n_polar), run%node_impulse(0:mesh%n_polar), source=0.0_wp)
+         allocate (run%floor_force(0:mesh%n_polar, 2), run%node_impulse(0:mesh%n_polar, 2), source=0.0_wp)
       end associate
    end function new_impact_run
 
-   !> Number of steps in a sampling interval that keeps the run stable.
+   !> Number of steps in a sampling interval that keeps the run stable; it never falls during a run.
    subroutine choose_step(run, interval, safety, min_steps, n_step)
       type(impact_run_type), intent(inout) :: run
       !> Sampling interval, s; part of the limit of stability to be used.
@@ -98,9 +98,11 @@ contains
       integer, intent(inout) :: n_step
       real(wp) :: growth, ratio, wave, width
       integer :: n_iteration, iteration
+      logical :: starts
 
       n_iteration = next_iterations
-      if (n_step == 0) then
+      starts = n_step == 0
+      if (starts) then
          n_iteration = first_iterations
          associate (material => run%body%material, mesh => run%body%mesh)
             wave = sqrt((material%bulk_modulus + 4*material%shear_modulus/3)/material%density)
@@ -119,7 +121,8 @@ contains
          ratio = growth/(safety*max_growth)
          ! Growth rises with the first to the second power of the step: take the higher.
          if (ratio <= 1.0_wp) then
-            n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
+            ! Later on no step is taken back: the direction follows the deforming ball late.
+            if (starts) n_step = max(min_steps, 1, ceiling(n_step*sqrt(max(ratio, 0.0_wp))))
             exit
          end if
          n_step = ceiling(n_step*min(ratio, 2.0_wp))
@@ -133,33 +136,59 @@ contains
       real(wp), intent(in) :: interval
       real(wp) :: force(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
       real(wp) :: before(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
-      real(wp) :: impulse(0:run%body%mesh%n_polar)
+      real(wp) :: impulse(0:run%body%mesh%n_polar, 2)
       real(wp) :: span
+      logical :: starts
       integer :: last
 
       last = run%body%mesh%n_radial
       span = (run%last_interval + interval)/2
       call get_internal_forces(run%body, run%position, run%velocity, interval, .true., force, run%state)
       if (run%state%failure /= no_failure) return
-      call get_penalty_forces(run%contact, run%position(:, last, 2), run%floor_force, run%spring)
-      force(:, last, 2) = force(:, last, 2) + run%floor_force
+      call get_contact_forces(run%contact, run%position(:, last, :), run%floor_force, run%spring)
+      force(:, last, :) = force(:, last, :) + run%floor_force
       before = run%velocity
       run%time = run%time + span
       run%velocity = before + span*force/run%mass
       run%velocity(:, :, 2) = run%velocity(:, :, 2) - span*run%gravity
       call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2), interval, run%velocity(:, last, 2), &
-         impulse)
-      ! Half of the work of the stops comes with the velocities after them, in the next step.
-      run%stopped = run%stopped + run%half_stop - dot_product(impulse, before(:, last, 2))/2
-      run%half_stop = -dot_product(impulse, run%velocity(:, last, 2))/2
+         impulse(:, 2))
+      call slow_by_friction(run%contact, run%mass(:, last, 1), span*run%floor_force(:, 2) + impulse(:, 2), &
+         run%velocity(:, last, 1), impulse(:, 1))
+      starts = .not. run%last_interval > 0.0_wp
+      call add_lost_work(impulse(:, 2), before(:, last, 2), run%velocity(:, last, 2), starts, run%stopped, run%half_stop)
+      call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%rubbed, run%half_rub)
       run%floor_force = run%floor_force + impulse/span
-      run%impulse = span*sum(run%floor_force)
+      run%impulse = span*sum(run%floor_force(:, 2))
       run%node_impulse = run%node_impulse + span*run%floor_force
       run%kinetic = sum(run%mass*before*run%velocity)/2
+      ! The velocities of the start are not half a step late.
+      if (starts) run%kinetic = sum(run%mass*before**2)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
-      if (.not. run%contact%stops) run%sink = max(run%sink, -minval(run%position(:, last, 2)))
+      if (run%contact%layer_stiffness > 0.0_wp) run%sink = max(run%sink, -minval(run%position(:, last, 2)))
    end subroutine kick
+
+   !> Adds the work that impulses of the floor take from nodes. Half of it comes with the velocities after them, in the
+   !> next step; of the first step all.
+   pure subroutine add_lost_work(impulse, before, after, starts, lost, waiting)
+      !> Impulses, N s; velocities before and after, m/s: [0:n_polar].
+      real(wp), intent(in) :: impulse(0:), before(0:), after(0:)
+      !> It is the first step.
+      logical, intent(in) :: starts
+      !> Energy lost so far; energy that the next step adds, J.
+      real(wp), intent(inout) :: lost, waiting
+
+      lost = lost + waiting
+      waiting = -dot_product(impulse, after)/2
+      associate (now => -dot_product(impulse, before)/2)
+         if (starts) then
+            waiting = waiting + now
+         else
+            lost = lost + now
+         end if
+      end associate
+   end subroutine add_lost_work
 
    !> Second half of a step: positions a step on.
    pure subroutine drift(run, interval)
@@ -179,7 +208,7 @@ contains
       real(wp) :: energy
 
       energy = run%kinetic + run%state%strain_energy + run%state%gas_energy + run%potential + run%spring + run%dissipated &
-         + run%stopped
+         + run%stopped + run%rubbed
    end function get_energy
 
    !> Height of the centre of mass.

@@ -5,9 +5,10 @@ module thud_material
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type, name_length
+   use thud_fractional_loss, only: new_fractional_loss
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, list_field, real_field
-   use thud_prony, only: fit_constant_loss, get_loss_factor, get_storage_ratio
+   use thud_prony, only: check_fractional_loss, fit_constant_loss, fit_fractional_loss, get_loss_ratio, get_storage_ratio
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -26,12 +27,14 @@ module thud_material
       real(wp) :: mooney_share = 0.2_wp
       !> Maximum bulk modulus over shear modulus: Poisson's ratio counts as at most that of this ratio.
       real(wp) :: bulk_ratio = 200.0_wp
-      !> Law of viscosity: `none`, `kelvin_voigt`, `constant_loss` or `prony`.
-      character(len=name_length) :: viscosity = 'kelvin_voigt'
+      !> Law of viscosity: `none`, `kelvin_voigt`, `fractional`, `constant_loss` or `prony`.
+      character(len=name_length) :: viscosity = 'fractional'
       !> Loss factor at `loss_frequency`.
-      real(wp) :: loss_factor = 0.2_wp
+      real(wp) :: loss_factor = 0.143_wp
       !> Frequency of the loss factor, Hz; there the ball's modulus of elasticity is the storage modulus.
       real(wp) :: loss_frequency = 74.0_wp
+      !> Order of the derivative of a fractional law.
+      real(wp) :: fractional_order = 0.3_wp
       !> Prony series: moduli over the long-term modulus.
       type(list_type) :: prony_share
       !> Prony series: relaxation times, s.
@@ -60,7 +63,7 @@ contains
    function get_material_fields(options) result(fields)
       !> The options that the fields read and set.
       type(material_options_type), intent(in), target :: options
-      !> One field per component: [8].
+      !> One field per component: [9].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -71,11 +74,13 @@ contains
          real_field('bulk_ratio', options%bulk_ratio, '', &
          "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
-         [character(len=16) :: 'none', 'kelvin_voigt', 'constant_loss', 'prony']), &
-         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt; ' &
-         //'over 10 to 1000 Hz, of constant_loss', '(0, 1]'), &
+         [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
+         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt and ' &
+         //'fractional; over 10 to 1000 Hz, of constant_loss', '(0, 1]'), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
          "where the ball's modulus is the storage modulus", '[1, 10000]'), &
+         real_field('fractional_order', options%fractional_order, '', &
+         'order of the derivative, of fractional; 1: kelvin_voigt', '(0, 1]'), &
          list_field('prony_share', options%prony_share, '', 'moduli over the long-term modulus, of prony', &
          '[0, 1000]'), &
          list_field('prony_time', options%prony_time, 's', 'relaxation times, of prony', &
@@ -104,6 +109,9 @@ contains
       else if (ball%poisson_ratio < 0.0_wp) then
          error = input_error('&ball: poisson_ratio = '//to_text(ball%poisson_ratio) &
             //' is not allowed with finite_element; allowed: 0 to 0.5')
+      else if (options%viscosity == 'fractional') then
+         call check_fractional_loss('material', options%fractional_order, options%loss_factor, &
+            options%loss_frequency, error)
       end if
    end subroutine check_material
 
@@ -115,8 +123,9 @@ contains
       type(material_type), intent(out) :: material
       !> No Prony series fits the loss factor.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: storage_modulus, poisson_ratio, omega
+      real(wp) :: storage_modulus, poisson_ratio, omega, viscosity
       real(wp), allocatable :: share(:)
+      logical :: failed
 
       omega = 2*pi*options%loss_frequency
       material%density = get_density(ball)
@@ -126,12 +135,20 @@ contains
       storage_modulus = ball%youngs_modulus/(2*(1 + poisson_ratio))
       material%bulk_modulus = ball%youngs_modulus/(3*(1 - 2*poisson_ratio))
       allocate (share(0), material%branch_time(0))
+      viscosity = 0.0_wp
       select case (options%viscosity)
       case ('kelvin_voigt')
-         material%viscosity = options%loss_factor*storage_modulus/omega
+         viscosity = options%loss_factor/omega
+      case ('fractional')
+         call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
+            options%loss_frequency), share, material%branch_time, viscosity)
       case ('constant_loss')
-         call fit_constant_loss(options%loss_factor, share, material%branch_time, error)
-         if (allocated(error)) return
+         call fit_constant_loss(options%loss_factor, share, material%branch_time, failed)
+         if (failed) then
+            error = input_error('&material: no Prony series has loss_factor = '//to_text(options%loss_factor) &
+               //' from 10 to 1000 Hz; allowed: up to about 0.9')
+            return
+         end if
       case ('prony')
          share = options%prony_share%values(:options%prony_share%count)
          material%branch_time = options%prony_time%values(:options%prony_time%count)
@@ -139,6 +156,7 @@ contains
          continue
       end select
       material%shear_modulus = storage_modulus/get_storage_ratio(share, material%branch_time, omega)
+      material%viscosity = viscosity*material%shear_modulus
       allocate (material%branch_modulus, source=share*material%shear_modulus)
    end subroutine new_material
 
@@ -149,9 +167,13 @@ contains
       real(wp), intent(in) :: frequency
       !> Loss modulus over storage modulus.
       real(wp) :: loss_factor
+      real(wp) :: omega
 
-      loss_factor = get_loss_factor(material%branch_modulus/material%shear_modulus, material%branch_time, 2*pi*frequency) &
-         + 2*pi*frequency*material%viscosity/material%shear_modulus
+      omega = 2*pi*frequency
+      associate (share => material%branch_modulus/material%shear_modulus, time => material%branch_time)
+         loss_factor = (get_loss_ratio(share, time, omega) + omega*material%viscosity/material%shear_modulus) &
+            /get_storage_ratio(share, time, omega)
+      end associate
    end function get_material_loss_factor
 
 end module thud_material

@@ -11,6 +11,10 @@ module thud_mesh
 
    public :: get_mesh_fields, mesh_options_type, mesh_type, new_mesh
 
+   !> How much smaller elements are around the lowest point, where the contact is, than their mean: at the inner and
+   !> at the outer surface. More at the outer one, whose elements are larger: the smallest ones decide the step.
+   real(wp), parameter :: grading(2) = [0.15_wp, 0.45_wp]
+
    !> Numbers of elements.
    type :: mesh_options_type
       !> Elements through the wall.
@@ -48,7 +52,8 @@ contains
          integer_field('polar_elements', options%polar_elements, 'elements from pole to pole', '[8, 1024]')]
    end function get_mesh_fields
 
-   !> Mesh of the undeformed ball around the origin.
+   !> Mesh of the undeformed ball around the origin. Elements of order 1 are graded, for the contact; those of order 2,
+   !> for the free modes, are not.
    pure function new_mesh(ball, options, order) result(mesh)
       type(ball_type), intent(in) :: ball
       !> Numbers of elements.
@@ -56,7 +61,7 @@ contains
       !> Order of the elements, 1 or 2.
       integer, intent(in) :: order
       type(mesh_type) :: mesh
-      real(wp) :: radius, angle
+      real(wp) :: radius, angle, depth
       integer :: i, j, n_ring, n_line
 
       mesh%order = order
@@ -66,9 +71,11 @@ contains
       n_line = order*mesh%n_polar
       allocate (mesh%r(0:n_line, 0:n_ring), mesh%z(0:n_line, 0:n_ring))
       do i = 0, n_ring
-         radius = ball%outer_radius - ball%wall_thickness*real(n_ring - i, wp)/real(n_ring, wp)
+         depth = real(n_ring - i, wp)/real(n_ring, wp)
+         radius = ball%outer_radius - ball%wall_thickness*depth
          do j = 0, n_line
             angle = pi*real(j, wp)/real(n_line, wp)
+            if (order == 1) angle = angle - (grading(1)*depth + grading(2)*(1 - depth))*sin(angle)
             mesh%r(j, i) = radius*sin(angle)
             mesh%z(j, i) = -radius*cos(angle)
          end do

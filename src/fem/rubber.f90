@@ -213,17 +213,20 @@ contains
       power = power + total/(2*viscosity)
    end subroutine add_viscous_stress
 
-   !> Adds the stresses of one Maxwell branch in the middle of a step, and takes its flow to the end.
+   !> Adds the mean stresses of the Maxwell branches over a step, and takes their flow to its end.
    !>
    !> The flow is known at the middles between the instants of the displacements, as velocities are:
-   !> the step is of second order.
+   !> the step is of second order. A branch that relaxes within a step is a viscosity.
    pure subroutine add_branch_stress(n, modulus, time, interval, keep, weight, f, cofactor, jacobian, flow, stress, energy, &
       power)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Shear modulus of the branch, Pa; relaxation time, s; length of the step, s.
-      real(wp), intent(in) :: modulus, time, interval
-      !> The flow is taken to the end of the step; otherwise it stays, to try forces only.
+      !> Shear moduli of the branches, Pa; relaxation times, s: [n_branch].
+      real(wp), intent(in) :: modulus(:), time(:)
+      !> Length of the step, s.
+      real(wp), intent(in) :: interval
+      !> The flow is taken to the end of the step; otherwise it stays, and the stresses are those that the
+      !> fastest motion meets, which turns round in each step, and the flow with it.
       logical, intent(in) :: keep
       !> Volumes of the points, undeformed, m3: [n, point].
       real(wp), intent(in) :: weight(n, n_point)
@@ -233,32 +236,51 @@ contains
       real(wp), intent(in) :: cofactor(n, n_component, n_point)
       !> Their determinants: [n, point].
       real(wp), intent(in) :: jacobian(n, n_point)
-      !> Flow Cv from half a step before to half a step after: [n, symmetric, point].
-      real(wp), intent(inout) :: flow(n, n_symmetric, n_point)
+      !> Flow Cv from half a step before to half a step after: [n, symmetric, point, branch].
+      real(wp), intent(inout) :: flow(n, n_symmetric, n_point, size(time))
       !> Stresses, Pa: [n, component, point].
       real(wp), intent(inout) :: stress(n, n_component, n_point)
-      !> Gets the energy of the branch added, J; gets the power dissipated added, W.
+      !> Gets the energy of the branches added, J; gets the power dissipated added, W.
       real(wp), intent(inout) :: energy, power
-      real(wp), dimension(n) :: excess, root, shrink
-      real(wp), dimension(n, n_symmetric) :: c, inverse, next
-      real(wp) :: ratio
-      integer :: g, k
+      real(wp) :: shrink(n)
+      real(wp), dimension(n, n_symmetric) :: c, inverse, pull
+      real(wp), dimension(size(time)) :: ratio, part, effective
+      real(wp) :: stored
+      integer :: b, g
 
-      ratio = min(interval/time, max_steps_over_time)
+      ratio = interval/time
+      part = get_part_to_mean(ratio)
+      effective = modulus
+      if (.not. keep) effective = modulus*(1 + tanh(ratio/2))
       do g = 1, n_point
          call get_isochoric(n, f(:, :, g), jacobian(:, g), shrink, c)
-         call get_unimodular_inverse(n, flow(:, :, g) + (exp(ratio/2) - 1)*c, inverse)
-         call add_spring_stress(n, modulus, time, weight(:, g), f(:, :, g), cofactor(:, :, g), jacobian(:, g), shrink, c, &
-            inverse, stress(:, :, g), energy, power, excess)
-         if (.not. keep) cycle
-         ! At large strain the rate of the norm counts too, in the second order of the step.
-         next = flow(:, :, g) + spread(exp(ratio) - 1 + excess*ratio**2/2, 2, n_symmetric)*c
-         call get_inverse_cube_root(n, (next(:, 1)*next(:, 2) - next(:, 4)**2)*next(:, 3), root)
-         do k = 1, n_symmetric
-            flow(:, k, g) = next(:, k)*root
+         pull = 0.0_wp
+         do b = 1, size(time)
+            call get_unimodular_inverse(n, part(b), c, flow(:, :, g, b), inverse)
+            stored = 0.0_wp
+            call add_spring_pull(n, effective(b), time(b), weight(:, g), c, inverse, pull, stored, power)
+            ! Of the mean stress: so work, energy and loss of a linear branch add up over the steps.
+            energy = energy + stored*(1 + part(b))*(1 + exp(-ratio(b)))/2
+            if (keep) call let_flow(n, min(ratio(b), max_steps_over_time), c, inverse, flow(:, :, g, b))
          end do
+         call add_pull(n, shrink, c, pull, f(:, :, g), cofactor(:, :, g), jacobian(:, g), stress(:, :, g))
       end do
    end subroutine add_branch_stress
+
+   !> Growth exp(t/time) - 1 at the instant t of a step at which a decaying stress equals its mean over
+   !> the step: x/(1 - exp(-x)) - 1.
+   pure elemental function get_part_to_mean(ratio) result(part)
+      !> Length of the step over the relaxation time, x.
+      real(wp), intent(in) :: ratio
+      real(wp) :: part
+
+      if (ratio < 1.0e-3_wp) then
+         ! Series, where the difference would lose digits; off by x**4/720.
+         part = ratio/2 + ratio**2/12
+      else
+         part = ratio/(1 - exp(-ratio)) - 1
+      end if
+   end function get_part_to_mean
 
    !> Isochoric right Cauchy-Green tensors at one Gauss point.
    pure subroutine get_isochoric(n, f, jacobian, shrink, c)
@@ -286,18 +308,23 @@ contains
       end do
    end subroutine get_isochoric
 
-   !> Inverses of symmetric tensors, these scaled to the determinant 1.
-   pure subroutine get_unimodular_inverse(n, tensor, inverse)
+   !> Inverse of the flow within a step, of determinant 1.
+   pure subroutine get_unimodular_inverse(n, part, c, flow, inverse)
       !> Number of elements.
       integer, intent(in) :: n
-      !> The tensors: [n, symmetric].
-      real(wp), intent(in) :: tensor(n, n_symmetric)
-      !> Their inverses: [n, symmetric].
+      !> Weight of the deformation beside the flow.
+      real(wp), intent(in) :: part
+      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
+      real(wp), intent(in) :: c(n, n_symmetric)
+      !> Flow Cv at the beginning of the step: [n, symmetric].
+      real(wp), intent(in) :: flow(n, n_symmetric)
+      !> The inverse: [n, symmetric].
       real(wp), intent(out) :: inverse(n, n_symmetric)
-      real(wp) :: determinant(n), root(n)
+      real(wp) :: determinant(n), root(n), tensor(n, n_symmetric)
       real(wp) :: scale
       integer :: j
 
+      tensor = flow + part*c
       determinant = (tensor(:, 1)*tensor(:, 2) - tensor(:, 4)**2)*tensor(:, 3)
       call get_inverse_cube_root(n, determinant, root)
       ! Adjugate over determinant, with the norm of the tensor removed.
@@ -311,54 +338,108 @@ contains
       end do
    end subroutine get_unimodular_inverse
 
-   !> Adds the stresses of the spring of a Maxwell branch at one Gauss point.
-   pure subroutine add_spring_stress(n, modulus, time, weight, f, cofactor, jacobian, shrink, c, inverse, stress, energy, &
-      power, excess)
+   !> Adds the pull of one Maxwell branch at one Gauss point, its energy and its loss.
+   pure subroutine add_spring_pull(n, modulus, time, weight, c, inverse, pull, energy, power)
       !> Number of elements.
       integer, intent(in) :: n
       !> Shear modulus, Pa; relaxation time, s.
       real(wp), intent(in) :: modulus, time
       !> Volumes of the points, undeformed, m3: [n].
       real(wp), intent(in) :: weight(n)
+      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
+      real(wp), intent(in) :: c(n, n_symmetric)
+      !> Inverse of the flow Cv: [n, symmetric].
+      real(wp), intent(in) :: inverse(n, n_symmetric)
+      !> Gets modulus times inverse added, Pa: [n, symmetric].
+      real(wp), intent(inout) :: pull(n, n_symmetric)
+      !> Gets the energy added, J; gets the power dissipated added, W.
+      real(wp), intent(inout) :: energy, power
+      real(wp) :: trace, square
+      integer :: j
+
+      !$omp simd private(trace, square) reduction(+:energy, power)
+      do j = 1, n
+         associate (i1 => inverse(j, 1), i2 => inverse(j, 2), i3 => inverse(j, 3), i4 => inverse(j, 4))
+            trace = c(j, 1)*i1 + c(j, 2)*i2 + c(j, 3)*i3 + 2*c(j, 4)*i4
+            square = (c(j, 1)*i1 + c(j, 4)*i4)**2 + (c(j, 2)*i2 + c(j, 4)*i4)**2 + (c(j, 3)*i3)**2 &
+               + 2*(c(j, 1)*i4 + c(j, 4)*i2)*(c(j, 4)*i1 + c(j, 2)*i4)
+            pull(j, 1) = pull(j, 1) + modulus*i1
+            pull(j, 2) = pull(j, 2) + modulus*i2
+            pull(j, 3) = pull(j, 3) + modulus*i3
+            pull(j, 4) = pull(j, 4) + modulus*i4
+            energy = energy + weight(j)*modulus/2*(trace - 3)
+            power = power + weight(j)*modulus/(2*time)*(square - trace**2/3)
+         end associate
+      end do
+   end subroutine add_spring_pull
+
+   !> Takes the flow of one Maxwell branch at one Gauss point to the end of a step.
+   pure subroutine let_flow(n, ratio, c, inverse, flow)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Length of the step over the relaxation time.
+      real(wp), intent(in) :: ratio
+      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
+      real(wp), intent(in) :: c(n, n_symmetric)
+      !> Inverse of the flow Cv within the step: [n, symmetric].
+      real(wp), intent(in) :: inverse(n, n_symmetric)
+      !> Flow Cv: [n, symmetric].
+      real(wp), intent(inout) :: flow(n, n_symmetric)
+      real(wp) :: determinant(n), root(n)
+      real(wp) :: growth, excess
+      integer :: j
+
+      growth = exp(ratio) - 1
+      !$omp simd private(excess)
+      do j = 1, n
+         ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, counts too, in the second order of the step.
+         excess = (c(j, 1)*inverse(j, 1) + c(j, 2)*inverse(j, 2) + c(j, 3)*inverse(j, 3) &
+            + 2*c(j, 4)*inverse(j, 4))/3 - 1
+         excess = growth + excess*ratio**2/2
+         flow(j, 1) = flow(j, 1) + excess*c(j, 1)
+         flow(j, 2) = flow(j, 2) + excess*c(j, 2)
+         flow(j, 3) = flow(j, 3) + excess*c(j, 3)
+         flow(j, 4) = flow(j, 4) + excess*c(j, 4)
+         determinant(j) = (flow(j, 1)*flow(j, 2) - flow(j, 4)**2)*flow(j, 3)
+      end do
+      call get_inverse_cube_root(n, determinant, root)
+      do j = 1, n_symmetric
+         flow(:, j) = flow(:, j)*root
+      end do
+   end subroutine let_flow
+
+   !> Adds the stresses of all branches at one Gauss point.
+   pure subroutine add_pull(n, shrink, c, pull, f, cofactor, jacobian, stress)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Determinants to the power -2/3: [n].
+      real(wp), intent(in) :: shrink(n)
+      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
+      real(wp), intent(in) :: c(n, n_symmetric)
+      !> Sum of moduli times inverses of the flow, Pa: [n, symmetric].
+      real(wp), intent(in) :: pull(n, n_symmetric)
       !> Deformation gradients: [n, component].
       real(wp), intent(in) :: f(n, n_component)
       !> Their cofactors: [n, component].
       real(wp), intent(in) :: cofactor(n, n_component)
       !> Their determinants: [n].
       real(wp), intent(in) :: jacobian(n)
-      !> Determinants to the power -2/3: [n].
-      real(wp), intent(in) :: shrink(n)
-      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
-      real(wp), intent(in) :: c(n, n_symmetric)
-      !> Inverse of the flow Cv: [n, symmetric].
-      real(wp), intent(in) :: inverse(n, n_symmetric)
       !> Stresses, Pa: [n, component].
       real(wp), intent(inout) :: stress(n, n_component)
-      !> Gets the energy added, J; gets the power dissipated added, W.
-      real(wp), intent(inout) :: energy, power
-      !> tr(Cbar Cv^-1)/3 - 1: [n].
-      real(wp), intent(out) :: excess(n)
-      real(wp) :: trace, square, coupling, factor
+      real(wp) :: factor
       integer :: j
 
-      !$omp simd private(trace, square, coupling, factor) reduction(+:energy, power)
+      !$omp simd private(factor)
       do j = 1, n
-         associate (i1 => inverse(j, 1), i2 => inverse(j, 2), i3 => inverse(j, 3), i4 => inverse(j, 4))
-            trace = c(j, 1)*i1 + c(j, 2)*i2 + c(j, 3)*i3 + 2*c(j, 4)*i4
-            excess(j) = trace/3 - 1
-            square = (c(j, 1)*i1 + c(j, 4)*i4)**2 + (c(j, 2)*i2 + c(j, 4)*i4)**2 + (c(j, 3)*i3)**2 &
-               + 2*(c(j, 1)*i4 + c(j, 4)*i2)*(c(j, 4)*i1 + c(j, 2)*i4)
-            coupling = modulus*shrink(j)
-            factor = -modulus*trace/(3*jacobian(j))
-            stress(j, 1) = stress(j, 1) + coupling*(f(j, 1)*i1 + f(j, 2)*i4) + factor*cofactor(j, 1)
-            stress(j, 2) = stress(j, 2) + coupling*(f(j, 1)*i4 + f(j, 2)*i2) + factor*cofactor(j, 2)
-            stress(j, 3) = stress(j, 3) + coupling*(f(j, 3)*i1 + f(j, 4)*i4) + factor*cofactor(j, 3)
-            stress(j, 4) = stress(j, 4) + coupling*(f(j, 3)*i4 + f(j, 4)*i2) + factor*cofactor(j, 4)
-            stress(j, 5) = stress(j, 5) + coupling*f(j, 5)*i3 + factor*cofactor(j, 5)
-            energy = energy + weight(j)*modulus/2*(trace - 3)
-            power = power + weight(j)*modulus/(2*time)*(square - trace**2/3)
+         associate (p1 => pull(j, 1), p2 => pull(j, 2), p3 => pull(j, 3), p4 => pull(j, 4), scale => shrink(j))
+            factor = -(c(j, 1)*p1 + c(j, 2)*p2 + c(j, 3)*p3 + 2*c(j, 4)*p4)/(3*jacobian(j))
+            stress(j, 1) = stress(j, 1) + scale*(f(j, 1)*p1 + f(j, 2)*p4) + factor*cofactor(j, 1)
+            stress(j, 2) = stress(j, 2) + scale*(f(j, 1)*p4 + f(j, 2)*p2) + factor*cofactor(j, 2)
+            stress(j, 3) = stress(j, 3) + scale*(f(j, 3)*p1 + f(j, 4)*p4) + factor*cofactor(j, 3)
+            stress(j, 4) = stress(j, 4) + scale*(f(j, 3)*p4 + f(j, 4)*p2) + factor*cofactor(j, 4)
+            stress(j, 5) = stress(j, 5) + scale*f(j, 5)*p3 + factor*cofactor(j, 5)
          end associate
       end do
-   end subroutine add_spring_stress
+   end subroutine add_pull
 
 end module thud_rubber

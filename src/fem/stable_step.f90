@@ -6,7 +6,7 @@
 !> forces. The direction is kept between calls, so that a few iterations follow the deforming ball.
 module thud_stable_step
    use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, no_failure
-   use thud_floor_contact, only: floor_contact_type
+   use thud_floor_contact, only: floor_contact_type, get_contact_stiffness
    use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -55,8 +55,8 @@ contains
       integer, intent(in) :: n_iteration
       !> Direction of the fastest motion, better after each call: the same shape.
       real(wp), intent(inout), contiguous :: direction(0:, 0:, :)
-      !> The growth; of the body from below, close after tens of iterations; of the springs of the floor from
-      !> above. Huge where there are no forces, or after an interrupt.
+      !> The growth; of the body from below, close after tens of iterations; of the floor from above. Huge where
+      !> there are no forces, or after an interrupt.
       real(wp), intent(out) :: growth
       real(wp), dimension(0:body%mesh%n_polar, 0:body%mesh%n_radial, 2) :: here, there, product
       real(wp) :: step, thickness
@@ -83,8 +83,8 @@ contains
          growth = sum(direction*product)
          direction = product/mass
       end do
-      ! The springs of the floor, by their maximum: some node may touch it at any time.
-      if (.not. contact%stops) growth = growth + interval**2*maxval(contact%stiffness/body%mass(:, last))
+      ! The floor, by its maximum: some node may touch it at any time.
+      growth = growth + interval**2*maxval(get_contact_stiffness(contact, position(:, last, 1))/body%mass(:, last))
    end subroutine find_growth
 
 end module thud_stable_step

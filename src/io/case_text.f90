@@ -5,7 +5,7 @@ module thud_case_text
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, newline, quoted, to_text
+   use thud_text, only: join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
    private
 
@@ -36,8 +36,14 @@ contains
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
+      case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
+      case%has_compression = any([(groups(i)%name == 'compression', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
+      if (.not. allocated(error) .and. (case%has_room .neqv. any([(groups(i)%name == 'floor', i=1, size(groups))]))) then
+        error = input_error('&floor and &room: one of them is given without the other; allowed: both, for the level in ' &
+         //'the room below')
+      end if
       do i = 1, merge(size(main_groups), 1, case%has_impact)
          if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
          case%left_out = trim(case%left_out)//' &'//main_groups(i)
@@ -94,7 +100,7 @@ contains
       do i = 1, size(groups)
          if (.not. any(fields%group == groups(i)%name)) then
             call get_suggestion(groups(i)%name, fields%group, suggestion)
-            error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line) &
+            error = input_error('&'//shortened(groups(i)%name)//' in line '//to_text(groups(i)%line) &
                //' is not a known group'//suggestion//'; allowed: '//join_quoted(distinct(fields%group)))
             return
          end if
@@ -123,7 +129,7 @@ contains
             is_meant = fields%group == group%name .and. fields%key == given%key
             if (.not. any(is_meant)) then
                call get_suggestion(given%key, pack(fields%key, fields%group == group%name), suggestion)
-               error = input_error('&'//group%name//': '//given%key//' in line '//to_text(given%line) &
+               error = input_error('&'//group%name//': '//shortened(given%key)//' in line '//to_text(given%line) &
                   //' is not a known key'//suggestion//'; allowed: ' &
                   //join_quoted(distinct(pack(fields%key, fields%group == group%name))))
             else if (any([(group%assignments(j)%key == given%key, j=1, i - 1)])) then

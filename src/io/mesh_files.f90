@@ -58,9 +58,9 @@ contains
       integer, intent(in) :: extents(3)
       real(wp) :: bytes
 
-      ! Three vectors and two scalars a node; four corners, an offset and a type an element; in base 64.
+      ! Three vectors and three scalars a node; four corners, an offset and a type an element; in base 64.
       associate (n => real(extents, wp))
-         bytes = n(3)*(2000 + 4*(88*n(1)*n(2) + 41*(n(1) - 1)*(n(2) - 1))/3)
+         bytes = n(3)*(2000 + 4*(96*n(1)*n(2) + 41*(n(1) - 1)*(n(2) - 1))/3)
       end associate
    end function estimate_motion_bytes
 
@@ -69,7 +69,7 @@ contains
       type(motion_type), intent(in) :: motion
       !> The files: [n_frame + 2].
       type(text_file_type), intent(out) :: files(:)
-      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), pressure(size(vector, 2), 2)
+      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), stress(size(vector, 2), 3)
       integer :: i, n_polar, n_radial
 
       n_polar = ubound(motion%start, 1)
@@ -79,31 +79,32 @@ contains
          vector(:, :, 1) = get_points(motion%position(:, :, 1, i) - motion%start(:, :, 1), &
             motion%position(:, :, 2, i) - motion%start(:, :, 2))
          vector(:, :, 2) = get_points(motion%velocity(:, :, 1, i), motion%velocity(:, :, 2, i))
-         pressure = 0.0_wp
-         pressure(size(pressure, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
-         pressure(:n_polar + 1, 2) = motion%cavity_pressure(i)
+         stress = 0.0_wp
+         stress(size(stress, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
+         stress(size(stress, 1) - n_polar:, 2) = motion%contact_shear(:, i)
+         stress(:n_polar + 1, 3) = motion%cavity_pressure(i)
          call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), &
             get_cells(n_polar, n_radial, 1), quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
-            [character(len=16) :: 'contact_pressure', 'cavity_pressure'], pressure, files(i)%content)
+            [character(len=16) :: 'contact_pressure', 'contact_shear', 'cavity_pressure'], stress, files(i)%content)
       end do
       files(motion%n_frame + 1:)%name = motion_names
       call get_pvd(files(:motion%n_frame)%name, motion%time(:motion%n_frame), files(motion%n_frame + 1)%content)
       call get_pressure_csv(motion, files(motion%n_frame + 2)%content)
    end subroutine get_motion_files
 
-   !> Pressures on the floor, one line for each snapshot and node that touches it.
+   !> Pressures on the floor and its radial stresses, one line for each snapshot and node that touches it.
    subroutine get_pressure_csv(motion, text)
       type(motion_type), intent(in) :: motion
       !> Text of `pressure.csv`.
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
-      text = 'time_s,radius_m,pressure_Pa'//newline
+      text = 'time_s,radius_m,pressure_Pa,shear_Pa'//newline
       do i = 1, motion%n_frame
          do j = 0, ubound(motion%contact_pressure, 1)
             if (.not. motion%contact_pressure(j, i) > 0.0_wp) cycle
             text = text//to_text(motion%time(i))//','//to_text(motion%position(j, ubound(motion%position, 2), 1, i))//',' &
-               //to_text(motion%contact_pressure(j, i))//newline
+               //to_text(motion%contact_pressure(j, i))//','//to_text(motion%contact_shear(j, i))//newline
          end do
       end do
    end subroutine get_pressure_csv

@@ -3,7 +3,7 @@
 !> which key holds a bad value.
 module thud_namelist_text
    use thud_error, only: error_type, input_error
-   use thud_text, only: lower_case, newline, replaced, to_text
+   use thud_text, only: lower_case, newline, replaced, shortened, to_text
    implicit none (type, external)
    private
 
@@ -140,7 +140,7 @@ contains
       if (closed) then
          if (structure(finish:finish) == '&') closed = index(structure(finish:)//' ', '&end') == 1
       end if
-      if (.not. closed) error = input_error('&'//group%name//' in line '//to_text(group%line) &
+      if (.not. closed) error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line) &
          //" is not terminated; allowed: a '/' at the end of the group")
    end subroutine find_group
 
@@ -164,7 +164,7 @@ contains
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
          call get_value(clean(start:finish), given%value)
          error = input_error('&'//group%name//' in line '//to_text(group%line)//": '" &
-            //given%value//"' is not an assignment; allowed: 'key = value'")
+            //shortened(given%value)//"' is not an assignment; allowed: 'key = value'")
          return
       end if
       do while (key_start <= finish)

@@ -2,6 +2,7 @@
 module thud_report
    use thud_band, only: octave_count
    use thud_case, only: case_type
+   use thud_compression, only: compression_type
    use thud_compute, only: get_judged_force, is_conforming, verdict_type
    use thud_constants, only: version
    use thud_force_history, only: force_count, force_history_type, force_names, get_scalars, scalar_fields
@@ -11,7 +12,7 @@ module thud_report
    implicit none (type, external)
    private
 
-   public :: get_channels_csv, get_force_csv, get_levels_csv, get_summary, get_word
+   public :: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary, get_word
 
    !> Format of a row of numbers: every bit of them, 25 characters each with its comma.
    character(len=*), parameter :: csv_form = '(*(es24.16e3,:,","))'
@@ -51,6 +52,22 @@ contains
          at = at + len(row)
       end do
    end function get_force_csv
+
+   !> Force against deflection of a slow compression, 17 digits.
+   function get_compression_csv(compression) result(text)
+      type(compression_type), intent(in) :: compression
+      !> Text of `compression.csv`.
+      character(len=:), allocatable :: text
+      character(len=50) :: row
+      integer :: i
+
+      text = 'deflection_m,force_N'//newline
+      do i = 1, size(compression%force)
+         write (row, csv_form) compression%deflection(i), compression%force(i)
+         row(len(row):) = newline
+         text = text//row
+      end do
+   end function get_compression_csv
 
    !> Channels of the model against time, 17 digits.
    function get_channels_csv(history) result(text)

@@ -2,17 +2,18 @@
 module thud_run
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
-   use thud_compute, only: compute_case, is_conforming, judge_case, results_type
+   use thud_compute, only: compute_case, is_conforming, judge_case, predict_room, results_type
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
    use thud_file, only: get_file_stem, read_text_file, text_file_type
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
-   use thud_report, only: get_channels_csv, get_force_csv, get_levels_csv, get_summary
+   use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
+   use thud_room_report, only: get_room_csv, get_room_table
    use thud_system, only: get_free_bytes
-   use thud_table, only: get_defaults_line, get_modes_table, get_table
+   use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
    implicit none (type, external)
    private
@@ -24,6 +25,11 @@ module thud_run
 
    !> File of models with channels.
    character(len=*), parameter :: channel_file = 'channels.csv'
+
+   !> File of cases with a room below.
+   character(len=*), parameter :: room_file = 'room_levels.csv'
+   !> File of a slow compression.
+   character(len=*), parameter :: compression_file = 'compression.csv'
 
    !> The full input, which says whose results a directory holds.
    character(len=*), parameter :: input_file = 'effective.nml'
@@ -114,6 +120,8 @@ contains
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
+      if (case%has_room .and. .not. allocated(error)) call predict_room(case, results%history%floor_force, &
+         results%history%sample_rate, results%room, error)
       if (allocated(error)) return
       call describe(case, results, files, outcome)
       call write_results(outcome%directory, input, files, differs, error)
@@ -150,6 +158,7 @@ contains
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> Gets table and verdict.
       type(outcome_type), intent(inout) :: outcome
+      character(len=:), allocatable :: room_table
       integer :: at
 
       allocate (files(count_files(case, results)))
@@ -166,7 +175,12 @@ contains
       if (.not. case%has_impact) return
       associate (history => results%history, verdict => results%verdict)
          outcome%conforms = is_conforming(case, verdict)
-         outcome%table = outcome%table//newline//get_table(case, history, verdict)//get_defaults_line(case)
+         outcome%table = outcome%table//newline//get_table(case, history, verdict)
+         if (case%has_room) then
+            call get_room_table(case, results%room, room_table)
+            outcome%table = outcome%table//newline//room_table
+         end if
+         outcome%table = outcome%table//get_defaults_line(case)
          files(at + 1:at + size(file_names))%name = file_names
          files(at + 1)%content = get_force_csv(history)
          files(at + 2)%content = get_levels_csv(case, verdict)
@@ -178,6 +192,17 @@ contains
             files(at)%content = get_channels_csv(history)
          end if
       end associate
+      if (case%has_room) then
+         at = at + 1
+         files(at)%name = room_file
+         call get_room_csv(results%room, files(at)%content)
+      end if
+      if (case%has_compression) then
+         at = at + 1
+         files(at)%name = compression_file
+         files(at)%content = get_compression_csv(results%compression)
+         outcome%table = outcome%table//newline//get_compression_table(results%compression)
+      end if
       if (results%history%motion%n_frame > 0) call get_motion_files(results%history%motion, files(at + 1:))
    end subroutine describe
 
@@ -192,6 +217,8 @@ contains
       if (.not. case%has_impact) return
       n_file = n_file + size(file_names)
       if (allocated(results%history%channel)) n_file = n_file + 1
+      if (case%has_room) n_file = n_file + 1
+      if (case%has_compression) n_file = n_file + 1
       if (results%history%motion%n_frame > 0) n_file = n_file + results%history%motion%n_frame + size(motion_names)
    end function count_files
 

@@ -58,8 +58,9 @@ contains
 
       call load_case(path, case, error, unchecked=.true.)
       if (allocated(error)) return
-      ! Free modes are the same for all.
+      ! Sets are of drops.
       case%has_modes = .false.
+      case%has_compression = .false.
       if (.not. case%has_impact) error = input_error(path//': &model is missing; allowed: sets of a case ' &
          //'with a source model')
       if (allocated(error)) return

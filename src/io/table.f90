@@ -2,6 +2,7 @@
 module thud_table
    use thud_band, only: get_band_name, octave_count
    use thud_case, only: case_type
+   use thud_compression, only: compression_type
    use thud_compute, only: get_judged_force, verdict_type
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type
@@ -12,7 +13,7 @@ module thud_table
    implicit none (type, external)
    private
 
-   public :: get_defaults_line, get_force_title, get_modes_table, get_span_row, get_table
+   public :: get_defaults_line, get_compression_table, get_force_title, get_modes_table, get_span_row, get_table
 
 contains
 
@@ -105,6 +106,20 @@ contains
             //right(to_text(modes%harmonic(i)), 11)//right(fixed(modes%participation(i), 3), 16)//newline
       end do
    end function get_modes_table
+
+   !> The slow compression on the screen: its end, and the secant stiffness at its beginning and end.
+   function get_compression_table(compression) result(text)
+      type(compression_type), intent(in) :: compression
+      character(len=:), allocatable :: text
+
+      associate (deflection => compression%deflection, force => compression%force, n => size(compression%force))
+         text = '  slow compression between plates'//newline &
+            //row('maximum deflection', 1.0e3_wp*deflection(n), 2, 'mm') &
+            //row('force there', force(n), 1, 'N') &
+            //row('secant stiffness', force(n)/deflection(n)/1.0e3_wp, 2, 'kN/m') &
+            //row('at the first point', force(2)/deflection(2)/1.0e3_wp, 2, 'kN/m')
+      end associate
+   end function get_compression_table
 
    !> One number of the table, with its limits where there are any.
    function row(name, value, decimals, unit, criterion, scale) result(text)

@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
+   public :: dgbsv, dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
 
    interface
       !> Generalised symmetric eigenproblem.
@@ -105,6 +105,16 @@ module thud_lapack
          real(wp), intent(inout) :: ab(ldab, *)
          integer, intent(out) :: info
       end subroutine dpbtrf
+
+      !> Solution with a general banded matrix.
+      pure subroutine dgbsv(n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: n, kl, ku, nrhs, ldab, ldb
+         integer, intent(out) :: ipiv(*)
+         integer, intent(out) :: info
+         real(wp), intent(inout) :: ab(ldab, *), b(ldb, *)
+      end subroutine dgbsv
 
       !> Cholesky factor of a small matrix.
       pure subroutine dpotf2(uplo, n, a, lda, info)

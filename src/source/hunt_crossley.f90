@@ -35,6 +35,7 @@ module thud_hunt_crossley
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: solve
+      procedure, pass(options) :: compress
    end type hunt_crossley_type
 
    !> Equation of motion M z'' = -F with F = k d^n (1 + 3/2 alpha d').
@@ -220,6 +221,23 @@ contains
       length = contact_time*impact_velocity/time
       stiffness = mass*impact_velocity**2/length**(exponent + 1)
    end function get_stiffness
+
+   !> Force on each of two plates that press the source slowly: k (deflection/2)^n.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The source, of which nothing counts.
+      type(ball_type), intent(in) :: ball
+      class(hunt_crossley_type), intent(in) :: options
+      !> Approach of the plates, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The stiffness hangs on a drop.
+      type(error_type), allocatable, intent(out) :: error
+
+      force = options%stiffness*(deflection/2)**options%exponent
+      if (.not. options%stiffness > 0.0_wp) error = input_error('&hunt_crossley: stiffness = 0 is not allowed with ' &
+         //'&compression, as contact_time gives one for a drop only; allowed: above 0, without contact_time')
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)

@@ -20,6 +20,8 @@ module thud_motion
       real(wp), allocatable :: velocity(:, :, :, :)
       !> Pressure on the floor at the nodes of the outer surface, Pa: [0:n_polar, capacity].
       real(wp), allocatable :: contact_pressure(:, :)
+      !> Radial stress of the floor on the same nodes, positive outwards, Pa: the same shape.
+      real(wp), allocatable :: contact_shear(:, :)
       !> Overpressure of the gas, Pa: [capacity].
       real(wp), allocatable :: cavity_pressure(:)
    end type motion_type
@@ -38,13 +40,14 @@ contains
 
       n_polar = ubound(start, 1)
       n_radial = ubound(start, 2)
-      allocate (motion%time(capacity), motion%cavity_pressure(capacity), motion%contact_pressure(0:n_polar, capacity))
+      allocate (motion%time(capacity), motion%cavity_pressure(capacity))
+      allocate (motion%contact_pressure(0:n_polar, capacity), motion%contact_shear(0:n_polar, capacity))
       allocate (motion%start(0:n_polar, 0:n_radial, 2), source=start)
       allocate (motion%position(0:n_polar, 0:n_radial, 2, capacity), motion%velocity(0:n_polar, 0:n_radial, 2, capacity))
    end function new_motion
 
    !> Adds a snapshot where there is space for one.
-   pure subroutine take_snapshot(motion, time, position, velocity, contact_pressure, cavity_pressure)
+   pure subroutine take_snapshot(motion, time, position, velocity, contact_stress, cavity_pressure)
       type(motion_type), intent(inout) :: motion
       !> Time since the record began, s.
       real(wp), intent(in) :: time
@@ -52,8 +55,8 @@ contains
       real(wp), intent(in) :: position(0:, 0:, :)
       !> Velocities of the nodes, m/s: the same shape.
       real(wp), intent(in) :: velocity(0:, 0:, :)
-      !> Pressures on the floor at the nodes of the outer surface, Pa: [0:n_polar].
-      real(wp), intent(in) :: contact_pressure(0:)
+      !> Stresses of the floor on the nodes of the outer surface, outwards and upwards, Pa: [0:n_polar, 2].
+      real(wp), intent(in) :: contact_stress(0:, :)
       !> Overpressure of the gas, Pa.
       real(wp), intent(in) :: cavity_pressure
 
@@ -63,7 +66,8 @@ contains
          motion%time(i) = time
          motion%position(:, :, :, i) = position
          motion%velocity(:, :, :, i) = velocity
-         motion%contact_pressure(:, i) = contact_pressure
+         motion%contact_shear(:, i) = contact_stress(:, 1)
+         motion%contact_pressure(:, i) = contact_stress(:, 2)
          motion%cavity_pressure(i) = cavity_pressure
       end associate
    end subroutine take_snapshot

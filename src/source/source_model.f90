@@ -25,6 +25,7 @@ module thud_source_model
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
       procedure, pass(options) :: get_loss_factors
+      procedure, pass(options) :: compress
    end type source_model_type
 
    abstract interface
@@ -109,5 +110,22 @@ contains
       loss_factor = 0.0_wp
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
+
+   !> Force on each of two plates that press the ball slowly, of models that have one; others refuse.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> The options, checked.
+      class(source_model_type), intent(in) :: options
+      !> Approach of the plates, ascending from 0, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The model has no static compression, or the ball cannot be pressed so far.
+      type(error_type), allocatable, intent(out) :: error
+
+      force = 0.0_wp
+      error = input_error('&model: name: this model has no static compression; allowed: one that has')
+   end subroutine compress
 
 end module thud_source_model

@@ -24,7 +24,6 @@ DENSITY = MASS / (4 / 3 * np.pi * (RADIUS**3 - (RADIUS - WALL) ** 3))
 VELOCITY = np.sqrt(2 * 9.81 * 1.0)
 THROUGH, ALONG = 5, 64
 SLAB_HOLE, SLAB_RADIUS, SLAB_THICKNESS = 1e-3, 0.1, 0.01
-PENALTY = 1e9
 # CalculiX expands axisymmetric elements to a wedge of two degrees and prints its sums.
 WEDGES = 180
 # It gives no initial velocity to the nodes of that wedge; a short gravity launches the ball.
@@ -112,7 +111,7 @@ def floor_lines() -> list[str]:
     ]
 
 
-def calculix_deck(increment: float, duration: float, alpha: float) -> str:
+def calculix_deck(increment: float, duration: float, alpha: float, penalty: float) -> str:
     """Return the input of CalculiX."""
     shear, bulk = MODULUS / (2 * (1 + POISSON)), MODULUS / (3 * (1 - 2 * POISSON))
     return "\n".join([
@@ -128,7 +127,7 @@ def calculix_deck(increment: float, duration: float, alpha: float) -> str:
         "*DENSITY", "7850",
         "*SOLID SECTION, ELSET=FLOOR, MATERIAL=STEEL",
         "*SURFACE INTERACTION, NAME=HARD",
-        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{PENALTY:g}",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{penalty:g}",
         "*CONTACT PAIR, INTERACTION=HARD, TYPE=SURFACE TO SURFACE", "OUTSIDE, TOP",
         "*STEP, NLGEOM", "*DYNAMIC, DIRECT, ALPHA=0", f"{LAUNCH:g}, {LAUNCH:g}",
         "*DLOAD", f"BALL, GRAV, {VELOCITY / LAUNCH:.12g}, 0, -1, 0",
@@ -158,7 +157,11 @@ def read_totals(text: str) -> list[np.ndarray]:
 
 
 def calculix_impact(
-    directory: Path, increment: float = 1e-4, duration: float = 0.03, alpha: float = -0.05
+    directory: Path,
+    increment: float = 1e-4,
+    duration: float = 0.03,
+    alpha: float = -0.05,
+    penalty: float = 1e9,
 ) -> Impact:
     """Return the impact of the ball on the floor as CalculiX computes it.
 
@@ -170,6 +173,8 @@ def calculix_impact(
         Fixed time increment and end of the analysis, in seconds.
     alpha : float
         Numerical damping of the implicit method (Hilber, Hughes and Taylor), from -1/3 to 0.
+    penalty : float
+        Pressure over penetration of the floor, in Pa/m: a layer of that stiffness.
 
     Raises
     ------
@@ -182,7 +187,7 @@ def calculix_impact(
     if executable is None:
         message = "ccx is not installed"
         raise CompetitorMissingError(message)
-    deck = calculix_deck(increment, duration, alpha)
+    deck = calculix_deck(increment, duration, alpha, penalty)
     (directory / "impact.inp").write_text(deck, encoding="ascii")
     subprocess.run(
         [executable, "impact"], cwd=directory, check=False, stdout=subprocess.DEVNULL,

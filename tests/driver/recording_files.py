@@ -100,6 +100,10 @@ def _matlab(*, packed: bool) -> Writer:
     return write
 
 
+def _structure(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
+    scipy.io.savemat(path, {"plate": {"Force": values, "Fs": rate, "unit": unit}})
+
+
 def _matlab73(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
     with h5py.File(path, "w", userblock_size=512) as file:
         file["Force"] = values[np.newaxis]
@@ -148,6 +152,7 @@ WITH_UNIT: dict[str, Writer] = {
     "binary.uff": _universal(1),
     "plain.mat": _matlab(packed=False),
     "packed.mat": _matlab(packed=True),
+    "structure.mat": _structure,
     "v73.mat": _matlab73,
     "plate.tdms": _tdms,
 }

@@ -75,6 +75,22 @@ def test_names_are_plain_text(name: str) -> None:
         thud.solve_case(thud.Case(name=name))
 
 
+@pytest.mark.parametrize("name", ["a" + 300 * " " + "b", "a" * 129, "a\\b", "a/b"])
+def test_name_is_refused_and_not_cut(case_file: Callable[..., Path], name: str) -> None:
+    with pytest.raises(thud.InputError, match="&case: name"):
+        thud.read_case(case_file(f"&case\n name = '{name}'\n/\n&model /\n"))
+
+
+def test_long_value_does_not_hide_what_is_allowed(case_file: Callable[..., Path]) -> None:
+    long = 2000 * "x"
+    for text in (f"&model name = '{long}' /", f"&{long} /", f"&ball {long} = 1 /"):
+        with pytest.raises(thud.InputError) as refused:
+            thud.read_case(case_file(f"{text}\n"))
+        sentence = str(refused.value)
+        assert "allowed: " in sentence
+        assert 81 * "x" not in sentence
+
+
 def test_errors_of_a_file_name_the_file(case_file: Callable[..., Path]) -> None:
     path = case_file("&ball mass = 'x' / &drop / &model /")
     with pytest.raises(thud.InputError) as caught:

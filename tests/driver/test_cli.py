@@ -116,6 +116,7 @@ def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> N
 def test_figures_of_the_paper(tmp_path: Path) -> None:
     assert cli.main(["figures", "-q", "-o", "drawn"]) == 0
     names = (
+        "compression",
         *("figure2_force_history", "figure3_levels", "figure4_free_modes", "figure5_motion"),
         *("finite_element_force", "finite_element_levels", "loss_factor"),
         *("modal_families", "momentum_flux"),

@@ -24,7 +24,9 @@ MASS = {"mass": {"low": 2.4, "high": 2.6}}
 
 @cache
 def impact() -> thud.Impact:
-    return thud.solve(thud.Ball.standard(), model="finite_element")
+    return thud.solve(
+        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+    )
 
 
 def results() -> list[Displayed]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import subprocess
 import sys
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -12,6 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import thud
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 FLUX = ["momentum_balance", "retarding", "conservative", "none"]
 
@@ -303,3 +307,23 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
     found = subprocess.run(command, check=True, capture_output=True, text=True)
     # One chunk's results are 20 000 * (6 + 2 * 5 + 10) * 8 B = 4 MB.
     assert int(found.stdout) < 8 * 1024
+
+
+@pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
+def test_processes_that_start_after_threads_go_on(method: str, tmp_path: Path) -> None:
+    """A forked process has none of the threads that its parent had started."""
+    script = tmp_path / "script.py"
+    script.write_text(f"""
+import multiprocessing
+import thud
+
+def peaks(_):
+    return thud.solve_many({{"mass": [2.4, 2.5]}}, threads=2).peak_force.tolist()
+
+if __name__ == "__main__":
+    before = peaks(0)
+    with multiprocessing.get_context("{method}").Pool(2) as pool:
+        assert pool.map(peaks, range(4)) == 4 * [before]
+    assert peaks(0) == before
+""")
+    subprocess.run([sys.executable, script], check=True, timeout=60)

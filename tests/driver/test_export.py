@@ -20,8 +20,8 @@ import thud
 from thud import export_force
 from thud.cli.export import EXPORT, KINDS
 from thud.export_force import EXPORTS, BlockedForce, blocked_force
+from thud.recordings.read_recording import read_recording
 from thud.recordings.reading import open_signals
-from thud.recordings.recording import read_recording
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -246,7 +246,6 @@ def test_missing_files_get_one_sentence(name: str, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def plate():  # noqa: ANN201 - a module
     """Return the example."""
-    pytest.importorskip("skfem", reason="scikit-fem, of the extra bench, is not installed")
     path = REPOSITORY / "docs/examples/plate_scikit_fem.py"
     spec = importlib.util.spec_from_file_location("plate_scikit_fem", path)
     module = importlib.util.module_from_spec(spec)

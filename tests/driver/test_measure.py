@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import pickle
 import subprocess
 import sys
 import tomllib
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +20,16 @@ from synthetic import make_recording
 
 import thud
 from thud import cli
+from thud.recordings import kept, measurement
 from thud.recordings.config import Config, read_config
+from thud.recordings.levels import measure_levels
+from thud.recordings.measurement import measure_window
 from thud.recordings.verdict import average_estimates
 from thud.report.data import report_data
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from thud.recordings.drops import Window
+    from thud.recordings.estimates import Drop
 
 FOLDER = REPOSITORY / "inputs/recordings"
 TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
@@ -65,7 +71,9 @@ def test_examples_are_measured_as_they_were_made(
 
 
 def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
-    impact = thud.solve(thud.Ball.standard(), model="finite_element")
+    impact = thud.solve(
+        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+    )
     random = np.random.default_rng(3)
     for quiet, noise, offset in ((0.01, 5.0, 0.0), (0.1, 5.0, 0.0), (0.1, 0.5, 12.0)):
         force = np.pad(impact.floor_force, int(quiet * impact.sample_rate)) + offset
@@ -77,7 +85,9 @@ def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
 
 
 def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
-    impact = thud.solve(thud.Ball.standard(), model="finite_element")
+    impact = thud.solve(
+        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+    )
     assert recorded(impact).conformity().verdict == "cannot be decided"
     verdict = recorded(impact, height=1.0, mass=2.5).conformity()
     assert verdict.verdict == "conforms"
@@ -185,7 +195,7 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             assert abs(found.value - truth) <= found.expanded
 
 
-NOT_GIVEN = "the uncertainty of the calibration is not given; it is not part of the uncertainties"
+NOT_COUNTED = "no uncertainty is given, and none counted, of: "
 
 
 def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:
@@ -198,7 +208,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
     file, table = FOLDER / "drop_1.wav", FOLDER / "drop_1.csv"
     unknown = thud.read_recording(file, calibration="5000 N/FS")
     assert unknown.calibration_uncertainty is None
-    assert NOT_GIVEN in unknown.remarks
+    assert f"{NOT_COUNTED}calibration" in unknown.remarks
     assert "calibration" not in parts(unknown, 0)
     config = replace(read_config(FOLDER / "lab.toml"), polarity=None)
     number = Config(calibration=1.0, calibration_uncertainty=0.005)
@@ -209,7 +219,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
         thud.read_recording(table, unit="V", config=number),
     ):
         assert known.calibration_uncertainty == 0.005
-        assert NOT_GIVEN not in known.remarks
+        assert not any("calibration" in remark for remark in known.remarks)
         assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
     with pytest.raises(thud.InputError, match="calibration_uncertainty = -1 is not allowed"):
         thud.read_recording(table, calibration_uncertainty=-1)
@@ -218,7 +228,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
 def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> None:
     known = example("drop_1.wav", tmp_path)
     unknown = example("drop_1.wav", tmp_path, ("f0_uncertainty = 0.005", "# "))
-    told = "the uncertainty of the resonance of the plate is not given"
+    told = f"{NOT_COUNTED}resonance of the plate"
     assert not any(told in remark for remark in known.remarks)
     assert any(told in remark for remark in unknown.remarks)
     assert parts(known, 4)["plate"] == pytest.approx(0.061, abs=2e-3)
@@ -241,6 +251,7 @@ def test_peaks_of_noise_that_were_counted_as_exact() -> None:
 
 def test_weights_of_the_restitution_hold_the_calibration() -> None:
     file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
+    config = replace(config, mass_uncertainty=None, height_uncertainty=None)
     for share in (0.0, 0.005, 0.5):
         recording = thud.read_recording(file, config=config, calibration_uncertainty=share)
         for drop in recording.drops:
@@ -250,10 +261,11 @@ def test_weights_of_the_restitution_hold_the_calibration() -> None:
             weight = other.uncertainty**2 / (by.uncertainty**2 + scale**2 + other.uncertainty**2)
             expected = weight * by.value + (1 - weight) * other.value
             assert drop.restitution.value == pytest.approx(expected, abs=1e-9)
-            assert drop.restitution_calibration == pytest.approx(weight * scale, rel=1e-9)
+            found = drop.restitution_shared.get("calibration", 0.0)
+            assert found == pytest.approx(weight * scale, rel=1e-9)
         budget = recording.quantities["restitution"].contributions
         shares = {part.name: part.uncertainty for part in budget}
-        mean = np.mean([drop.restitution_calibration for drop in recording.drops])
+        mean = np.mean([d.restitution_shared.get("calibration", 0.0) for d in recording.drops])
         assert shares.get("calibration", 0.0) == pytest.approx(mean)
 
 
@@ -287,3 +299,121 @@ def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> Non
     assert done.returncode == 1
     assert done.stderr.count("standard output: ") == 1
     assert (tmp_path / "out/report.json").exists()
+
+
+def test_interrupted_measurement_goes_on_where_it_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
+    folder = tmp_path / "results"
+    monkeypatch.setattr(kept, "INTERVAL", -1.0)
+    measured: list[str] = []
+
+    def measure(window: Window, config: Config) -> Drop:
+        if len(measured) == 2:
+            raise KeyboardInterrupt
+        measured.append(window.name)
+        return measure_window(window, config)
+
+    monkeypatch.setattr(measurement, "measure_window", measure)
+    with pytest.raises(KeyboardInterrupt):
+        thud.read_recording(file, config=config, keep=folder)
+    parts = sorted(folder.iterdir())
+    assert len(parts) == 2
+    # What is damaged or is no data is measured again, and nothing of it is called.
+    parts[0].write_bytes(pickle.dumps(Call(tmp_path / "called")))
+    measured.clear()
+    found = thud.read_recording(file, config=config, keep=folder)
+    assert [name[-1] for name in measured] == ["1", "3"]
+    assert not (tmp_path / "results").exists()
+    assert not (tmp_path / "called").exists()
+    measured.clear()
+    with pytest.raises(KeyboardInterrupt):
+        thud.read_recording(file, config=config, keep=folder)
+    measured.clear()
+    with pytest.raises(KeyboardInterrupt):
+        thud.read_recording(file, config=replace(config, mass=2.4), keep=folder)
+    assert len(measured) == 2
+    measured.clear()
+    monkeypatch.setattr(measurement, "measure_window", measure_window)
+    whole = thud.read_recording(file, config=config)
+    assert [one.contact_time for one in found.drops] == [one.contact_time for one in whole.drops]
+    np.testing.assert_array_equal(found.levels(), whole.levels())
+
+
+class Call:
+    """Something that is called when a pickle is read."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Return what is called, and its arguments."""
+        return Path.touch, (self.path,)
+
+
+def test_drops_that_held_more_than_their_force() -> None:
+    recording = thud.read_recording(FOLDER / "three_drops.flac", config=FOLDER / "lab.toml")
+    for drop in recording.drops:
+        known = drop.force.nbytes + drop.contact.covariance.nbytes
+        assert len(pickle.dumps(drop)) < known + 20_000
+
+
+def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
+    monkeypatch.setattr(measurement, "WORTH", 1)
+    one, two = (thud.read_recording(file, config=config, workers=n) for n in (1, 2))
+    assert [drop.name for drop in two.drops] == [drop.name for drop in one.drops]
+    np.testing.assert_allclose(two.levels(), one.levels(), rtol=0, atol=1e-9)
+
+
+def test_outliers_of_all_quantities_are_marked() -> None:
+    time = np.arange(0, 0.02, 1 / 24_000)
+    pulse = 1500 * np.sin(np.pi * time / 0.02)
+    longer = 1500 * np.sin(np.pi * np.arange(0, 0.021, 1 / 24_000) / 0.021)
+    pieces = [make_recording(pulse, 24_000, noise_db=60, seed=i)[0] for i in range(6)]
+    pieces.insert(3, make_recording(longer, 24_000, noise_db=60, seed=9)[0])
+    found = thud.Recording.from_array(np.concatenate(pieces), 24_000, height=1.0, mass=2.5)
+    marked = {outlier.quantity.split(",")[0] for outlier in found.outliers}
+    assert {"contact time", "restitution"} <= marked
+    assert {outlier.name for outlier in found.outliers} == {"recording, drop 4"}
+    assert len(found.drops) == 7
+    assert any("contact time, ms, 2" in remark for remark in found.remarks)
+
+
+def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> None:
+    lab = ("mass = 2.5", "mass = 2.5\nlow_pass = true")
+    plate = (
+        "f0_uncertainty = 0.005",
+        "f0_uncertainty = 1e-4\ntime_constant = 1\nfull_scale = 4e3\nlinearity = [[5, 5], [5e3, 5e3]] #",  # noqa: E501
+    )
+    usual, found = example("drop_1.wav", tmp_path), example("drop_1.wav", tmp_path, lab, plate)
+    drop = found.drops[0]
+    np.testing.assert_array_equal(found.levels(), measure_levels(drop, low_pass=True).level)
+    assert not np.array_equal(found.levels(), usual.levels())
+    assert any("low-pass, -3 dB at 1.25 kHz" in step for step in found.steps)
+    assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
+    told = [remark for remark in found.remarks if remark.startswith("force plate: ")]
+    assert len(told) == 2
+    assert "0.2 Hz" in told[0]
+    assert "4000 N" in told[1]
+
+
+def test_calibration_record_gives_lines_of_a_configuration(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    volt = np.repeat([0.0, 0.4, 0.0], 4000) + rng.normal(0, 1e-4, 12000)
+    rows = "\n".join(f"{i / 4000:.6f},{one:.6f}" for i, one in enumerate(volt))
+    (tmp_path / "weight.csv").write_text(f"Time [s],Force [V]\n{rows}\n")
+    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--mass", "10"]
+    assert cli.main([*arguments, "--uncertainty", "0.002"]) == 0
+    said = capsys.readouterr()
+    found = tomllib.loads(said.out)
+    assert float(found["calibration"].split()[0]) == pytest.approx(98.1 / 0.4, rel=1e-4)
+    assert found["calibration_uncertainty"] == pytest.approx(0.002, rel=0.05)
+    assert not said.err
+    assert cli.main(arguments) == 0
+    assert "not counted" in capsys.readouterr().err
+    assert cli.main(arguments[:2]) == 1
+    assert "force in N or mass in kg" in capsys.readouterr().err

@@ -121,12 +121,19 @@ def test_mode_shapes_are_named() -> None:
 
 
 def test_loss_factors_follow_their_laws() -> None:
-    laws = {law: thud.FiniteElement(viscosity=law) for law in ("kelvin_voigt", "constant_loss")}
+    laws = {
+        law: thud.FiniteElement(viscosity=law, loss_factor=0.2)
+        for law in ("kelvin_voigt", "constant_loss", "fractional")
+    }
     (axes,) = thud.plot.loss_factor(laws).axes
     assert axes.get_xlabel() == "Frequency, Hz"
-    rising, constant = (line.get_ydata() for line in axes.lines)
+    rising, constant, fractional = (line.get_ydata() for line in axes.lines)
     assert rising[-1] / rising[0] == pytest.approx(100)
     np.testing.assert_allclose(constant, 0.2, rtol=3e-3)
+    # From 10 to 1000 Hz: p sin x**0.3/(1 + p cos (x**0.3 - 1)) with x = f/74 Hz and p = 0.2/sin.
+    power = np.array([10 / 74, 1000 / 74]) ** 0.3
+    expected = 0.2 * power / (1 + 0.2 / np.tan(0.15 * np.pi) * (power - 1))
+    np.testing.assert_allclose(fractional[[0, -1]], expected, rtol=0.02)
 
 
 def test_figures_without_snapshots_are_refused(tmp_path: Path) -> None:

@@ -586,6 +586,32 @@ def test_long_tables_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert "260 MiB of text, which is read as a whole" in refusal(path)
 
 
+@pytest.mark.parametrize("packed", [False, True])
+def test_matlab_structures_are_read(packed: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    force, path = half_sine(48000.0), tmp_path / "ball.mat"
+    times = np.arange(len(force)) / 8000
+    lab = {
+        "unit": "N",
+        "one": {"Force": force, "Fs": 48000.0},
+        "two": {"Force": force[::-1], "t": times},
+    }
+    scipy.io.savemat(path, {"lab": lab, "Fs": 51200.0}, do_compression=packed)
+    one, two = open_signals(path)
+    assert [one.sample_rate, two.sample_rate] == pytest.approx([48000.0, 8000.0])
+    np.testing.assert_array_equal(one.read(0, one.n_sample), force)
+    np.testing.assert_array_equal(two.read(0, two.n_sample), force[::-1])
+    (chosen,) = open_signals(path, channel="lab/two/Force")
+    assert chosen.sample_rate == two.sample_rate
+    many = np.zeros(2, dtype=[("Force", "O")])
+    many["Force"][:] = [force, force]
+    scipy.io.savemat(path, {"lab": many}, do_compression=packed)
+    assert "lab is an array of structures" in refusal(path)
+    for _ in range(9):
+        lab = {"lab": lab}
+    scipy.io.savemat(path, lab)
+    assert "structures in more than 8 structures" in refusal(path)
+
+
 def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
     """A quarter of a gibibyte of zeros in a quarter of a mebibyte."""
     path = write_pulse(tmp_path, "packed.mat")

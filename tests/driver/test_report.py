@@ -28,8 +28,9 @@ from thud.levels import record_force
 from thud.plot.recording import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Drop, Estimate
-from thud.recordings.recording import Recording, read_recording
-from thud.report.data import level_budgets, read_date, report_data
+from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import Recording
+from thud.report.data import read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
 from thud.report.write import write_report
@@ -78,10 +79,10 @@ def remembered(measure: Any) -> Any:  # noqa: ANN401 - a function
     known: dict[Any, Any] = {}
 
     @functools.wraps(measure)
-    def measured(drop: Drop, *arguments: str) -> Any:  # noqa: ANN401
-        key = (drop.force.tobytes(), *arguments)
+    def measured(drop: Drop, *arguments: str, low_pass: bool) -> Any:  # noqa: ANN401
+        key = (drop.force.tobytes(), *arguments, low_pass)
         if key not in known:
-            known[key] = measure(drop, *arguments)
+            known[key] = measure(drop, *arguments, low_pass=low_pass)
         found = known[key]
         return found if isinstance(found, dict) else replace(found, name=drop.name)
 
@@ -459,18 +460,20 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
         bars = axes.containers[0]
         np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels(bands))
         half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]
-        np.testing.assert_allclose(half, [one.expanded for one in level_budgets(recording, bands)])
+        np.testing.assert_allclose(
+            half, [one.expanded for one in recording.level_quantities(bands)]
+        )
 
 
 def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
-    plate = PlateConfig(f0=1600.0, Q=20.0)
+    plate = PlateConfig(f0=1600.0, Q=20.0, f0_uncertainty=0.005)
     for recording in (one, many(one, 5), many(one, 5, plate=plate)):
         data = report_data(recording)
         found = data["levels"]["octave"]
         for i, decision in enumerate(recording.conformity().decisions[:5]):
             assert found["uncertainty"][i] == decision.quantity.uncertainty
             assert found["expanded_uncertainty"][i] == decision.quantity.expanded
-    octaves, thirds = (level_budgets(recording, bands) for bands in ("octave", "third"))
+    octaves, thirds = (recording.level_quantities(bands) for bands in ("octave", "third"))
     for budgets in (octaves, thirds):
         names = [part.name for part in budgets[-1].contributions]
         assert names[-2:] == ["calibration", "plate"]

@@ -210,6 +210,7 @@ MODELS = {
         "&mesh radial_elements = 2, polar_elements = 16 /",
     ),
     "hunt_crossley": ("contact_time", [0.018, 0.02, 0.022], ""),
+    "two_mass": ("belt_mass", [0.2, 1.0, 2.0], ""),
     "measured_modes": (
         "frequency(2)",
         [80.0, 89.0, 95.0],

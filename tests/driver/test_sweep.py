@@ -248,6 +248,60 @@ def test_modulus_is_that_of_the_reference_temperature() -> None:
     assert "degC" not in thud.sweep(study)["youngs_modulus"].attrs["long_name"]
 
 
+WLF = {"reference": 20, "c1": 8.0, "c2": 120.0}
+
+
+def shifted(model: str, temperature: float, **law: object) -> tuple[float, float]:
+    """Return modulus and loss factor that a study uses at a temperature."""
+    given = {
+        "fixed": {"model": model, "youngs_modulus": 2e6, **law},
+        "temperature": {**WLF, "coefficient": 0.003},
+        "parameters": {"temperature": {"values": [temperature]}},
+    }
+    study = sweep.KIND.read_study(given)
+    found = study.key_columns(study.parameter_columns(0, 1))
+    return float(found["youngs_modulus"][0]), float(found["loss_factor"][0])
+
+
+def test_temperature_shifts_the_frequency_of_the_loss() -> None:
+    # At 10 degC a = 10**(80/110): the material behaves as it would at a times the frequency.
+    factor = 10 ** (8 * 10 / 110)
+    law: dict[str, Any] = {
+        "viscosity": "fractional", "fractional_order": 0.4, "loss_factor": 0.1,
+    }  # fmt: skip
+    modulus, loss = shifted("finite_element", 10, **law)
+    pot = 0.1 / np.sin(0.2 * np.pi)
+    expected = 1 - pot * np.exp(0.2j * np.pi).real + pot * factor**0.4 * np.exp(0.2j * np.pi)
+    assert modulus == pytest.approx(0.97 * 2e6 * expected.real, rel=1e-12)
+    assert loss == pytest.approx(expected.imag / expected.real, rel=1e-12)
+    # The library's own law at the shifted frequency, within the error of its series.
+    ours = thud.loss_factors(thud.FiniteElement(**law), [74 * factor])[0]
+    assert loss == pytest.approx(ours, rel=0.01)
+    # The modal ball has the same law; Kelvin and Voigt's modulus does not depend on frequency.
+    del law["viscosity"]
+    assert shifted("modal_ball", 10, **law, damping_law="fractional") == (modulus, loss)
+    for model, word in (("finite_element", "viscosity"), ("modal_ball", "damping_law")):
+        viscous = {word: "kelvin_voigt" if word == "viscosity" else "rising", "loss_factor": 0.1}
+        modulus, loss = shifted(model, 10, **viscous)
+        assert modulus == pytest.approx(0.97 * 2e6, rel=1e-12)
+        assert loss == pytest.approx(0.1 * factor, rel=1e-12)
+    # At the reference nothing changes.
+    assert shifted("modal_ball", 20, **law, damping_law="fractional") == pytest.approx(
+        (2e6, 0.1), rel=1e-14
+    )
+
+
+def test_sets_below_the_range_of_the_shift_have_no_results() -> None:
+    study: dict[str, Any] = {
+        "fixed": {"model": "modal_ball", "damping_law": "rising"},
+        "temperature": WLF,
+        "parameters": {"temperature": {"values": [20, -100]}},
+    }
+    found = thud.sweep(study)
+    assert found["status"].values.tolist() == [0, 1]
+    assert "NaN" in str(found["reason"].values[1])
+
+
 def test_failing_sets_say_why_and_disturb_no_other() -> None:
     found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}})
     assert found["status"].values.tolist() == [0, 1, 2]
@@ -306,7 +360,8 @@ def test_blocks_take_about_half_a_second() -> None:
         return thud.read_study({**HEIGHTS, "fixed": fixed}).block_size
 
     assert size() > size(model="modal_ball") > 10
-    assert size(model="finite_element") == 2
+    assert size(model="finite_element", viscosity="kelvin_voigt") == 2
+    assert size(model="finite_element", viscosity="fractional") == 1
 
 
 def test_many_sets_need_a_word(tmp_path: Path) -> None:
@@ -400,6 +455,23 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("fixed.temperature = 1\nparameters.mass.values = [1]", r"temperature in \[parameters\]"),
         ("parameters.temperature.values = [1]", "allowed: reference, degC, and coefficient"),
         ("temperature.reference = 1\nparameters.temperature.values = [1]", "coefficient = None"),
+        (
+            "temperature = {reference=1, c1=8}\nparameters.temperature.values = [1]",
+            r"\[temperature\] c2 = None",
+        ),
+        (
+            "temperature = {reference=1, c1=8, c2=-1}\nparameters.temperature.values = [1]",
+            r"\[temperature\] c2 = -1 .*0 < c2",
+        ),
+        (
+            "temperature = {reference=1, c1=8, c2=100}\nparameters.temperature.values = [1]",
+            r"c1 cannot shift the loss of hollow_sphere",
+        ),
+        (
+            "fixed.model = 'modal_ball'\ntemperature = {reference=1, c1=8, c2=100}\n"  # noqa: ISC004
+            "parameters = {temperature.values=[1], damping_law.values=['rising']}",
+            r"c1 has no use where damping_law varies",
+        ),
         ("design.kind = 'cube'\nparameters.mass.values = [1]", "allowed: grid, list, random"),
         ("design.size = 3\nparameters.mass.values = [1]", "'size' is not known; allowed: kind"),
         ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*numbers from 1"),

@@ -15,6 +15,7 @@ names: tuple[thud.ModelName, ...] = ("hollow_sphere", "modal_ball")
 ball = thud.Ball(outer_radius=thud.quantity("8.9 cm"))
 impacts: dict[str, thud.Impact] = {name: thud.solve(ball, model=name) for name in names}
 lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
+tyre: thud.ModelOptions = thud.TwoMass(belt_mass=1.0)
 impacts["lumped"] = thud.solve(ball, thud.Drop(height=1.0), lumped)
 flagship = thud.solve(thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt")
 motion: thud.Motion | None = flagship.motion
@@ -31,6 +32,11 @@ again = (
 verdict: thud.Conformity = thud.judge([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
 missed: list[thud.Criterion] = [one for one in verdict.criteria if not one.conforms]
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count, polar_elements=16)
+press = thud.Compression(gas="isothermal")
+pressed: thud.CompressionCurve = thud.compress(ball, "modal_ball", points=5, gas=press.gas)
+modulus_fit: thud.CompressionFit = thud.fit_compression(
+    pressed.deflection, pressed.force, ball, "modal_ball", gas=press.gas
+)
 bands: thud.Bands = thud.get_bands("third")
 thirds = thud.force_exposure_levels(flagship.floor_force, flagship.sample_rate, "third", "fft")
 many: thud.Ensemble = thud.solve_many({"height": [0.5, 1.0]}, case, source=thud.Limits().source)
@@ -40,9 +46,25 @@ np.savetxt(folder / "record.csv", np.c_[np.arange(len(plate)) / flagship.sample_
 record: thud.Recording = thud.read_recording(folder / "record.csv", height=1.0, mass=2.5)
 page: thud.Comparison = thud.compare({**impacts, "record": record}, force="floor")
 cases = thud.read_all([folder / "mine.nml"])
-for figure in (flagship.plot(), record.plot("force"), thud.plot.levels(impacts), page.figure()):
+for figure in (
+    flagship.plot(),
+    pressed.plot(),
+    record.plot("force"),
+    thud.plot.levels(impacts),
+    page.figure(),
+):
     thud.plot.save(figure, folder / "figure.png")
-tables = flagship.to_dataframe().describe(), flagship.to_xarray().sizes, many.to_xarray().sizes
+tables = (
+    pressed.to_dataframe(),
+    flagship.to_dataframe().describe(),
+    flagship.to_xarray().sizes,
+    many.to_xarray().sizes,
+)
+floor, room = thud.Floor(thickness=0.2), thud.Room(volume=40.0)
+below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
+(folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
+site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
+rating: thud.Rating = thud.rating(thud.standardised_level(site.level, 0.6, 40.0))
 height = {"height": thud.Parameter(values=[0.5, 1.0])}
 mass = {"mass": thud.Parameter(low=2.4, high=2.6)}
 modulus = {"youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa")}
@@ -74,6 +96,9 @@ results = [
     chart,
     spread,
     shares,
+    below,
+    site,
+    rating,
     learned,
 ]
 print(*results, *missed, sep="\n")

@@ -36,7 +36,7 @@ def test_flagship_has_the_spectrum_of_the_standard(
         ({"radial_elements": 12, "polar_elements": 96}, 0.06, 0.2),
         ({"step_safety": 0.2}, 0.02, 0.04),
         ({"bulk_ratio": 1000}, 0.04, 0.04),
-        ({"treatment": "penalty"}, 0.02, 0.04),
+        ({"layer_stiffness": 1e11}, 0.02, 0.04),
     ],
 )
 def test_flagship_is_converged(options: dict[str, object], low: float, high: float) -> None:
@@ -64,8 +64,9 @@ def test_free_modes_of_the_paper(poisson_ratio: float, reference: list[float]) -
 
 
 def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
-    # At 0.2 m/s the ball deflects by 2 mm, 1/16 of its wall: large strain matters to a part of
-    # that. There is next to no gravity, which the modal ball leaves out.
+    # At 0.2 m/s the ball deflects by 2 mm, 1/16 of its wall. Large strain then takes 2 % off the
+    # static force (test_pressed_ball.py), which is 1 % of the contact time and 0.2 dB. There is
+    # next to no gravity, which the modal ball leaves out.
     gravity = 1e-3
     drop = thud.Drop(0.2**2 / (2 * gravity), gravity)
     ball = thud.Ball(poisson_ratio=0.495)
@@ -77,21 +78,46 @@ def test_slow_elastic_impact_is_that_of_the_modal_ball() -> None:
     assert finite.contact_time == pytest.approx(linear.contact_time, rel=0.016)
     assert finite.max_deflection == pytest.approx(linear.max_deflection, rel=0.016)
     assert finite.restitution == pytest.approx(linear.restitution, abs=0.004)
-    np.testing.assert_allclose(finite.levels()[0], linear.levels()[0], atol=0.2)
+    np.testing.assert_allclose(finite.levels()[0], linear.levels()[0], atol=0.25)
+
+
+def test_slow_impact_loses_what_the_modal_ball_of_the_same_law_loses() -> None:
+    # As above. The modal ball steps each mode exactly, by other equations. Nodes of the coarse mesh
+    # take energy when they are stopped, the same for every law: restitution 0.014 lower.
+    gravity = 1e-3
+    drop = thud.Drop(0.2**2 / (2 * gravity), gravity)
+    ball = thud.Ball(poisson_ratio=0.495)
+    low = []
+    for order in (0.15, 0.3, 1.0):
+        law = {"fractional_order": order, "loss_factor": 0.13}
+        linear = thud.solve(
+            ball, drop, "modal_ball", damping_law="fractional", substeps=4, **law
+        )  # fmt: skip
+        finite = thud.solve(
+            ball, drop, "finite_element", viscosity="fractional", snapshot_interval=0,
+            radial_elements=4, polar_elements=32, duration=0.06, **law,
+        )  # fmt: skip
+        assert finite.contact_time == pytest.approx(linear.contact_time, rel=0.025)
+        low.append(linear.restitution - finite.restitution)
+    # The laws themselves differ by 0.08.
+    assert np.ptp(low) < 0.002
+    assert max(low) < 0.016
 
 
 def test_undamped_ball_is_that_of_calculix() -> None:
-    # CalculiX 2.20, 5 x 64 quadratic elements, increment 0.02 ms, penalty 1e9 Pa/m, without gas and
-    # gravity (tests/bench/competitor_impact.py): 22.26 ms, e 0.9807 and these levels. Its impulse
-    # fixes the low octaves; above, its increment and penalty alone are worth 0.5 dB and more.
-    reference = np.array([37.80, 26.42, 21.29])
+    # CalculiX 2.20, 5 x 64 quadratic elements, increment 0.05 ms, penalty 4e9 Pa/m, without gas and
+    # gravity (tests/bench/competitor_impact.py): 22.20 ms, e 0.9805 and these levels. At 250 and
+    # 500 Hz 12 x 96 linear elements are 0.4 and 0.5 dB below their limit, and increments of 0.02 ms
+    # raise CalculiX by 0.1 dB.
+    reference = np.array([37.79, 26.38, 21.25, 20.72, 13.00])
     gravity = 1e-3
     drop = thud.Drop(9.81 / gravity, gravity)
     ball = thud.Ball(poisson_ratio=0.49, ambient_pressure=0)
     impact = thud.solve(
         ball, drop, "finite_element", viscosity="none", snapshot_interval=0,
-        radial_elements=16, polar_elements=128,
+        radial_elements=12, polar_elements=96, layer_stiffness=4e9,
     )  # fmt: skip
-    assert impact.contact_time == pytest.approx(22.26e-3, abs=0.1e-3)
-    assert impact.restitution == pytest.approx(0.9807, abs=0.002)
-    np.testing.assert_allclose(impact.levels()[:3], reference, atol=0.1)
+    # Release is a glancing contact.
+    assert impact.contact_time == pytest.approx(22.2e-3, rel=0.01)
+    assert impact.restitution == pytest.approx(0.9805, abs=0.002)
+    assert (abs(impact.levels() - reference) <= [0.1, 0.1, 0.1, 0.5, 0.65]).all()

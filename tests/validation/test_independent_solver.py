@@ -67,3 +67,78 @@ def test_agrees_with_dop853(ball: thud.Ball, height: float, choice: str) -> None
     assert impact.max_deflection == pytest.approx(largest, rel=1e-9)
     assert impact.restitution == pytest.approx(restitution, rel=1e-9)
     assert impact.impulse == pytest.approx(impulse, rel=1e-9)
+
+
+def tyre_reference(
+    options: thud.TwoMass, mass: float, v0: float
+) -> tuple[float, float, float, float, int]:
+    """Return contact time, largest deflection, restitution, impulse and number of contacts."""
+    m1, m2 = options.belt_mass, mass - options.belt_mass
+    w = 2 * np.pi * options.belt_frequency
+    stiffness, damping = m1 * w**2, 2 * options.belt_damping * m1 * w
+    patch = options.inflation_pressure * options.area_growth
+    carcass = options.carcass_stiffness / 0.02 ** (options.carcass_exponent - 1)
+
+    def right_hand_side(_: float, y: np.ndarray, touching: float) -> list[float]:
+        z1, v1, z2, v2, _impulse = y
+        d = max(z1, 0) * touching
+        force = patch * d + carcass * d**options.carcass_exponent
+        force *= max(1 + options.contact_damping * v1, 0)
+        sidewall = stiffness * (z2 - z1) + damping * (v2 - v1)
+        return [v1, (sidewall - force) / m1, v2, -sidewall / m2, force]
+
+    def crossing(_: float, y: np.ndarray, _touching: float) -> float:
+        return float(y[0])
+
+    def turning(_: float, y: np.ndarray, _touching: float) -> float:
+        return float(m1 * y[1] + m2 * y[3])
+
+    crossing.terminal = True  # type: ignore[attr-defined]
+    state, time, contact, largest, contacts = np.array([0, v0, 0, v0, 0.0]), 0.0, 0.0, 0.0, 0
+    touching = 1.0
+    while time < 0.3:
+        crossing.direction = -1 if touching else 1  # type: ignore[attr-defined]
+        found = solve_ivp(
+            right_hand_side, (time, 0.3), state, "DOP853", events=(crossing, turning),
+            args=(touching,), rtol=1e-12, atol=1e-13,
+        )  # fmt: skip
+        for y in found.y_events[1]:
+            largest = max(largest, (m1 * y[0] + m2 * y[2]) / mass)
+        state, time = found.y[:, -1], found.t[-1]
+        state[0] = 0.0 if found.status == 1 else state[0]
+        contacts += touching > 0
+        contact = time if touching else contact
+        touching = 1 - touching
+    return contact, largest, -float(m1 * state[1] + m2 * state[3]) / mass / v0, state[4], contacts
+
+
+@pytest.mark.parametrize(
+    ("options", "contacts"),
+    [
+        (thud.TwoMass(), 1),
+        (thud.TwoMass(belt_mass=0.3, belt_frequency=200, contact_damping=0.1), 1),
+        (
+            thud.TwoMass(
+                belt_mass=1.0,
+                area_growth=8,
+                belt_frequency=70,
+                belt_damping=0.01,
+                contact_damping=0.01,
+            ),
+            2,
+        ),
+    ],
+    ids=["tyre", "light belt", "bouncing belt"],
+)
+def test_tyre_agrees_with_dop853(options: thud.TwoMass, contacts: int) -> None:
+    impact = thud.solve(thud.Ball(mass=7.3), thud.Drop(0.85), options)
+    time, largest, restitution, impulse, found = tyre_reference(
+        options, 7.3, impact.impact_velocity
+    )
+    assert found >= contacts
+    assert impact.contact_time == pytest.approx(time, rel=1e-8)
+    # The largest of the steps, at most 2e-5 s apart.
+    assert impact.max_deflection == pytest.approx(largest, rel=1e-6)
+    assert impact.restitution == pytest.approx(restitution, rel=1e-8)
+    assert impact.impulse == pytest.approx(impulse, rel=1e-8)
+    assert impact.energy_residual < 1e-9

@@ -51,6 +51,34 @@ def test_bins_agree_with_the_integral() -> None:
             np.testing.assert_allclose(impact.levels(method="fft", force=force), exact, atol=0.15)
 
 
+def test_bins_of_random_pulses_differ_by_what_the_documentation_tells() -> None:
+    # docs/levels.md, from 1600 drops; these are some of the same ranges.
+    rng = np.random.default_rng(1)
+    worst: dict[str, list[float]] = {"models": [0, 0], "lumped": [0, 0]}
+    for _ in range(60):
+        ball = thud.Ball(
+            youngs_modulus=rng.uniform(1e6, 3e6), wall_thickness=rng.uniform(0.028, 0.036)
+        )
+        time, restitution, exponent = rng.uniform((0.016, 0.6, 1), (0.026, 0.95, 2.5))
+        lumped = thud.solve(
+            model="hunt_crossley", contact_time=time, restitution=restitution, exponent=exponent
+        )
+        shell = thud.solve(ball, thud.Drop(rng.uniform(0.2, 1.6)))
+        for kind, force in (
+            ("models", shell.floor_force),
+            ("models", shell.elastic_force),
+            ("lumped", lumped.floor_force),
+        ):
+            for i, bands in enumerate(("octave", "third")):
+                exact = thud.force_exposure_levels(force, 44100.0, bands)
+                bins = thud.force_exposure_levels(force, 44100.0, bands, method="fft")
+                worst[kind][i] = max(worst[kind][i], float(np.abs(exact - bins).max()))
+    # Near the limits, not only below them.
+    assert 0.1 < worst["models"][0] < 0.15
+    assert 0.4 < worst["models"][1] < 0.55
+    assert 0.1 < worst["lumped"][0] < 0.27
+
+
 def test_moved_record_has_the_same_levels() -> None:
     force = thud.solve().floor_force
     moved = np.concatenate([np.zeros(12345), force, np.zeros(77)])

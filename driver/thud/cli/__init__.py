@@ -11,11 +11,13 @@ from typing import TYPE_CHECKING, NoReturn
 
 from thud._api import version
 from thud.checks import suggestion
+from thud.cli.calibrate import CALIBRATE
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
+from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
 from thud.errors import InputError, ThudError
@@ -73,6 +75,7 @@ COMMANDS = {
         "nothing is written",
     ),
     "measure": MEASURE,
+    "calibrate": CALIBRATE,
     "export": EXPORT,
     "history": Command(
         "control chart of a ball from its calibration reports",
@@ -91,6 +94,7 @@ COMMANDS = {
         ),
         run_history,
     ),
+    "rate": RATE,
     **study_commands(),
     "figures": Command(
         "draw the figures of the paper and of the documentation",
@@ -110,7 +114,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             command = COMMANDS[options.name]
             kept = command.kept
-            if options.output is not None and not options.output.strip():
+            folder = getattr(options, "output", None)
+            if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
             code = command.function(options)

@@ -49,6 +49,11 @@ QUIET = argument("-q", "--quiet", action="store_true", help="show only errors an
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 
 
+def channel_of(text: str | None) -> int | str | None:
+    """Return the number or the name of a channel."""
+    return int(text) if text is not None and text.isdecimal() else text
+
+
 def exit_code(error: Exception) -> int:
     """Return the exit code of an error; an OSError counts as bad input."""
     return error.exit_code if isinstance(error, ThudError) else InputError.exit_code

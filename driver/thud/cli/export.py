@@ -52,7 +52,7 @@ def run_export(options: argparse.Namespace) -> int:
 def _read(path: str, config: str | None) -> Impact | Recording:
     """Return the impact of a case, or the recording, of a file."""
     from thud.recordings.formats import FORMATS  # noqa: PLC0415 - SciPy takes its time
-    from thud.recordings.recording import read_recording  # noqa: PLC0415 - likewise
+    from thud.recordings.read_recording import read_recording  # noqa: PLC0415 - likewise
 
     endings = {ending for one in FORMATS for ending in one.suffixes}
     if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte

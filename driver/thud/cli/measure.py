@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, channel_of, output
 from thud.errors import ReportWarning
 from thud.levels import SOURCES
 from thud.tables import format_rows
@@ -16,41 +17,52 @@ if TYPE_CHECKING:
     import argparse
 
 NOT_CONFORMING = 3
+# Drops that the screen shows.
+SHOWN = 50
 
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings import results  # noqa: PLC0415 - SciPy takes its time
-    from thud.recordings.recording import read_recording  # noqa: PLC0415
+    from thud.recordings.read_recording import read_recording  # noqa: PLC0415
 
+    folder = Path(options.output or Path("outputs", Path(options.drops[0]).stem))
     recording = read_recording(
         options.drops,
         height=options.height,
         mass=options.mass,
+        height_uncertainty=options.height_uncertainty,
+        mass_uncertainty=options.mass_uncertainty,
         source=options.source,
-        channel=int(options.channel) if (options.channel or "").isdigit() else options.channel,
+        channel=channel_of(options.channel),
         unit=options.unit,
         calibration=options.calibration,
         calibration_uncertainty=options.calibration_uncertainty,
         polarity=options.polarity,
         sample_rate=options.sample_rate,
+        low_pass=options.low_pass or None,
         config=options.config,
         progress=not options.quiet and sys.stderr.isatty(),
+        workers=options.workers or len(os.sched_getaffinity(0)),
+        keep=folder,
     )
     verdict = recording.conformity()
-    folder = Path(options.output or Path("outputs", recording.name))
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always", ReportWarning)
         results.save(recording, folder, figures=not options.no_figures)
     if not options.quiet:
-        print(format_rows(results.drop_table(recording)))
+        rows = results.drop_table(recording)
+        print(format_rows(rows[: SHOWN + 1]))
+        if len(rows) > SHOWN + 1:
+            print(f"and {len(rows) - SHOWN - 1} more drops, in {folder / 'report.json'}")
         print()
         print(format_rows(results.table(recording)))
         print()
-        for step in recording.steps:
+        for step in (*results.sentences(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
         print(f"  {results.verdict_sentence(recording)}")
-    for remark in recording.remarks:
+    told = results.sentences(recording, "remarks")
+    for remark in (*recording.doubts, *recording.outliers, *told):
         print(f"thud-driver: {remark}", file=sys.stderr)
     for warning in found:
         print(f"thud-driver: {warning.message}", file=sys.stderr)
@@ -68,6 +80,8 @@ MEASURE = Command(
         argument("--source", choices=SOURCES, help="source of the limits (default: rubber_ball)"),
         argument("--mass", type=float, metavar="KG", help="mass of the source"),
         argument("--height", type=float, metavar="M", help="drop height"),
+        argument("--mass-uncertainty", type=float, metavar="KG", help="its standard uncertainty"),
+        argument("--height-uncertainty", type=float, metavar="M", help="its standard uncertainty"),
         argument("--config", metavar="LAB.toml", help="laboratory, instruments, calibration"),
         argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
         argument("--unit", help="unit of the recorded values, where the file does not say it"),
@@ -84,10 +98,15 @@ MEASURE = Command(
             "--polarity", choices=("positive", "negative"), help="sign of a compression in the file"
         ),
         argument("--sample-rate", type=float, metavar="HZ", help="where the file does not say it"),
+        argument("--low-pass", action="store_true", help="levels of the force below 1.25 kHz"),
+        argument(
+            "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
+        ),
         output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
         NO_FIGURES,
         QUIET,
     ),
     measure,
+    "drops that were measured are taken up by the same command",
 )

@@ -13,6 +13,7 @@ from tqdm import tqdm
 from thud._api import api, call, text
 from thud.case import Case, read_case
 from thud.cli.command import exit_code, sentence
+from thud.compression import new_curve
 from thud.errors import InputError, ThudError
 from thud.files import add_files
 from thud.free_modes import new_modes
@@ -81,10 +82,11 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
     case = Case.from_text(text(found["case"]))
     impact = new_impact(case, found) if "samples" in found else None
     modes = new_modes(case.ball, found) if "modes" in found else None
+    curve = new_curve(case, found) if "compression" in found else None
     with TemporaryDirectory() as name:
         folder = Path(name)
         if figures:
-            plot.save_all(plot.case_figures(impact, modes), folder)
+            plot.save_all(plot.case_figures(impact, modes, curve), folder)
         if animation and impact is not None and impact.motion:
             plot.animate(impact, folder / "motion.gif")
         return {path.name: path.read_bytes() for path in folder.iterdir()}

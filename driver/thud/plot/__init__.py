@@ -1,8 +1,8 @@
 """Figures, each in a file of its own.
 
 A file holds the function that draws its figure, as wide as a column of a journal page, and declares
-its use: ``thud-driver run`` adds ``IMPACT_FIGURES`` and ``MODES_FIGURES`` to the results of a case,
-``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
+its use: ``thud-driver run`` adds ``IMPACT_FIGURES``, ``MODES_FIGURES`` and ``COMPRESSION_FIGURES``
+to the results of a case, ``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
 """
 
 import importlib
@@ -12,9 +12,11 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from thud.compression import CompressionCurve
 from thud.free_modes import FreeModes
 from thud.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
+from thud.plot.compression import compression as compression
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
 from thud.plot.force_history import force_history as force_history
@@ -38,20 +40,26 @@ from thud.plot.loss_factor import loss_factor as loss_factor
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion
+from thud.plot.prediction import draw_prediction as draw_prediction
 from thud.plot.recording import recording_forces as recording_forces
 from thud.plot.recording import recording_levels as recording_levels
+from thud.plot.room import room_levels as room_levels
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
 from thud.plot.surrogate import draw_surrogate as draw_surrogate
 from thud.plot.sweep import draw_sweep as draw_sweep
 from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
 
 
-def case_figures(impact: Impact | None = None, modes: FreeModes | None = None) -> dict[str, Figure]:
-    """Draw the figures of a case that has an impact, free modes or both.
+def case_figures(
+    impact: Impact | None = None,
+    modes: FreeModes | None = None,
+    curve: CompressionCurve | None = None,
+) -> dict[str, Figure]:
+    """Draw the figures of a case: of its impact, its free modes, its slow compression.
 
     Return the figures by the names of their files, without those that have nothing to show.
     """
-    given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes}
+    given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes, "COMPRESSION_FIGURES": curve}
     drawn = {
         name: draw(results)
         for kind, results in given.items()

@@ -7,6 +7,6 @@ from thud.impact import Impact, solve
 
 
 @cache
-def solve_published(viscosity: str = "kelvin_voigt") -> Impact:
+def solve_published(viscosity: str = "fractional") -> Impact:
     """Return the impact of the ball of the published modes by finite elements."""
     return solve(Ball.standard(), model="finite_element", viscosity=viscosity)

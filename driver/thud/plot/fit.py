@@ -19,6 +19,7 @@ from thud.plot.look import (
     legend_above,
     new_figure,
 )
+from thud.studies.fitting.misfit import SHIFT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     from thud.studies.fitting.force_target import ForceMisfit
     from thud.studies.fitting.level_target import LevelMisfit
-    from thud.studies.fitting.result import Fit
+    from thud.studies.fitting.result import Fit, FittedTarget
 
 # More names of bands are rotated.
 MAX_UPRIGHT = 5
@@ -41,35 +42,40 @@ BEFORE, AFTER = 0.15, 0.4
 
 
 def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
-    """Draw a fit: the figure ``"fit"`` and, of two parameters or more, ``"confidence"``.
+    """Draw a fit: ``"fit"``, or ``"fit_1"`` and so on, and of several parameters ``"confidence"``.
 
     Units are given by name and size in SI units.
     """
-    figures = {"fit": target_and_fit(fit)}
+    figures = {
+        f"fit{end}": target_and_fit(fit, number) for number, end in enumerate(fit.ends, start=1)
+    }
     if len(fit.names) > 1:
         figures["confidence"] = confidence(fit, units)
     return figures
 
 
-def target_and_fit(fit: Fit) -> Figure:
-    """Draw target and model, in kN against ms or in dB, and below it their difference."""
+def target_and_fit(fit: Fit, number: int = 1) -> Figure:
+    """Draw a target and the model, in kN against ms or in dB, and below it their difference."""
+    target = fit.targets[number - 1]
+    deviation = fit.deviation_of(target)
     figure = new_figure(3.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
     dress(above)
     dress(below)
     below.axhline(0, color="0.45", linewidth=0.8)
-    if fit.misfit.deviation_unit == "N":
-        _draw_force(fit, cast("ForceMisfit", fit.misfit), above, below)
+    if target.misfit.deviation_unit == "N":
+        _draw_force(target, deviation, above, below)
     else:
-        _draw_levels(fit, cast("LevelMisfit", fit.misfit), above, below)
+        _draw_levels(target, deviation, above, below)
     above.tick_params(axis="x", labelbottom=False)
     figure.align_ylabels()
     return figure
 
 
-def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None:
-    """Draw record, fit and residual."""
-    column = misfit.history_columns(fit.impact, fit.time_shift)
+def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes) -> None:
+    """Draw record, fit with its background, and residual."""
+    misfit = cast("ForceMisfit", fitted.misfit)
+    column = misfit.history_columns(fitted.impact, fitted.own)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
     band = f"below {misfit.below / 1e3:.3g} kHz"
@@ -78,15 +84,13 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     above.plot(
         time, target / 1e3, color=COLOURS[5], linewidth=2.8, alpha=0.6, label=f"Record {band}"
     )
-    above.plot(
-        time, column["model_N"] / 1e3, color=COLOURS[1], linestyle="--", linewidth=1.1, label="Fit"
-    )
-    share = np.sqrt(misfit.size / len(time))
-    width = 2 * share * fit.noise
+    fit = column["model_N"] + column["background_N"]
+    above.plot(time, fit / 1e3, color=COLOURS[1], linestyle="--", linewidth=1.1, label="Fit")
+    width = 2 * np.sqrt(misfit.count / len(time)) * deviation
     below.axhspan(-width, width, color=GREY, linewidth=0)
     below.plot(time, column["residual_N"], color=COLOURS[6], linewidth=0.7)
-    contact = fit.impact.contact_time
-    begin, end = fit.time_shift - BEFORE * contact, fit.time_shift + (1 + AFTER) * contact
+    contact, touch = fitted.impact.contact_time, fitted.own_value(SHIFT, 0.0)
+    begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
     below.set_xlim(1e3 * max(begin, misfit.time[0]), 1e3 * min(end, misfit.time[-1]))
     below.set_xlabel("Time, ms", fontsize=SIZE)
     above.set_ylabel(f"{FORCE_WORDS[misfit.kind].capitalize()}, kN", fontsize=SIZE)
@@ -98,9 +102,11 @@ def _draw_force(fit: Fit, misfit: ForceMisfit, above: Axes, below: Axes) -> None
     legend_above(above)
 
 
-def _draw_levels(fit: Fit, misfit: LevelMisfit, above: Axes, below: Axes) -> None:
-    """Draw levels with their uncertainty, and the residuals of all quantities."""
-    column = misfit.columns(fit.impact, 0.0)
+def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -> None:
+    """Draw levels with their uncertainty times a scale, and the residuals of all quantities."""
+    misfit = cast("LevelMisfit", fitted.misfit)
+    column = misfit.columns(fitted.impact, fitted.own)
+    residuals = misfit.residual(fitted.impact, fitted.own) / scale
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
     values = {
         name: np.array(column[name], dtype=np.float64)
@@ -108,7 +114,6 @@ def _draw_levels(fit: Fit, misfit: LevelMisfit, above: Axes, below: Axes) -> Non
     }
     place = np.arange(len(names))
     count = sum(str(name).endswith(" Hz") for name in column["quantity"])
-    scale = 1.0 if fit.known_noise else fit.noise
     for i in range(count):
         edge = values["target"][i] + scale * np.array([-1, 1]) * values["uncertainty"][i]
         name = "Target" if i == 0 else None
@@ -123,8 +128,8 @@ def _draw_levels(fit: Fit, misfit: LevelMisfit, above: Axes, below: Axes) -> Non
         marker="o", markersize=4, label="Fit",
     )  # fmt: skip
     below.axhspan(-1, 1, color=GREY, linewidth=0)
-    below.plot(place, fit.residuals, color=COLOURS[1], marker="o", markersize=4, linestyle="none")
-    limit = 1.2 * max(1.2, np.abs(fit.residuals).max())
+    below.plot(place, residuals, color=COLOURS[1], marker="o", markersize=4, linestyle="none")
+    limit = 1.2 * max(1.2, np.abs(residuals).max())
     below.set_ylim(-limit, limit)
     below.set_xticks(place, [BROKEN.get(name, name) for name in names], fontsize=SIZE - 1)
     below.xaxis.set_minor_locator(NullLocator())
@@ -132,6 +137,6 @@ def _draw_levels(fit: Fit, misfit: LevelMisfit, above: Axes, below: Axes) -> Non
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
     below.set_xlabel(f"{BAND_WORDS[misfit.bands]}, Hz", fontsize=SIZE)
-    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[fit.impact.judged(misfit.kind)]})", fontsize=SIZE)
+    above.set_ylabel(f"{LEVEL}\n({FORCE_WORDS[fitted.impact.judged(misfit.kind)]})", fontsize=SIZE)
     below.set_ylabel("(Fit − target)\n/ uncertainty", fontsize=SIZE)
     legend_above(above)

@@ -8,11 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud._schema import BandSet, Levels, LevelsForce, LevelsMethod, LimitsSource
+from thud._schema import Ball, BandSet, Drop, Levels, LevelsForce, LevelsMethod, LimitsSource
 from thud.checks import refuse
 from thud.impact import Impact, solve
 from thud.levels import octave_limits
-from thud.plot.examples import solve_published
 from thud.plot.look import (
     SIZE,
     Curve,
@@ -128,9 +127,29 @@ def _draw_models() -> Figure:
     impacts = {
         "hollow sphere": solve(),
         "modal ball": solve(model="modal_ball"),
-        "finite elements": solve_published(),
+        # The ends of the band of inputs/studies/law_of_loss.toml.
+        **{
+            f"finite elements, order {order:g}": solve(
+                Ball.standard(),
+                model="finite_element",
+                viscosity="fractional",
+                fractional_order=order,
+                loss_factor=loss_factor,
+            )
+            for order, loss_factor in ((0.15, 0.1305), (1.0, 0.2041))
+        },
     }
     return levels(impacts)
+
+
+def _draw_tyres() -> Figure:
+    """Draw the tyre as one mass and as belt and rim."""
+    tyre, drop = Ball(mass=7.3), Drop(0.85)
+    impacts = {
+        "one mass": solve(tyre, drop, "hunt_crossley", contact_time=0.02, restitution=0.8),
+        "two masses": solve(tyre, drop, "two_mass"),
+    }
+    return levels(impacts, source="tyre")
 
 
 def _draw_fluxes() -> Figure:
@@ -145,4 +164,5 @@ DOCUMENTATION_FIGURES = {
     "figure3_levels": _draw_shell,
     "finite_element_levels": _draw_models,
     "momentum_flux": _draw_fluxes,
+    "tyre_levels": _draw_tyres,
 }

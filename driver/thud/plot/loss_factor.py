@@ -59,8 +59,14 @@ def _draw_viscosity(impact: Impact) -> Figure | None:
 def _draw_laws() -> Figure:
     """Draw the laws of viscosity."""
     laws = {
-        "Kelvin–Voigt": FiniteElement(),
-        "Prony series, constant": FiniteElement(viscosity="constant_loss"),
+        **{
+            f"Fractional, order {order:g}": FiniteElement(
+                viscosity="fractional", fractional_order=order, loss_factor=loss
+            )
+            for order, loss in ((0.15, 0.1305), (0.3, 0.1434), (0.5, 0.1613))
+        },
+        "Kelvin–Voigt": FiniteElement(viscosity="kelvin_voigt", loss_factor=0.2),
+        "Constant": FiniteElement(viscosity="constant_loss", loss_factor=0.13),
         "Prony series, one term": FiniteElement(
             viscosity="prony", prony_share=(0.5,), prony_time=(1.5e-3,)
         ),

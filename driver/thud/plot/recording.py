@@ -11,7 +11,6 @@ from thud.levels import BANDWIDTHS, record_force
 from thud.plot.force_history import MARGIN, TIME_LABEL
 from thud.plot.levels import draw_tolerance
 from thud.plot.look import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis
-from thud.report.data import level_budgets
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -101,7 +100,7 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
         )
     place = np.arange(len(average.level), dtype=float)
     _draw_drops(axes, place, average.drops, recording)
-    expanded = np.array([one.expanded for one in level_budgets(recording, bands)])
+    expanded = np.array([one.expanded for one in recording.level_quantities(bands)])
     mark = "average, 95 %" if len(average.drops) > 1 else "drop, 95 %"
     axes.errorbar(
         place, average.level, yerr=_bar(expanded), label=mark, marker="o", markersize=3, **BARS,
@@ -135,7 +134,7 @@ def _draw_drops(
     axes: Axes, x: NDArray[np.float64], curves: NDArray[np.float64], recording: Recording
 ) -> None:
     """Draw the curves of the drops, shape (n_drop, n), or their range; outliers in their style."""
-    deviant = {outlier.name for outlier in recording.average().outliers}
+    deviant = {outlier.name for outlier in recording.outliers}
     marked = np.array([drop.name in deviant for drop in recording.drops])
     count = len(curves)
     if count > MAX_LINES:

@@ -13,6 +13,7 @@ from thud.checks import refuse, require_choice, require_number, shown
 from thud.levels import SOURCES, get_bands, judge
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
+from thud.recordings.plate import Plate, check_plate
 from thud.recordings.reading import regular_file
 from thud.recordings.units import read_chain, require_unit
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from thud._schema import LimitsSource
+    from thud.recordings.plate import PlateCheck
     from thud.recordings.units import Calibration
 
 LONGEST = 500
@@ -29,21 +31,29 @@ ABSOLUTE_ZERO = -273.15
 
 @dataclass(frozen=True)
 class PlateConfig:
-    """First resonance of a force plate.
+    """A force plate.
 
     Attributes
     ----------
-    f0 : float
-        Frequency, Hz.
-    Q : float
-        Quality factor.
+    f0, Q : float or None
+        Frequency, Hz, and quality factor of the first resonance, which is corrected; None where it
+        is not.
     f0_uncertainty : float or None
         Relative standard uncertainty of the frequency; None where it is not known.
+    time_constant : float or None
+        Time constant of the amplifier, s; None where it is not known.
+    full_scale : float or None
+        Largest force that plate and recorder can read, N; None where it is not known.
+    linearity : tuple of tuple
+        Pairs of a force applied and the force indicated, N.
     """
 
-    f0: float
-    Q: float
+    f0: float | None = None
+    Q: float | None = None
     f0_uncertainty: float | None = None
+    time_constant: float | None = None
+    full_scale: float | None = None
+    linearity: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -71,8 +81,12 @@ class Config:
         that of the `Calibration`.
     mass, height : float or None
         Mass of the ball, kg, and drop height, m.
+    mass_uncertainty, height_uncertainty : float or None
+        Their standard uncertainties, kg and m; None where they are not known.
     plate : PlateConfig or None
-        Resonance that is corrected.
+        The force plate.
+    low_pass : bool
+        Whether levels are those of the force below 1.25 kHz.
     limits : mapping
         Minimum and maximum by criterion where they differ from the standards'.
     """
@@ -92,8 +106,33 @@ class Config:
     sample_rate: float | None = None
     mass: float | None = None
     height: float | None = None
+    mass_uncertainty: float | None = None
+    height_uncertainty: float | None = None
     plate: PlateConfig | None = None
+    low_pass: bool = False
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def resonance(self) -> Plate | None:
+        """The resonance that is corrected; an uncertainty that is not known counts as zero."""
+        plate = self.plate
+        if plate is None or plate.f0 is None or plate.Q is None:
+            return None
+        return Plate(plate.f0, plate.Q, frequency_uncertainty=plate.f0_uncertainty or 0.0)
+
+    @property
+    def plate_checks(self) -> tuple[PlateCheck, ...]:
+        """The standard's demands on the plate; none where there is no ``[plate]``."""
+        plate = self.plate
+        if plate is None:
+            return ()
+        return check_plate(
+            self.resonance,
+            corrected=True,
+            time_constant=plate.time_constant,
+            full_scale=plate.full_scale,
+            calibration=plate.linearity or None,
+        )
 
 
 def read_config(path: str | os.PathLike[str]) -> Config:
@@ -114,6 +153,15 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
     _require_known(given, [one.name for one in fields(Config)], name)
     return Config(**{key: check_key(key, value, f"{name}: {key}") for key, value in given.items()})
+
+
+def checked_config(config: Config) -> Config:
+    """Return a configuration; raise InputError where a number is not within its range."""
+    for key in NUMBERS:
+        value = getattr(config, key, None)
+        if value is not None:
+            check_key(key, value, key)
+    return config
 
 
 def _require_known(given: Mapping[str, object], known: list[str], place: str) -> None:
@@ -139,9 +187,13 @@ NUMBERS = {
     "sample_rate": (1.0, 1e9),
     "mass": (0.01, 1000.0),
     "height": (0.001, 100.0),
+    "mass_uncertainty": (0.0, 100.0),
+    "height_uncertainty": (0.0, 10.0),
     "f0": (1.0, 1e6),
     "Q": (0.5, 1e6),
     "f0_uncertainty": (0.0, 0.5),
+    "time_constant": (1e-3, 1e9),
+    "full_scale": (1.0, 1e9),
 }
 
 
@@ -206,14 +258,34 @@ def _table(value: object, place: str, known: list[str]) -> dict[str, object]:
 
 
 def _plate(value: object, place: str) -> PlateConfig:
-    """Return the resonance of a plate."""
+    """Return a force plate."""
     table = _table(value, place, [one.name for one in fields(PlateConfig)])
-    for key in ("f0", "Q"):
-        if key not in table:
-            refuse(f"{place}: {key} is missing", "f0 and Q")
+    if "f0_uncertainty" in table or ("f0" in table) != ("Q" in table):
+        for key in ("f0", "Q"):
+            if key not in table:
+                refuse(f"{place}: {key} is missing", "f0 and Q")
     return PlateConfig(
         **{key: check_key(key, value, f"{place}: {key}") for key, value in table.items()}
     )
+
+
+def _linearity(value: object, place: str) -> tuple[tuple[float, float], ...]:
+    """Return pairs of forces."""
+    pairs = value if isinstance(value, list) else []
+    if len(pairs) < 2 or not all(isinstance(one, list) and len(one) == 2 for one in pairs):  # noqa: PLR2004
+        refuse(
+            f"{place} = {shown(value)} is not allowed",
+            "[[applied, indicated], ...], N",
+        )
+    low, high = ([_number(one[k], place, 1e-3, 1e9) for one in pairs] for k in (0, 1))
+    return tuple(zip(low, high, strict=True))
+
+
+def _flag(value: object, place: str) -> bool:
+    """Return yes or no."""
+    if not isinstance(value, bool):
+        refuse(f"{place} = {shown(value)} is not allowed", "true or false")
+    return value
 
 
 def _limits(value: object, place: str) -> dict[str, tuple[float, float]]:
@@ -239,5 +311,7 @@ CHECKS: dict[str, Callable[[object, str], object]] = {
     "polarity": _polarity,
     "source": _source,
     "plate": _plate,
+    "linearity": _linearity,
+    "low_pass": _flag,
     "limits": _limits,
 }

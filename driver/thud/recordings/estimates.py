@@ -17,6 +17,7 @@ from thud.levels import RECORDED_BAND, record_force
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
+from thud.recordings.restitution import Fall
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,8 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Drop", "Estimate", "measure_drop"]
 
-# Bounces that are measured.
-MAX_BOUNCES = 2
+# Draws of noise that show what it adds to the maximum.
+PEAK_DRAWS = 32
 # Quiet below which it is told, s.
 SHORT_QUIET = 0.005
 # Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the
@@ -48,8 +49,6 @@ class Drop:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    time : ndarray, shape (n,)
-        Time since first touch, s.
     force : ndarray, shape (n,)
         Force without offset, drift, hum and slow noise, N.
     sample_rate : float
@@ -57,12 +56,13 @@ class Drop:
     onset : float
         Time of first touch in the file, s.
     gate : tuple of int
-        First sample of the contact with its margins, and the one behind it: levels are computed
-        over ``force[gate[0]:gate[1]]`` and the expected energy of the noise is subtracted.
+        First sample of the contact with its margins, and the one behind it: levels are those of
+        ``force[gate[0]:gate[1]]``.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
-    restitution_calibration : float
-        Standard uncertainty that the calibration makes of the restitution, beside that stated.
+    restitution_shared : dict of str to float
+        Standard uncertainties that calibration, mass and drop height make of the restitution of
+        all drops alike, beside that stated; signed.
     restitution_by : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
@@ -70,20 +70,20 @@ class Drop:
     noise : Noise
         Noise of the quiet parts.
     bounces : tuple of float
-        Times of first touch of later bounces since the onset, s.
+        Times of first touch of the later bounces that were measured since the onset, s: of one
+        where the drop height is known, else of up to two.
     steps, remarks : tuple of str
         What was done to the signal, and what is doubtful; a sentence each.
     """
 
     name: str
-    time: NDArray[np.float64]
     force: NDArray[np.float64]
     sample_rate: float
     onset: float
     gate: tuple[int, int]
     contact_time: Estimate
     restitution: Estimate
-    restitution_calibration: float
+    restitution_shared: dict[str, float]
     restitution_by: str
     restitutions: dict[str, Estimate]
     peak_force: Estimate
@@ -95,14 +95,30 @@ class Drop:
     remarks: tuple[str, ...]
     contact: Contact
 
-    def band_energy(
-        self, lower: float, upper: float, *, exact: bool = False
-    ) -> tuple[float, float, float]:
-        """Return the energy of the force in a band, N2 s, that of the noise, and a deviation.
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n,)."""
+        return np.arange(*self.contact.span) / self.sample_rate - self.contact.touch.value
 
-        The energy is that of the gate less the expected energy of the noise in it; the last is
-        its standard deviation (docs/recordings_theory.md, section 4). Where the force is exact,
-        without noise, nothing is subtracted.
+    def band_noise(self, lower: float, upper: float) -> tuple[float, float]:
+        """Return the expected energy of the noise of the gate in a band, and a deviation, N2 s.
+
+        The second is the standard deviation of the energy of the force when the first is subtracted
+        from what is measured (docs/recordings_theory.md, section 4).
+        """
+        value, covariance = self.band_values(lower, upper)
+        noise, squares = float(np.trace(covariance)), float((covariance**2).sum())
+        # The first term is too large by twice the second, on the mean.
+        variance = max(4 * float(value @ covariance @ value) - 2 * squares, 2 * squares)
+        density, doubt = self.contact.background.density((lower + upper) / 2)
+        return noise, math.sqrt(variance + (noise * doubt / density) ** 2)
+
+    def band_values(
+        self, lower: float, upper: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return values whose squares add up to the energy of the gate in a band, N2 s.
+
+        Linear functionals of the force, [n], and the covariance of the noise in them, [n, n].
         """
         first, stop = self.gate
         force, time = self.force[first:stop], self.time[first:stop]
@@ -112,24 +128,17 @@ class Drop:
         phase = 2 * np.pi * frequency[:, None] * time
         scale = np.sqrt((upper - lower) * weights)[:, None] / self.sample_rate
         functionals = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
-        value = functionals @ force
-        covariance = self.contact.covariance_of(functionals)
-        noise = float(np.trace(covariance))
-        second = float((covariance**2).sum())
-        variance = 4 * float(value @ covariance @ value) + 2 * second
-        if exact:
-            return float(value @ value), noise, math.sqrt(variance)
-        # The first term is too large by twice the second, on the mean.
-        variance = max(variance - 4 * second, 2 * second) + (noise * self.contact.noise_doubt) ** 2
-        return float(value @ value) - noise, noise, math.sqrt(variance)
+        return functionals @ force, self.contact.covariance_of(functionals)
 
 
-def measure_drop(
+def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     window: Window,
     *,
     height: float | None = None,
     mass: float | None = None,
     calibration_uncertainty: float = 0.0,
+    mass_uncertainty: float = 0.0,
+    height_uncertainty: float = 0.0,
     gravity: float = 9.81,
 ) -> Drop:
     """Return what one drop tells.
@@ -142,8 +151,8 @@ def measure_drop(
         Drop height of the lowest point, m.
     mass
         Mass of the source, kg.
-    calibration_uncertainty
-        Relative standard uncertainty of the force; it weights the restitution from the impulse.
+    calibration_uncertainty, mass_uncertainty, height_uncertainty
+        Standard uncertainties, relative, kg and m; they weight the ways to the restitution.
     gravity
         Acceleration of free fall, m/s2.
 
@@ -162,7 +171,8 @@ def measure_drop(
         if quiet < SHORT_QUIET:
             remarks += (f"there are {1e3 * quiet:.1f} ms of quiet {side} the contact",)
     rate = window.sample_rate
-    landings = _landings(window, contact)
+    # The flight behind the drop gives the restitution; without the height two flights are compared.
+    landings = _landings(window, contact, 1 if height else 2)
     touch, release = contact.touch, contact.release
     contact_time = Estimate(
         release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
@@ -184,30 +194,26 @@ def measure_drop(
             )
         )
         leaving = again
-    ways, told = _restitutions(impulse, contact_time, flights, height, mass, gravity)
-    scale = 0.0
-    if height and mass:
-        # Of 1 + e + g t/v0.
-        scale = calibration_uncertainty * impulse.value / (mass * math.sqrt(2 * gravity * height))
-    told += _told_difference(ways, scale)
-    restitution, calibration = _mean(ways, scale)
-    time = (np.arange(*contact.span)) / rate - touch.value
+    fall = Fall(
+        height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty, gravity
+    )
+    ways, told = fall.restitutions(impulse, contact_time, flights)
+    restitution, shared = fall.mean(ways, impulse)
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
         name=window.name,
-        time=time,
         force=contact.force,
         sample_rate=rate,
         onset=window.start / rate + touch.value,
         gate=(first, stop),
         contact_time=contact_time,
         restitution=restitution,
-        restitution_calibration=calibration,
+        restitution_shared=shared,
         restitution_by=" and ".join(ways),
         restitutions=ways,
         peak_force=_peak(contact),
         impulse=impulse,
-        effective_mass=_effective_mass(impulse, contact_time, ways.get("bounces"), height, gravity),
+        effective_mass=fall.effective_mass(impulse, contact_time, ways.get("bounces")),
         noise=_noise(contact),
         bounces=tuple(landing.value - touch.value for landing, _ in landings),
         steps=steps,
@@ -216,10 +222,10 @@ def measure_drop(
     )
 
 
-def _landings(window: Window, drop: Contact) -> list[tuple[Estimate, Estimate]]:
-    """Return first touch and release of the bounces, s from the first sample of the window."""
+def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
+    """Return first touch and release of the first bounces, s from the start of the window."""
     found = []
-    for bounce in window.bounces[:MAX_BOUNCES]:
+    for bounce in window.bounces[:count]:
         first, stop = bounce.contact
         least = least_quiet(bounce.sample_rate)
         if first < least or len(bounce.force) - stop < least:
@@ -243,12 +249,22 @@ def _impulse(contact: Contact) -> Estimate:
 
 
 def _peak(contact: Contact) -> Estimate:
-    """Return the maximum of the force below 1.25 kHz, N."""
-    low = record_force(np.pad(contact.gated, 2), contact.sample_rate)
+    """Return the maximum of the force below 1.25 kHz, N, less what noise adds to a maximum.
+
+    That is what further noise of the same density adds (bootstrap), a part of it where there is
+    much noise; as much again counts as uncertain.
+    """
+    force = np.pad(contact.gated, 2)
+    low = record_force(force, contact.sample_rate)
     place = int(np.argmax(low)) * len(contact.covariance) // len(low)
-    variance = contact.background.variances[0] * min(RECORDED_BAND, contact.sample_rate / 2)
+    density, _ = contact.background.density(RECORDED_BAND)
+    deviation = math.sqrt(density * contact.sample_rate / 2)
+    draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
+    higher = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
+    excess = max(float(np.mean(higher) - low.max()), 0.0)
+    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + excess**2
     variance += contact.covariance[place, place]
-    return Estimate(float(low.max()), math.sqrt(variance))
+    return Estimate(float(low.max()) - excess, math.sqrt(variance))
 
 
 def _noise(contact: Contact) -> Noise:
@@ -262,9 +278,7 @@ def _noise(contact: Contact) -> Noise:
 
 def _told_background(contact: Contact) -> tuple[str, ...]:
     """Return what was removed, a sentence each."""
-    first, stop = (place - contact.span[0] for place in contact.gate)
-    offset = float(contact.under[first:stop].mean())
-    steps = [f"an offset of {offset:.3g} N was removed"]
+    steps = [f"an offset of {contact.offset:.3g} N was removed"]
     drift, deviation = contact.background.drift
     if abs(drift) > NOTABLE * deviation:
         steps.append(f"a drift of {drift:.3g} N/s was removed")
@@ -297,93 +311,3 @@ def _told_aliased(contact: Contact) -> tuple[str, ...]:
         f"sampling, the octave of 500 Hz may be off by {error:.1f} dB"
     )
     return (told,)
-
-
-def _restitutions(  # noqa: PLR0913, PLR0917 - each is one quantity of the formula
-    impulse: Estimate,
-    contact_time: Estimate,
-    flights: list[Estimate],
-    height: float | None,
-    mass: float | None,
-    gravity: float,
-) -> tuple[dict[str, Estimate], tuple[str, ...]]:
-    """Return the restitution by each way, and remarks (docs/recordings_theory.md, section 5)."""
-    ways: dict[str, Estimate] = {}
-    speed = math.sqrt(2 * gravity * height) if height else math.nan
-    if height and mass:
-        value = impulse.value / (mass * speed) - 1 - gravity * contact_time.value / speed
-        ways["impulse"] = Estimate(
-            value,
-            math.hypot(
-                impulse.uncertainty / (mass * speed), gravity * contact_time.uncertainty / speed
-            ),
-        )
-    if height and flights:
-        scale = gravity / (2 * speed)
-        ways["bounces"] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
-    elif len(flights) > 1:
-        one, two = flights[:2]
-        told = (
-            f"the restitution of the first bounce is {two.value / one.value:.3f}; that of the drop "
-            "itself is not known without the drop height"
-        )
-        return ways, (told,)
-    return ways, ()
-
-
-def _told_difference(ways: dict[str, Estimate], scale: float) -> tuple[str, ...]:
-    """Return a sentence where impulse and bounces differ; `scale` is what the calibration makes."""
-    if len(ways) < 2:  # noqa: PLR2004 - two ways
-        return ()
-    by, other = ways["impulse"], ways["bounces"]
-    difference = by.value - other.value
-    deviation = math.hypot(by.uncertainty, scale, other.uncertainty)
-    if abs(difference) <= NOTABLE * deviation:
-        return ()
-    told = (
-        f"the restitution by impulse, {by.value:.3f}, and by bounces, {other.value:.3f}, "
-        f"differ by {difference:.3f}, with a standard uncertainty of {deviation:.2g}: "
-        "check mass, height and calibration"
-    )
-    return (told,)
-
-
-def _mean(ways: dict[str, Estimate], scale: float) -> tuple[Estimate, float]:
-    """Return the mean, weighted by 1/uncertainty2, and what the calibration makes of it.
-
-    The uncertainty of the impulse holds that of the calibration, `scale`; that of the mean is
-    without it, and grows with disagreement.
-    """
-    if not ways:
-        return Estimate.unknown(), 0.0
-    shared = np.array([scale if way == "impulse" else 0.0 for way in ways])
-    own = np.array([max(one.uncertainty, 1e-12) for one in ways.values()])
-    weight = 1 / (own**2 + shared**2)
-    value = np.array([one.value for one in ways.values()])
-    mean = float(weight @ value / weight.sum())
-    # Birge's ratio.
-    spread = float(weight @ (value - mean) ** 2) / max(len(ways) - 1, 1)
-    calibration = float(weight @ shared / weight.sum())
-    variance = max(1.0, spread) / float(weight.sum()) - calibration**2
-    return Estimate(mean, math.sqrt(max(variance, 0.0))), calibration
-
-
-def _effective_mass(
-    impulse: Estimate,
-    contact_time: Estimate,
-    restitution: Estimate | None,
-    height: float | None,
-    gravity: float,
-) -> Estimate:
-    """Return impulse over (v0 (1 + e) + g t_c), kg, e from bounces."""
-    if restitution is None or not height:
-        return Estimate(math.nan, math.nan)
-    speed = math.sqrt(2 * gravity * height)
-    change = speed * (1 + restitution.value) + gravity * contact_time.value
-    value = impulse.value / change
-    parts = (
-        impulse.uncertainty / change,
-        value * speed * restitution.uncertainty / change,
-        value * gravity * contact_time.uncertainty / change,
-    )
-    return Estimate(value, math.hypot(*parts))

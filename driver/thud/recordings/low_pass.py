@@ -28,7 +28,7 @@ def low_pass_force(
     1.25 kHz. Where the sample rate, Hz, is too low to hold such frequencies, nothing is done.
     """
     if sample_rate <= 2 * RECORDED_BAND:
-        return force, f"no low-pass at 1.25 kHz: the sample rate, {sample_rate:g} Hz, is one"
+        return force, describe_low_pass(sample_rate)
     # Both runs attenuate by (1 + (t/t_corner)**12)**2 in energy, t = tan(pi f / rate): 2 at the
     # band edge.
     edge = math.tan(math.pi * RECORDED_BAND / sample_rate)
@@ -36,7 +36,14 @@ def low_pass_force(
     sections = butter(ORDER, corner, fs=sample_rate, output="sos")
     room = min(len(force) - 1, math.ceil(10 * sample_rate / RECORDED_BAND))
     filtered: NDArray[np.float64] = sosfiltfilt(sections, force, padlen=max(room, 0))
-    return filtered, (
+    return filtered, describe_low_pass(sample_rate)
+
+
+def describe_low_pass(sample_rate: float) -> str:
+    """Return what `low_pass_force` does at a sample rate, Hz."""
+    if sample_rate <= 2 * RECORDED_BAND:
+        return f"no low-pass at 1.25 kHz: the sample rate, {sample_rate:g} Hz, is one"
+    return (
         f"low-pass, -3 dB at 1.25 kHz: Butterworth of order {ORDER}, forwards and backwards "
         "(no delay)"
     )

@@ -88,6 +88,16 @@ class Plate:
         quality = self.quality * math.sqrt(self.loading)
         return np.asarray(1 / (1 - ratio**2 + 1j * ratio / quality))
 
+    def correction(self, sample_rate: float) -> str:
+        """Return a sentence on what `correct_plate` does at a rate, Hz."""
+        highest = min(REACH * self.resonance, sample_rate / 2)
+        gain = 1 / abs(self.response(np.array([highest]))[0])
+        mass = f" with {self.added_mass:g} kg added" if self.added_mass else ""
+        return (
+            f"force plate: resonance of {self.resonance:.4g} Hz, quality {self.quality:g}{mass}, "
+            f"taken out up to {highest:.4g} Hz; noise there times {gain:.2g}"
+        )
+
     def level_uncertainty(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return what the uncertainty of the resonance makes of corrected levels, dB.
 
@@ -120,8 +130,8 @@ class PlateCheck:
 
 def correct_plate(
     force: NDArray[np.float64], sample_rate: float, plate: Plate, bands: BandSet = "third"
-) -> tuple[NDArray[np.float64], str]:
-    """Return the force that was applied to a plate, from the force that it measured.
+) -> NDArray[np.float64]:
+    """Return the force that was applied to a plate, N, shape (n_sample,), from the measured one.
 
     F = F_m + F_m' / (w0 Q) + F_m'' / w0**2, by the Fourier transform. Up to twice the resonance it
     is exact; above, where it would only amplify noise, it falls to zero within an octave.
@@ -136,11 +146,6 @@ def correct_plate(
         Resonance, quality factor, added mass.
     bands
         Bands that are to be read from the force.
-
-    Returns
-    -------
-    tuple
-        Force, N, shape (n_sample,), and a sentence on what was done.
 
     Raises
     ------
@@ -164,14 +169,10 @@ def correct_plate(
     # About the first value, so that the end that wraps around is no step.
     origin = padded[0]
     spectrum = np.fft.rfft(padded - origin, length) / plate.response(frequency) * fall
-    corrected = np.fft.irfft(spectrum, length)[room : room + len(force)] + origin
-    highest = min(reach, sample_rate / 2)
-    gain = 1 / abs(plate.response(np.array([highest]))[0])
-    mass = f" with {plate.added_mass:g} kg added" if plate.added_mass else ""
-    return corrected, (
-        f"force plate: resonance of {plate.resonance:.4g} Hz, quality {plate.quality:g}{mass}, "
-        f"taken out up to {highest:.4g} Hz; noise there times {gain:.2g}"
+    corrected: NDArray[np.float64] = (
+        np.fft.irfft(spectrum, length)[room : room + len(force)] + origin
     )
+    return corrected
 
 
 def check_plate(
@@ -228,6 +229,9 @@ def _check_high(plate: Plate | None, *, corrected: bool) -> PlateCheck:
     demand, high = "flat below", FLAT[1]
     if plate is None:
         return PlateCheck(demand, None, f"the response up to {high:g} Hz is not known (resonance)")
+    if corrected and not plate.frequency_uncertainty:
+        told = f"the response up to {high:g} Hz is not known (uncertainty of the resonance)"
+        return PlateCheck(demand, None, told)
     frequency = np.linspace(0.0, high, 1001, dtype=np.float64)
     response = np.abs(plate.response(frequency))
     if corrected:

@@ -12,8 +12,10 @@ from thud._api import version
 from thud.errors import InputError, ReportWarning
 from thud.extras import require_extra
 from thud.levels import get_bands
+from thud.recordings.contact import Estimate
 from thud.recordings.verdict import VERDICTS
 from thud.report.data import criteria_data, report_data
+from thud.report.notes import group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
 
@@ -21,7 +23,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
-    from thud.recordings.estimates import Estimate
     from thud.recordings.recording import Recording
 
 # Columns of the page that the screen leaves out.
@@ -32,26 +33,39 @@ _PAGE = (HTML, PDF, "force.png", "force.svg", "levels.png", "levels.svg")
 
 
 def drop_table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return rows of text, a drop each: touch, contact, restitution, peak and levels.
+    """Return rows of text, a drop each: touch, contact, restitution by each way, peak and levels.
 
     Behind ± is one standard uncertainty of that drop, of its noise.
     """
     nominal = get_bands().nominal
     levels = recording.average().drops
-    head = ("drop", "at, s", "contact, ms (± u)", "restitution (± u)", "peak, N")
+    ways = dict.fromkeys(way for drop in recording.drops for way in drop.restitutions)
+    by = [f"restitution by {way} (± u)" for way in ways] or ["restitution"]
+    head = ("drop", "at, s", "contact, ms (± u)", *by, "peak, N")
     rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
+    unknown = Estimate.unknown()
     rows += [
         (
             drop.name,
             f"{drop.onset:.3f}",
             _with_doubt(drop.contact_time, 1e-3, 2),
-            _with_doubt(drop.restitution, 1.0, 3),
+            *(_with_doubt(drop.restitutions.get(way, unknown), 1.0, 3) for way in ways or [""]),
             f"{drop.peak_force.value:.0f}",
             *(f"{level:z.2f}" for level in levels[i]),
         )
         for i, drop in enumerate(recording.drops)
     ]
     return rows
+
+
+def sentences(recording: Recording, kind: str) -> list[str]:
+    """Return the ``"steps"`` or ``"remarks"`` of files and drops, those that are alike as one."""
+    return group_places(
+        {
+            "files": [(one.name, getattr(one, kind)) for one in recording.origins],
+            "drops": [(one.name, getattr(one, kind)) for one in recording.drops],
+        }
+    )
 
 
 def table(recording: Recording) -> list[tuple[str, ...]]:

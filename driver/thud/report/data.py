@@ -10,8 +10,7 @@ import numpy as np
 
 from thud._api import version
 from thud.levels import BANDWIDTHS, get_bands, judge
-from thud.recordings.recording import _plate
-from thud.recordings.verdict import CONFIDENCE, level_quantities
+from thud.recordings.verdict import CONFIDENCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from thud._schema import BandSet, LimitsSource
     from thud.recordings.estimates import Drop, Estimate
     from thud.recordings.recording import Recording
-    from thud.recordings.verdict import Decision, Quantity
+    from thud.recordings.verdict import Decision
 
 FORMAT = "thud calibration report 1"
 DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
@@ -45,6 +44,8 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
         "instruments": list(config.instruments),
         "mass": config.mass,
         "height": config.height,
+        "mass_uncertainty": config.mass_uncertainty,
+        "height_uncertainty": config.height_uncertainty,
         "calibration_uncertainty": recording.calibration_uncertainty,
         "verdict": verdict.verdict,
         "confidence": CONFIDENCE,
@@ -54,7 +55,10 @@ def report_data(recording: Recording, source: LimitsSource | None = None) -> dic
             method: found.tolist() for method, found in recording.agreement().items()
         },
         "drops": [_drop(drop) for drop in recording.drops],
-        "outliers": [vars(one) for one in recording.average().outliers],
+        "plate": [vars(one) for one in config.plate_checks],
+        "steps": list(recording.level_steps),
+        "remarks": list(recording.doubts),
+        "outliers": [vars(one) for one in recording.outliers],
         "files": [
             {
                 "name": one.name,
@@ -81,16 +85,6 @@ def criteria_data(recording: Recording, source: LimitsSource | None = None) -> l
     verdict = recording.conformity(source)
     found: list[dict[str, Any]] = _known(_criteria(recording, verdict.source, verdict.decisions))
     return found
-
-
-def level_budgets(recording: Recording, bands: BandSet) -> tuple[Quantity, ...]:
-    """Return the average levels with all that makes them uncertain, dB, shape (n_band,)."""
-    plate = _plate(recording.config)
-    return level_quantities(
-        recording.average(bands),
-        recording.calibration_uncertainty,
-        plate.level_uncertainty(bands) if plate else None,
-    )
 
 
 def read_date(text: str) -> datetime | None:
@@ -164,7 +158,7 @@ def _criteria(
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     """Return the levels of the average and of the drops."""
-    average, budgets = recording.average(bands), level_budgets(recording, bands)
+    average, budgets = recording.average(bands), recording.level_quantities(bands)
     columns = ("background", "spread", "flag", "drops")
     return {
         "band": get_bands(bands).nominal.tolist(),
@@ -184,6 +178,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in estimates},
         "restitution_by": drop.restitution_by,
+        "restitutions": {way: _estimate(one) for way, one in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,
         "steps": list(drop.steps),

@@ -32,7 +32,8 @@ LEVELS = {
 FILES = {"name": "name", "sha256": "SHA-256", "date": "date", "calibration": "calibration"}
 PROVENANCE = (
     "name", "thud", "source", "verdict", "confidence", "laboratory", "ball", "serial", "date",
-    "temperature", "mass", "height", "calibration_uncertainty",
+    "temperature", "mass", "height", "mass_uncertainty", "height_uncertainty",
+    "calibration_uncertainty",
 )  # fmt: skip
 
 
@@ -78,10 +79,15 @@ def _attributes(data: dict[str, Any]) -> dict[str, Any]:
     told = {
         kind: "\n".join(
             dict.fromkeys(
-                f"{one['name']}: {sentence}"
-                for key in ("files", "drops")
-                for one in data[key]
-                for sentence in one[kind]
+                [
+                    *data[kind],
+                    *(
+                        f"{one['name']}: {sentence}"
+                        for key in ("files", "drops")
+                        for one in data[key]
+                        for sentence in one[kind]
+                    ),
+                ]
             )
         )
         for kind in ("steps", "remarks")

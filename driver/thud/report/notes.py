@@ -6,7 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 
@@ -41,6 +41,23 @@ def group_sentences(said: Iterable[tuple[str, str]], places: int, kind: str) -> 
             text += f" ({names[0]})" if len(names) == 1 else f" ({len(names)} of {places} {kind})"
         found.append(text)
     return found
+
+
+def group_places(places: Mapping[str, Sequence[tuple[str, Sequence[str]]]]) -> list[str]:
+    """Return sentences of places of several kinds, those of one kind that are alike as one.
+
+    Parameters
+    ----------
+    places
+        By kind, such as ``"drops"``: name and sentences of each place.
+    """
+    return [
+        sentence
+        for kind, ones in places.items()
+        for sentence in group_sentences(
+            [(name, one) for name, sentences in ones for one in sentences], len(ones), kind
+        )
+    ]
 
 
 def fit_lines(

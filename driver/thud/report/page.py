@@ -6,7 +6,6 @@ import html
 import io
 import math
 import re
-from string import Template
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
@@ -14,8 +13,9 @@ import matplotlib as mpl
 from thud.recordings.levels import BACKGROUND, MARGIN
 from thud.recordings.verdict import VERDICTS
 from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
-from thud.report.notes import fit_lines, group_sentences
+from thud.report.notes import fit_lines, group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
+from thud.report.template import BODY, PAGE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -28,7 +28,7 @@ SIZE = 7.3
 WIDTH, COLUMN, LABEL, REASON = 186.0, 91.0, 23.0, 112.0
 # Lines of a value, of the instruments, of files, of the blocks of notes and of a note.
 VALUE_LINES, INSTRUMENT_LINES, FILES = 2, 6, 5
-RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 5, 7
+RESULT_LINES, STEP_LINES, REMARK_LINES = 13, 8, 7
 SENTENCE_LINES = 3
 # Of two drops, none is an outlier.
 MIN_DROPS = 2
@@ -53,7 +53,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         SHA-256 of ``report.json``.
     """
     source = data["source"].replace("_", " ")
-    body = _BODY.substitute(
+    body = BODY.substitute(
         source=_text(source),
         verdict=_text(data["verdict"]),
         reason=_text(_reason(data["criteria"])),
@@ -71,7 +71,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
     )
     title = f"Calibration report: {data['serial'] or data['name']}"
     used = "".join(sorted(set(html.unescape(re.sub(r"<[^>]*>", "", body)))))
-    return _PAGE.substitute(
+    return PAGE.substitute(
         title=_text(title),
         fonts=font_faces(used),
         family=FAMILY,
@@ -200,9 +200,8 @@ def _rule(data: dict[str, Any]) -> str:
     )
 
 
-def _results(data: dict[str, Any]) -> list[str]:
-    """Return sentences on drops, other quantities and methods."""
-    drops, low, high = data["drops"], *BACKGROUND
+def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
+    """Return sentences on means of the drops that are no criteria."""
     names = {"peak_force": ("peak force below 1.25 kHz", "N", 0), "impulse": ("impulse", "N s", 2)}
     names["effective_mass"] = ("effective mass", "kg", 3)
     means = []
@@ -210,10 +209,18 @@ def _results(data: dict[str, Any]) -> list[str]:
         known = [one[key]["value"] for one in drops if one[key]["value"] is not None]
         if known:
             means.append(f"{title} {number(sum(known) / len(known), decimals)} {unit}")
-    ways = list(dict.fromkeys(one["restitution_by"] for one in drops if one["restitution_by"]))
-    found = [f"mean: {', '.join(means)}"]
-    if ways:
-        found.append(f"restitution by {', '.join(ways)}")
+    ways: dict[str, list[float]] = {}
+    for one in drops:
+        for way, estimate in one["restitutions"].items():
+            ways.setdefault(way, []).append(estimate["value"])
+    by = [f"by {way} {number(sum(found) / len(found), 3)}" for way, found in ways.items()]
+    return [f"mean: {', '.join(means)}", *([f"mean restitution: {', '.join(by)}"] if by else [])]
+
+
+def _results(data: dict[str, Any]) -> list[str]:
+    """Return sentences on drops, other quantities and methods."""
+    drops, low, high = data["drops"], *BACKGROUND
+    found = _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
     found.append(
         f"levels: {averaged}, method exact (band energy of the contact and at least "
@@ -224,6 +231,9 @@ def _results(data: dict[str, Any]) -> list[str]:
         found.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
     if "background" in flags:
         found.append(f"levels less than {low:g} dB above the background are upper bounds")
+    met = [one["sentence"] for one in data["plate"] if one["met"]]
+    if met:
+        found.append(f"force plate: {'; '.join(met)}")
     bands = [f"{one['band']:g}" for one in data["criteria"] if one["band"] is not None]
     for method, differences in data["method_differences"].items():
         if any(differences):
@@ -246,12 +256,9 @@ def _outliers(outliers: Iterable[dict[str, Any]]) -> str:
 
 
 def _told(data: dict[str, Any], kind: str) -> list[str]:
-    """Return the steps or remarks of files and drops; those of several in one sentence."""
-    found = []
-    for key in ("files", "drops"):
-        said = [(one["name"], sentence) for one in data[key] for sentence in one[kind]]
-        found += group_sentences(said, len(data[key]), key)
-    return found
+    """Return the steps or remarks of all, of files and of drops; those of several as one."""
+    places = {key: [(one["name"], one[kind]) for one in data[key]] for key in ("files", "drops")}
+    return [*data[kind], *group_places(places)]
 
 
 def _notes(title: str, sentences: Sequence[str], lines: int) -> str:
@@ -294,91 +301,3 @@ def _svg(figure: Figure, prefix: str) -> str:
     assert box  # noqa: S101 - matplotlib writes it
     head = f'<svg class="figure" {box[0]} role="img" preserveAspectRatio="xMidYMax">'
     return head + text[text.index(">") + 1 :]
-
-
-_BODY = Template("""<header>
-<div class="verdict"><b>$verdict</b><br>$reason</div>
-<h1>Calibration report</h1>
-<p>Heavy/soft impact source: $source</p>
-</header>
-<table class="columns"><tr>
-<td><table class="pairs">$about</table></td>
-<td><table class="pairs">$measured</table></td>
-</tr></table>
-<table class="criteria">
-<thead><tr>$head</tr></thead>
-<tbody>
-$rows
-</tbody>
-</table>
-<p class="rule">$rule</p>
-<table class="columns figures"><tr>
-$figures
-</tr></table>
-<table class="columns"><tr>
-<td>$results</td>
-<td>$done$remarks</td>
-</tr></table>
-<h2>Files and their SHA-256</h2>
-<table class="files">$files</table>
-<table class="signature"><tr>
-<td>Place and date</td><td>Name</td><td>Signature</td>
-</tr></table>
-<footer>$footer</footer>
-""")
-
-_PAGE = Template("""<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>$title</title>
-<style>
-$fonts
-@page { size: A4; margin: 9mm 12mm 8mm; }
-:root { color-scheme: light; }
-html { font: ${size}pt/3.4mm '$family', sans-serif; color: #000; background: #fff; }
-body { width: 186mm; margin: 0 auto; font-variant-ligatures: none; overflow-wrap: anywhere; }
-@media screen { body { padding: 11mm 12mm; } }
-h1 { font-size: 15pt; line-height: 6mm; margin: 0 0 1mm; }
-h2 { font-size: ${size}pt; line-height: 3.4mm; margin: 2mm 0 0.6mm; }
-header { border-bottom: 0.4mm solid #000; padding-bottom: 1.5mm; margin-bottom: 2mm;
-  height: 13.5mm; }
-header p { margin: 0; font-size: 9pt; line-height: 4mm; }
-.verdict { float: right; width: 118mm; height: 12.6mm; box-sizing: border-box; padding: 0.8mm 2mm;
-  border: 0.5mm solid #000; text-align: center; font-size: 0.93em; line-height: 2.9mm;
-  overflow: hidden; }
-.verdict b { font-size: 11pt; line-height: 4.4mm; text-transform: uppercase; }
-table { border-collapse: collapse; width: 100%; font-variant-numeric: tabular-nums; }
-td, th { padding: 0; vertical-align: top; text-align: left; }
-.columns { table-layout: fixed; }
-.columns > tbody > tr > td + td { padding-left: 2mm; }
-.columns > tbody > tr > td:first-child { padding-right: 2mm; }
-.pairs { table-layout: fixed; }
-.pairs th { width: 23mm; font-weight: normal; color: #444; }
-.criteria { margin-top: 2mm; border-bottom: 0.3mm solid #000; }
-.criteria th, .criteria td { text-align: right; padding: 0.5mm 0 0.5mm 2mm; white-space: nowrap; }
-.criteria th { border-top: 0.3mm solid #000; border-bottom: 0.2mm solid #000; }
-.criteria tbody tr + tr td { border-top: 0.1mm solid #bbb; }
-.criteria th:first-child, .criteria td:first-child { text-align: left; padding-left: 0; }
-.criteria th:last-child, .criteria td:last-child { text-align: left; width: 29mm; }
-.does-not-conform td:last-child { font-weight: bold; }
-.cannot-be-decided td:last-child { text-decoration: underline; }
-.range { width: 34mm; height: 3.4mm; display: block; margin: 0 auto; }
-.rule { margin: 0.8mm 0 1.2mm; }
-.figures { height: 64mm; }
-.figure { display: block; width: 91mm; height: 64mm; }
-ul { margin: 0; padding: 0 0 0 3mm; list-style: '–  '; }
-.files { table-layout: auto; }
-.files td:last-child { text-align: right; white-space: nowrap; }
-.signature { margin: 11mm -4mm 0; width: 194mm; table-layout: fixed; border-spacing: 4mm 0;
-  border-collapse: separate; }
-.signature td { border-top: 0.2mm solid #000; padding-top: 0.5mm; }
-footer { margin-top: 2mm; color: #444; font-size: 6pt; }
-</style>
-</head>
-<body>
-$body
-</body>
-</html>
-""")

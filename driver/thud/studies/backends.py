@@ -4,32 +4,26 @@ from __future__ import annotations
 
 import logging
 import os
-import signal
 from concurrent.futures import (
     FIRST_COMPLETED,
     Executor,
     Future,
-    ProcessPoolExecutor,
     ThreadPoolExecutor,
     wait,
 )
 from contextlib import contextmanager, suppress
-from multiprocessing import get_context
-from threading import RLock, Thread
 from typing import TYPE_CHECKING, Any
-
-from tqdm import tqdm
 
 from thud._api import api
 from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
 from thud.ensemble import MAX_THREADS
 from thud.errors import NumericalError, ThudError
 from thud.extras import require_extra
+from thud.processes import no_interrupt_in_processes, process_pool
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
-    from multiprocessing import connection
 
     from numpy.typing import NDArray
 
@@ -59,7 +53,7 @@ def run_blocks(
             for block in blocks:
                 if len(running) >= 2 * width:
                     _collect(running, keep)
-                with _no_interrupt_in_processes():
+                with no_interrupt_in_processes():
                     running[executor.submit(evaluate, block)] = block
             while running:
                 _collect(running, keep)
@@ -137,37 +131,8 @@ def _open(
                 api.end_calls()
                 raise
         return
-    # Forked processes would inherit locks held by threads that they do not have.
-    context = get_context("spawn")
-    end, held = context.Pipe(duplex=False)
-    with end, held, ProcessPoolExecutor(width, context, _follow_parent, (end,)) as processes:
-        try:
-            yield processes, width
-        except KeyboardInterrupt:
-            held.close()
-            raise
-
-
-def _follow_parent(end: connection.Connection) -> None:
-    """End with the parent process, or when it closes the other end of a pipe."""
-    # The usual lock is a semaphore of the system, which processes that end like this leave behind.
-    tqdm.set_lock(RLock())
-
-    def end_with_it() -> None:
-        end.poll(None)
-        os._exit(1)
-
-    Thread(target=end_with_it, daemon=True).start()
-
-
-@contextmanager
-def _no_interrupt_in_processes() -> Iterator[None]:
-    """Block Ctrl-C, which terminals send to all processes, in those that are started meanwhile."""
-    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+    with process_pool(width) as processes:
+        yield processes, width
 
 
 @contextmanager

@@ -90,7 +90,7 @@ def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
     key, law = parameter.key, study.temperature
     shown_unit, power = parameter.shown_unit
     meaning = key.meaning
-    if law and parameter.name == "youngs_modulus":
+    if law and parameter.name in law.keys:
         meaning += f" at {law.reference:g} degC; changed by its temperature"
     return {
         "units": key.unit or "1",

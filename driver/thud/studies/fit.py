@@ -5,10 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
 
-from thud.case import Case
+from thud.case import Case, check_case
 from thud.checks import (
     LARGEST_SEED,
     refuse,
@@ -19,11 +20,11 @@ from thud.checks import (
     require_words,
 )
 from thud.columns import read_table
-from thud.errors import FitWarning
+from thud.errors import FitWarning, InputError
 from thud.key import check_keywords
 from thud.record import read_record
 from thud.recordings.formats import FORMATS as RECORDING_FORMATS
-from thud.recordings.recording import Recording, read_recording
+from thud.recordings.read_recording import read_recording
 from thud.studies.directory import FORMATS
 from thud.studies.emulation.answered_levels import answered, confirmed, within_region
 from thud.studies.emulation.plan import read_plan
@@ -32,22 +33,24 @@ from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.level_target import LevelTarget
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
-from thud.studies.fitting.result import Fit
+from thud.studies.fitting.result import Fit, file_ends
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.parameter import quantity
-from thud.studies.study import Study, table_of, with_density
+from thud.studies.study import Study, fix_keys, table_of, with_density
 from thud.units import power_of, scaled
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Sequence
+    from collections.abc import Set as AbstractSet
     from pathlib import Path
 
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from thud.impact import Impact
+    from thud.recordings.recording import Recording
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
     from thud.studies.kind import How
@@ -60,12 +63,16 @@ _MAXIMUM = 100_000
 # What [target] may hold, and the units of its numbers.
 FORCE_KEYS = ("file", "config", *(f.name for f in fields(ForceTarget) if f.name != "record"))
 LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
-TARGET_UNITS = {"noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz"}
+TARGET_UNITS = {
+    "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "hum": "Hz", "gain": "",
+}  # fmt: skip
+
+Target: TypeAlias = ForceTarget | LevelTarget
 
 
 @check_keywords
 def fit(  # noqa: PLR0913 - options of a search
-    target: ForceTarget | LevelTarget | Recording | Impact | tuple[ArrayLike, ArrayLike],
+    target: Target | Recording | Impact | tuple[ArrayLike, ArrayLike] | list[Target],
     parameters: Iterable[str] | Mapping[str, Parameter | float | None],
     case: Case | None = None,
     *,
@@ -85,7 +92,7 @@ def fit(  # noqa: PLR0913 - options of a search
     ----------
     target
         What is fitted; a recording, an impact or arrays of time, s, and force, N, are the record
-        of a `ForceTarget`.
+        of a `ForceTarget`. A list of targets is fitted jointly, each with what is `fixed` for it.
     parameters
         Names of keys of ball, drop or model that take real numbers; as a mapping, with their
         starts or `Parameter`.
@@ -130,21 +137,56 @@ def fit(  # noqa: PLR0913 - options of a search
     require_kind("case", case, Case)
     options = {"confidence": confidence, "starts": starts, "seed": seed, "max_steps": max_steps}
     _require_options(options)
-    ranges = get_ranges(case, bound_parameters(case, parameters))
-    if not isinstance(target, ForceTarget | LevelTarget):
-        target = ForceTarget(target)
+    known = bound_parameters(case, parameters)
+    pairs = _pairs(case, _targets(target), {parameter.name for parameter in known})
     if surrogate is not None and not isinstance(surrogate, Surrogate):
         surrogate = read_surrogate(surrogate)
-    found = _search(case, ranges, target.misfit(), options, surrogate, progress=progress)
+    found = _search(pairs, get_ranges(case, known), options, surrogate, progress=progress)
     for sentence in found.warnings:
         warnings.warn(sentence, FitWarning, stacklevel=3)
     return found
 
 
-def _search(  # noqa: PLR0913 - those of `search`, and a surrogate
-    case: Case,
+def _targets(given: Any) -> tuple[Target, ...]:  # noqa: ANN401 - that is the question
+    """Return the targets of a call of `fit`."""
+    if not isinstance(given, list):
+        given = [given if isinstance(given, Target) else ForceTarget(given)]
+    elif not given or not all(isinstance(one, Target) for one in given):
+        refuse("target is a list of something else", "one or more of ForceTarget and LevelTarget")
+    return tuple(given)
+
+
+def _pairs(
+    case: Case, targets: Sequence[Target], names: AbstractSet[str]
+) -> list[tuple[Case, Misfit]]:
+    """Return the case of each target and what the fit needs of it."""
+    found: list[tuple[Case, Misfit]] = []
+    for number, target in enumerate(targets, start=1):
+        place = "target" if len(targets) == 1 else f"target {number}"
+        require_kind(f"{place}: fixed", target.fixed, Mapping)
+        for name in target.fixed:
+            if name in names or name == "model":
+                refuse(
+                    f"{place}: fixed {name} is not allowed",
+                    "keys of ball, drop and model that are not among [parameters]",
+                )
+        own, density = fix_keys(case, target.fixed, f"{place}: fixed")
+        own = own if density is None else with_density(own, density)
+        try:
+            if target.fixed:
+                check_case(replace(own, modes=None))
+            found.append((own, target.misfit()))
+        except InputError as error:
+            if len(targets) == 1:
+                raise
+            message = f"{place}: {str(error).removeprefix('target: ')}"
+            raise InputError(message) from error
+    return found
+
+
+def _search(
+    pairs: list[tuple[Case, Misfit]],
     ranges: list[Range],
-    misfit: Misfit,
     options: Mapping[str, Any],
     surrogate: Surrogate | None,
     *,
@@ -152,10 +194,19 @@ def _search(  # noqa: PLR0913 - those of `search`, and a surrogate
 ) -> Fit:
     """Return the best fit by the model or, where there is one, by a surrogate."""
     if surrogate is None:
-        return search(case, ranges, misfit, options, progress=progress)
-    by_answers = answered(misfit, surrogate, case, [entry.name for entry in ranges])
+        return search(pairs, ranges, options, progress=progress)
     inside = [within_region(entry, surrogate) for entry in ranges]
-    return confirmed(search(case, inside, by_answers, options, progress=progress), by_answers)
+    return confirmed(
+        search(_answered(pairs, surrogate, ranges), inside, options, progress=progress)
+    )
+
+
+def _answered(
+    pairs: list[tuple[Case, Misfit]], surrogate: Surrogate, parameters: Iterable[Range | Parameter]
+) -> list[tuple[Case, Misfit]]:
+    """Return pairs whose impacts a surrogate answers."""
+    names = [parameter.name for parameter in parameters]
+    return [(case, answered(misfit, surrogate, case, names)) for case, misfit in pairs]
 
 
 def _require_options(options: Mapping[str, Any]) -> None:
@@ -171,7 +222,7 @@ class FitStudy(Study):
 
     Attributes
     ----------
-    target : ForceTarget or LevelTarget
+    targets : tuple of ForceTarget and LevelTarget
         What is fitted.
     tables : dict
         The file as JSON holds it.
@@ -181,7 +232,7 @@ class FitStudy(Study):
         What answers the drops instead of the model.
     """
 
-    target: ForceTarget | LevelTarget = field(default_factory=lambda: LevelTarget(()))
+    targets: tuple[Target, ...] = ()
     tables: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
     surrogate: Surrogate | None = None
@@ -194,13 +245,22 @@ class FitStudy(Study):
 
     def own_identity(self) -> dict[str, str]:
         """Return target and search."""
-        vector = self.target.misfit().target_vector()
-        return {
-            **{f"[target] {key}": f"{value!r}" for key, value in self.tables["target"].items()},
-            "numbers of [target]": hashlib.sha256(vector.tobytes()).hexdigest()[:16],
-            **{name: f"{value!r}" for name, value in self.options.items()},
-            **({"surrogate": self.surrogate.digest} if self.surrogate else {}),
-        }
+        tables = self.tables["target"]
+        tables = tables if isinstance(tables, list) else [tables]
+        found: dict[str, str] = {}
+        for end, table, (_, misfit) in zip(
+            file_ends(len(tables)), tables, self.pairs(), strict=True
+        ):
+            found |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
+            digest = hashlib.sha256(misfit.data().tobytes()).hexdigest()[:16]
+            found[f"numbers of [target{end}]"] = digest
+        if self.surrogate:
+            found["surrogate"] = self.surrogate.digest
+        return found | {name: f"{value!r}" for name, value in self.options.items()}
+
+    def pairs(self) -> list[tuple[Case, Misfit]]:
+        """Return the case of each target and what the fit needs of it."""
+        return _pairs(self.case, self.targets, {parameter.name for parameter in self.parameters})
 
 
 class FitKind(Kind[FitStudy, Fit]):
@@ -221,15 +281,20 @@ class FitKind(Kind[FitStudy, Fit]):
         case = study.case
         if study.density is not None:
             case = with_density(case, study.density)
-        target = _read_target(table_of(given, "target"), folder)
+        tables = given.get("target")
+        if not isinstance(tables, list):
+            tables = [table_of(given, "target")]
+        elif not tables or not all(isinstance(table, dict) for table in tables):
+            refuse_value("target", tables, "a table [target], or several [[target]]")
+        targets = tuple(_read_target(table, folder) for table in tables)
         options = {name: given.get(name, default) for name, default in OPTIONS.items()}
         _require_options(options)
         get_ranges(case, study.parameters)
-        target.misfit()
         # JSON knows neither dates nor infinity.
-        tables = json.loads(json.dumps(given, default=str), parse_constant=str)
+        shown = json.loads(json.dumps(given, default=str), parse_constant=str)
         head = {**vars(study), "case": case}
-        found = FitStudy(**head, target=target, tables=tables, options=options)
+        found = FitStudy(**head, targets=targets, tables=shown, options=options)
+        found.pairs()
         if "surrogate" not in given:
             return found
         trained = read_plan(table_of(given, "surrogate"), folder)
@@ -242,16 +307,14 @@ class FitKind(Kind[FitStudy, Fit]):
     ) -> FitStudy:
         """Return a study whose drops a surrogate answers. Raises InputError where it cannot."""
         trained = given if isinstance(given, Surrogate) else read_surrogate(given)
-        names = [parameter.name for parameter in study.parameters]
-        answered(study.target.misfit(), trained, study.case, names)
+        _answered(study.pairs(), trained, study.parameters)
         return replace(study, surrogate=trained)
 
     def compute(self, study: FitStudy, folder: Path | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
         """Return the fit."""
         return _search(
-            study.case,
+            study.pairs(),
             get_ranges(study.case, study.parameters),
-            study.target.misfit(),
             study.options,
             study.surrogate,
             progress=how.get("progress", False),
@@ -265,18 +328,22 @@ class FitKind(Kind[FitStudy, Fit]):
         """Return the identity of a fit."""
         return dict(json.loads(path.read_bytes())["identity"])
 
-    def other_files(self, study: FitStudy) -> list[str]:  # noqa: ARG002
+    def other_files(self, study: FitStudy) -> list[str]:
         """Return the names of the other files."""
-        figures = [f"{name}{ending}" for name in ("fit", "confidence") for ending in FORMATS]
-        return ["fit.csv", "fitted.nml", *figures]
+        ends = file_ends(len(study.targets))
+        names = [*(f"fit{end}" for end in ends), "confidence"]
+        figures = [f"{name}{ending}" for name in names for ending in FORMATS]
+        files = [name for end in ends for name in (f"fit{end}.csv", f"fitted{end}.nml")]
+        return [*files, *figures]
 
     def table(self, result: Fit, study: FitStudy) -> str:
         """Return the fit as text."""
         return f"{study.name}\n\n{result.table(study.units)}"
 
     def remarks(self, result: Fit) -> list[str]:
-        """Return the warnings, and what is not plausible in the impact that was found."""
-        return [*result.warnings, *result.impact.remarks]
+        """Return the warnings, and what is not plausible in the impacts that were found."""
+        own = [remark for target in result.targets for remark in target.impact.remarks]
+        return [*result.warnings, *dict.fromkeys(own)]
 
     def succeeded(self, result: Fit) -> bool:
         """Return whether the search has converged."""
@@ -294,7 +361,7 @@ class FitKind(Kind[FitStudy, Fit]):
 KIND = FitKind()
 
 
-def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarget:
+def _read_target(table: dict[str, Any], folder: Path) -> Target:
     if ("file" in table) == ("levels" in table):
         refuse("[target] takes one of file and levels", "file = 'record.csv' or levels = [...]")
     require_words("[target]", table, FORCE_KEYS if "file" in table else LEVEL_KEYS)
@@ -309,9 +376,6 @@ def _read_target(table: dict[str, Any], folder: Path) -> ForceTarget | LevelTarg
             if name in options:
                 options[name] = _measured(f"[target] {name}", options[name], unit)
         return LevelTarget(**options)
-    if not isinstance(options.get("time_shift", True), bool):
-        given = options["time_shift"]
-        refuse_value("[target] time_shift", given, "true, false")
     paths = {word: options.pop(word) for word in ("file", "config") if word in options}
     for word, name in paths.items():
         if not isinstance(name, str) or not name.strip():

@@ -21,8 +21,9 @@ from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied
-from thud.studies.sets import SetStudy, read_temperature
+from thud.studies.sets import SetStudy
 from thud.studies.study import table_of
+from thud.studies.temperature import read_temperature
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
@@ -66,10 +67,10 @@ class DropsKind(Kind[SetStudy, R]):
         written = given.get("format", _FILE_FORMATS[0])
         require_choice("format", written, _FILE_FORMATS)
         law = table_of(given, "temperature") if "temperature" in given else None
-        temperature = read_temperature(law, study.parameters)
+        temperature = read_temperature(law, study.case, study.parameters)
         design = read_design(table_of(given, "design"), self.designs, study.parameters)
-        # Sets need neither snapshots nor free modes.
-        case = replace(study.case, modes=None)
+        # Sets need neither snapshots nor free modes nor a compression.
+        case = replace(study.case, modes=None, compression=None)
         owned = (key for key in KEYS if key.owner == study.model)
         files = {key.name: 0.0 for key in owned if key.group == OF_FILES}
         if case.model and files:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from thud.checks import refuse, require_words
 from thud.ensemble import get_cost
-from thud.keys import DENSITY, TEMPERATURE
+from thud.keys import DENSITY
 from thud.studies.designs import makers, unit_sets
-from thud.studies.parameter import checked
 from thud.studies.study import Study, wall_volume
 
 if TYPE_CHECKING:
@@ -21,7 +18,7 @@ if TYPE_CHECKING:
 
     from thud.studies.emulation.plan import Plan
     from thud.studies.emulation.surrogate import Surrogate
-    from thud.studies.parameter import Parameter
+    from thud.studies.temperature import Temperature
 
     Columns = dict[str, NDArray[Any]]
 
@@ -30,14 +27,6 @@ if TYPE_CHECKING:
 _BLOCK_TIME = 0.5
 # Sets of a block that a surrogate answers, in about this time.
 _ANSWERED = 2**16
-
-
-@dataclass(frozen=True)
-class Temperature:
-    """Temperature law of the modulus, E (1 + c (T - T_ref)): T_ref in degC, c in 1/K."""
-
-    reference: float
-    coefficient: float
 
 
 @dataclass(frozen=True)
@@ -51,7 +40,7 @@ class SetStudy(Study):
     size, seed : int
         Number of sets that are drawn (of base samples for ``"saltelli"``), and the seed.
     temperature : Temperature or None
-        Law of the modulus where the temperature varies.
+        Law of the material where the temperature varies.
     format : str
         ``"netcdf"``, ``"zarr"``, or ``"auto"``: Zarr for what is large.
     plan : Plan or None
@@ -77,7 +66,7 @@ class SetStudy(Study):
         if self.size:
             found |= {"[design] size": f"{self.size}", "[design] seed": f"{self.seed}"}
         if self.temperature:
-            found |= {f"[temperature] {k}": f"{v!r}" for k, v in vars(self.temperature).items()}
+            found |= {f"[temperature] {k}": f"{v!r}" for k, v in self.temperature.given.items()}
         if self.plan:
             found |= self.plan.identity
         elif self.surrogate:
@@ -126,7 +115,7 @@ class SetStudy(Study):
     def key_columns(self, columns: Columns) -> Columns:
         """Return sets of `parameter_columns` as values of keys of the library, shape (n_set,).
 
-        The density determines the mass, the temperature the modulus of elasticity.
+        The density determines the mass, the temperature modulus and loss factor.
         """
         found = dict(columns)
         density = found.pop(DENSITY.name, self.density)
@@ -134,26 +123,4 @@ class SetStudy(Study):
             ball = vars(self.case.ball) | found
             volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
             found["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
-        temperature = found.pop(TEMPERATURE.name, None)
-        if self.temperature and temperature is not None:
-            law = self.temperature
-            modulus = found.get("youngs_modulus", self.case.ball.youngs_modulus)
-            change = law.coefficient * (temperature - law.reference)
-            found["youngs_modulus"] = modulus * (1 + change)
-        return found
-
-
-def read_temperature(given: object, parameters: tuple[Parameter, ...]) -> Temperature | None:
-    """Return the law of the modulus in the table ``[temperature]``."""
-    varies = any(parameter.key == TEMPERATURE for parameter in parameters)
-    if varies != (given is not None):
-        refuse(
-            "temperature needs both a parameter and the table [temperature]",
-            "reference, degC, and coefficient, 1/K, in [temperature]",
-        )
-    if not isinstance(given, Mapping):
-        return None
-    words = ("reference", "coefficient")
-    require_words("[temperature]", given, words)
-    numbers = (checked(f"[temperature] {w}", TEMPERATURE, given.get(w), 0) for w in words)
-    return Temperature(*map(float, numbers))
+        return self.temperature.act(self.case, found) if self.temperature else found

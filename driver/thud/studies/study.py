@@ -164,7 +164,7 @@ def read_common(
     is_text = isinstance(name, str) and name.strip() and name.isprintable()
     if not is_text or name == ".." or Path(name).name != name:
         refuse_value("name", name, "the name of a file, without folders")
-    case, density = _fix(_case(given.get("case"), folder, fixed), fixed)
+    case, density = fix_keys(_case(given.get("case"), folder, fixed), fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
     found = tuple(
@@ -199,13 +199,15 @@ def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
     return case
 
 
-def _fix(case: Case, fixed: Mapping[str, Any]) -> tuple[Case, float | None]:
-    """Return the case with fixed keys, and a density if it is fixed."""
+def fix_keys(
+    case: Case, fixed: Mapping[str, Any], table: str = "[fixed]"
+) -> tuple[Case, float | None]:
+    """Return the case with the fixed keys of a table, and a density if it is fixed."""
     values: dict[str, object] = {}
     for name, entry in fixed.items():
         if name == "model":
             continue
-        place = f"[fixed] {name}"
+        place = f"{table} {name}"
         key, place_in_list = find_key(name, case.model.name)  # type: ignore[union-attr]
         if key == TEMPERATURE:
             refuse(f"{place} is not allowed", "temperature in [parameters]")
@@ -238,7 +240,7 @@ def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
     refusals = []
     for share in SHARES:
         try:
-            check_case(replace(study.trial_case(share), modes=None))
+            check_case(replace(study.trial_case(share), modes=None, compression=None))
         except InputError as error:
             refusals.append(str(error))
     named = [_NAMED_KEY.match(refusal) for refusal in refusals]

@@ -28,6 +28,7 @@ module thud_hollow_sphere
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: solve => solve_hollow_sphere
       procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: compress
    end type hollow_sphere_type
 
    !> The choices of `momentum_flux`.
@@ -82,6 +83,31 @@ contains
       modulus = 1.6e6_wp
    end function get_paper_modulus
 
+   !> Force on each of two plates that press the shell slowly: each flattens a cap of half their approach.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> The options, none of which counts.
+      class(hollow_sphere_type), intent(in) :: options
+      !> Approach of the plates, ascending, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The caps meet.
+      type(error_type), allocatable, intent(out) :: error
+      type(shell_type) :: shell
+      integer :: i
+
+      force = 0.0_wp
+      shell = new_shell(ball, 0.0_wp, 0.0_wp)
+      if (deflection(size(deflection)) >= shell%closing_deflection) then
+         error = numerical_error('&compression: max_deflection = '//to_text(deflection(size(deflection))) &
+            //' m closes the shell; allowed: less than the height of the cavity, '//to_text(shell%closing_deflection)//' m')
+         return
+      end if
+      force = [(shell%stiffness*deflection(i)/2 + get_gas_force(shell, deflection(i)/2, caps=2), i=1, size(deflection))]
+   end subroutine compress
+
    !> The equation of motion of a ball.
    pure function new_shell(ball, compression_weight, restitution_weight) result(shell)
       type(ball_type), intent(in) :: ball
@@ -122,16 +148,19 @@ contains
    end function get_volume_ratio
 
    !> Force of the enclosed gas, N (paper eq. 2): adiabatic overpressure on the flat cap.
-   pure function get_gas_force(shell, deflection) result(force)
+   pure function get_gas_force(shell, deflection, caps) result(force)
       class(shell_type), intent(in) :: shell
       !> Deflection, m; below the closing deflection.
       real(wp), intent(in) :: deflection
+      !> Number of caps that are flattened so far (default: 1).
+      integer, intent(in), optional :: caps
       !> Force, N.
       real(wp) :: force
-      real(wp) :: overpressure
+      real(wp) :: overpressure, ratio
 
-      overpressure = shell%initial_pressure*get_volume_ratio(shell, deflection)**(-shell%heat_capacity_ratio) &
-         - shell%ambient_pressure
+      ratio = get_volume_ratio(shell, deflection)
+      if (present(caps)) ratio = 1 - caps*(1 - ratio)
+      overpressure = shell%initial_pressure*ratio**(-shell%heat_capacity_ratio) - shell%ambient_pressure
       force = overpressure*pi*deflection*(2*shell%radius - deflection)
    end function get_gas_force
 

@@ -14,14 +14,15 @@ module thud_modal_ball
    use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_lapack, only: dgemv
-   use thud_legendre, only: get_legendre
+   use thud_lapack, only: dgemm, dgemv
    use thud_modal_ball_options, only: modal_ball_options_type
-   use thud_mode_step, only: get_energy, mode_step_type, set_factors
-   use thud_ring_contact, only: new_ring_contact, ring_contact_type, solve_contact
+   use thud_modal_compression, only: compress_modal_ball
+   use thud_modal_damping, only: set_damping
+   use thud_mode_step, only: advance, get_energies, mode_step_type, place_q, place_v, set_factors
+   use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_sphere_modes, only: basis_type, new_basis
-   use thud_sphere_modes, only: family_type, get_family, get_static_family
+   use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
+   use thud_surface_rings, only: new_surface_rings, surface_rings_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -41,26 +42,29 @@ module thud_modal_ball
    type, extends(modal_ball_options_type) :: modal_ball_type
    contains
       procedure, pass(options) :: solve
+      procedure, pass(options) :: compress
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
 
    !> Motion of the ball.
    type :: state_type
-      !> Amplitudes of the modes, m sqrt(kg): [n_mode].
-      real(wp), allocatable :: q(:)
-      !> Their rates: [n_mode].
-      real(wp), allocatable :: v(:)
+      !> Amplitudes of the modes, m sqrt(kg), their rates and strains of their branches: [n_mode, 2 + n_branch].
+      real(wp), allocatable :: motion(:, :)
       !> Height of the centre of mass, m.
       real(wp) :: height
       !> Its velocity upwards, m/s.
       real(wp) :: speed
+      !> Its acceleration downwards without contact, m/s2.
+      real(wp) :: gravity = 0.0_wp
       !> Energy that damping has taken, J.
       real(wp) :: loss = 0.0_wp
-      !> Workspace of a step: motion at its beginning, push of the floor on the modes: [n_mode].
-      real(wp), allocatable, dimension(:) :: old_q, old_v, push
-      !> Gaps between rings and floor, m: [n_ring].
+      !> Workspace of a step: motion at its beginning; push of the floor on the modes: [n_mode].
+      real(wp), allocatable :: before(:, :), push(:)
+      !> Gaps between rings and floor, and of rings that stick to where they touched first, m: [n_gap].
       real(wp), allocatable :: gap(:)
+      !> Gaps of the undeformed ball with its centre on the floor, m: [n_gap].
+      real(wp), allocatable :: start(:)
    end type state_type
 
 contains
@@ -71,7 +75,7 @@ contains
       !> The time, s.
       real(wp) :: cost
 
-      cost = 6.0e-3_wp*(options%rings/44.0_wp)
+      cost = 1.2e-2_wp*(options%rings/60.0_wp)
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3; of linear modes an effective modulus).
@@ -82,6 +86,22 @@ contains
 
       modulus = 1.6e6_wp
    end function get_paper_modulus
+
+   !> Force on each of two plates that press the ball slowly.
+   subroutine compress(ball, options, deflection, force, error)
+      !> The ball, with the gas that it has in the press.
+      type(ball_type), intent(in) :: ball
+      !> Harmonics and rings.
+      class(modal_ball_type), intent(in) :: options
+      !> Approach of the plates, ascending, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The rings cannot be distinguished, or the ball lies on the outermost one.
+      type(error_type), allocatable, intent(out) :: error
+
+      call compress_modal_ball(ball, options, deflection, force, error)
+   end subroutine compress
 
    !> Force history of one drop.
    subroutine solve(ball, drop, options, sampling, history, error)
@@ -97,6 +117,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(mode_step_type) :: step
       type(ring_contact_type) :: contact
+      type(surface_rings_type) :: rings
       real(wp) :: interval
       integer :: n_sample, i
 
@@ -108,67 +129,66 @@ contains
          'energy_rest_J']
       allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
-      call prepare(ball, options, interval, step, contact, error)
+      rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
+      call prepare(ball, options, rings, interval, step, contact, error)
       if (allocated(error)) return
-      call march(ball, sampling, interval, step, contact, history, error)
+      call march(ball, merge(drop%gravity, 0.0_wp, options%contact_gravity), sampling, interval, rings, step, contact, &
+         history, error)
    end subroutine solve
 
    !> Modes, their steps and the response of the rings.
-   subroutine prepare(ball, options, interval, step, contact, error)
+   subroutine prepare(ball, options, rings, interval, step, contact, error)
       type(ball_type), intent(in) :: ball
-      !> Modes, rings and damping.
+      !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
+      type(surface_rings_type), intent(in) :: rings
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(mode_step_type), intent(out) :: step
       type(ring_contact_type), intent(out) :: contact
       !> The modes cannot be computed, or the rings cannot be distinguished.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: response(options%rings, options%rings)
+      real(wp) :: response(rings%n_way*options%rings, rings%n_way*options%rings)
       real(wp), allocatable :: zeta(:)
       logical :: failed
-      integer :: i
 
-      response = interval/ball%mass
-      call add_modes(ball, options, interval, step, response, error)
+      response = 0.0_wp
+      response(::rings%n_way, ::rings%n_way) = interval/ball%mass
+      call add_modes(ball, options, rings, interval, step, response, error)
       if (allocated(error)) return
-      allocate (zeta(size(step%omega)), source=options%loss_factor/2)
-      if (options%damping_law == 'rising') zeta = zeta*step%omega/(2*pi*options%loss_frequency)
+      allocate (zeta, mold=step%omega)
+      call set_damping(options, step, zeta)
       call set_factors(step, zeta, interval)
-      do i = 1, options%rings
-         response(:, i) = response(:, i) + matmul(step%qv*step%fall(:, i), step%fall)
-      end do
-      call new_ring_contact(response, contact, failed)
+      response = response + matmul(transpose(step%fall), spread(step%factor(:, place_q, place_v), 2, &
+         size(response, 1))*step%fall)
+      call new_ring_contact(response, rings%n_way, contact, failed)
       if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
          //' cannot be distinguished; allowed: fewer rings, more static_harmonics, or more substeps')
    end subroutine prepare
 
    !> Modes of all harmonics, and the static response of the rings to what these leave out.
-   subroutine add_modes(ball, options, interval, step, response, error)
+   subroutine add_modes(ball, options, rings, interval, step, response, error)
       type(ball_type), intent(in) :: ball
-      !> Modes and rings.
+      !> Modes.
       class(modal_ball_options_type), intent(in) :: options
+      type(surface_rings_type), intent(in) :: rings
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       !> Gets frequencies, harmonics and falls of the modes.
       type(mode_step_type), intent(inout) :: step
-      !> Gets the fall of each ring by unit impulse on each added, m/(N s): [n_ring, n_ring].
+      !> Gets the fall of each ring by unit impulse on each added, m/(N s): [n_gap, n_gap].
       real(wp), intent(inout) :: response(:, :)
       !> The modes cannot be computed.
       type(error_type), allocatable, intent(out) :: error
       type(basis_type) :: basis
       type(family_type) :: family
-      real(wp) :: angle(options%rings), shape(options%rings, 2)
-      real(wp), dimension(0:options%static_harmonics, options%rings) :: value, first, second
+      real(wp), dimension(size(response, 1), 2, 0:options%static_harmonics) :: sunk
+      real(wp), allocatable :: fall(:, :)
       logical :: failed
-      integer :: n, i, kept, k
+      integer :: n, kept, k, last
 
-      angle = get_ring_angles(options%rings)
-      do i = 1, options%rings
-         call get_legendre(cos(angle(i)), value(:, i), first(:, i), second(:, i))
-      end do
       basis = new_basis(ball, options%static_harmonics, options%cavity_gas)
-      allocate (step%omega(0), step%harmonic(0), step%fall(0, options%rings))
+      allocate (step%omega(0), step%harmonic(0), fall(size(response, 1), (options%harmonics + 1)*options%radial_modes))
       do n = 0, options%static_harmonics
          call check_interrupt(error)
          if (allocated(error)) return
@@ -186,71 +206,64 @@ contains
                //' cannot be computed; allowed: fewer harmonics, or a thinner wall')
             return
          end if
-         ! Fall of the rings' height by unit U and V: P_n cos t and -dP_n/dt sin t.
-         shape(:, 1) = value(n, :)*cos(angle)
-         shape(:, 2) = first(n, :)*sin(angle)**2
-         response = response + matmul(shape, matmul(family%flexibility, transpose(shape)))/interval
-         if (size(family%omega) == 0) cycle
+         sunk(:, :, n) = matmul(rings%fall(:, :, n), family%flexibility)
+         last = size(step%omega) + size(family%omega)
+         fall(:, size(step%omega) + 1:last) = matmul(rings%fall(:, :, n), family%surface)
          step%omega = [step%omega, family%omega]
          step%harmonic = [step%harmonic, (n, k=1, size(family%omega))]
-         step%fall = reshape([transpose(step%fall), matmul(shape, family%surface)], [size(step%omega), options%rings], &
-            order=[2, 1])
       end do
+      step%fall = transpose(fall(:, :last))
+      associate (rows => size(response, 1), columns => size(sunk)/size(response, 1))
+         call dgemm('N', 'T', rows, rows, columns, 1/interval, sunk, rows, rings%fall, rows, 1.0_wp, response, rows)
+      end associate
    end subroutine add_modes
 
-   !> Angles of the rings from the lowest point to the equator.
-   pure function get_ring_angles(n_ring) result(angle)
-      integer, intent(in) :: n_ring
-      !> Angles, rad: [n_ring].
-      real(wp) :: angle(n_ring)
-      integer :: i
-
-      angle = [(pi/2*(i - 1)/(n_ring - 1), i=1, n_ring)]
-   end function get_ring_angles
-
    !> Marches from first touch until the ball has left for good.
-   subroutine march(ball, sampling, interval, step, contact, history, error)
+   subroutine march(ball, gravity, sampling, interval, rings, step, contact, history, error)
       type(ball_type), intent(in) :: ball
+      !> Gravity that acts during the contact, m/s2.
+      real(wp), intent(in) :: gravity
       type(sampling_type), intent(in) :: sampling
       !> Length of a step, s.
       real(wp), intent(in) :: interval
+      type(surface_rings_type), intent(in) :: rings
       type(mode_step_type), intent(in) :: step
       type(ring_contact_type), intent(inout) :: contact
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
       type(state_type) :: state
-      real(wp), dimension(size(step%fall, 2)) :: height, radius
       real(wp) :: impulse, quiet
       integer :: i, j, n_step, last
 
-      height = ball%outer_radius*cos(get_ring_angles(size(height)))
-      radius = ball%outer_radius*sin(get_ring_angles(size(radius)))
-      allocate (state%q, state%v, state%old_q, state%old_v, state%push, source=0*step%omega)
-      allocate (state%gap, mold=height)
+      allocate (state%motion(size(step%omega), 2 + size(step%time)), state%before(size(step%omega), 2 + size(step%time)), &
+         source=0.0_wp)
+      allocate (state%push, mold=step%omega)
+      allocate (state%gap(size(step%fall, 2)), state%start(size(step%fall, 2)), source=0.0_wp)
+      state%start(::rings%n_way) = -ball%outer_radius*rings%height
       state%height = ball%outer_radius
       state%speed = -history%impact_velocity
-      ! The ball has left for good when nothing touched for half a period of its slowest mode: its
-      ! surface may touch again while it swings back.
+      state%gravity = gravity
+      ! The surface may touch again while the slowest mode swings back, half a period later.
       quiet = 0.0_wp
-      if (size(step%omega) > 0) quiet = pi/minval(step%omega)
+      if (size(step%omega) > 0) quiet = pi/(sqrt(step%spring)*minval(step%omega))
       last = 0
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
             n_step = (i - 1)*sampling%substeps + j
-            call take_step(step, interval, ball%mass, height, state, contact, impulse, error)
+            call take_step(step, interval, ball%mass, state, contact, impulse, error)
             call check_interrupt(error)
             if (allocated(error)) return
             if (contact%last > 0) then
                last = n_step
                history%impulse = history%impulse + impulse
                history%part(i, 1) = history%part(i, 1) + impulse*sampling%sample_rate
-               history%channel(i, 1) = max(history%channel(i, 1), radius(contact%last))
+               history%channel(i, 1) = max(history%channel(i, 1), ball%outer_radius*rings%radius(contact%last))
             end if
-            if (contact%last == size(height)) then
+            if (contact%last == size(rings%radius)) then
                error = numerical_error('&drop: '//to_text(1.0e3_wp*n_step*interval)//' ms after first touch the ball lies ' &
-                  //'on its equator, its centre sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
+                  //'on its outermost ring, its centre sunk by '//to_text(1.0e3_wp*(ball%outer_radius - state%height)) &
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
@@ -264,16 +277,14 @@ contains
       end if
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(ball%mass, step, state, history, error)
+      if (.not. allocated(error)) call finish(ball, n_step*interval, step, state, history, error)
    end subroutine march
 
    !> One step of the modes, and the impulses of the floor at its beginning.
-   subroutine take_step(step, interval, mass, height, state, contact, impulse, error)
+   subroutine take_step(step, interval, mass, state, contact, impulse, error)
       type(mode_step_type), intent(in) :: step
       !> Length of the step, s; mass of the ball, kg.
       real(wp), intent(in) :: interval, mass
-      !> Heights of the rings of the undeformed ball below its centre, m: [n_ring].
-      real(wp), intent(in) :: height(:)
       !> Motion of the ball.
       type(state_type), intent(inout) :: state
       !> The rings; get their impulses.
@@ -282,40 +293,44 @@ contains
       real(wp), intent(out) :: impulse
       !> The contact cannot be solved.
       type(error_type), allocatable, intent(out) :: error
-      integer :: n_mode
+      integer :: i, n_mode, n_gap
 
       n_mode = size(step%omega)
-      associate (q => state%q, v => state%v, old_q => state%old_q, old_v => state%old_v, push => state%push, &
-         gap => state%gap)
-         old_q = q
-         old_v = v
-         q = step%qq*old_q + step%qv*old_v
-         v = step%vq*old_q + step%vv*old_v
+      associate (motion => state%motion, before => state%before, push => state%push, gap => state%gap, way => contact%n_way)
+         before = motion
+         call advance(step, before, motion)
          push = 0.0_wp
          impulse = 0.0_wp
-         state%height = state%height + interval*state%speed
-         gap = state%height - height
-         if (n_mode > 0) call dgemv('T', n_mode, size(height), -1.0_wp, step%fall, n_mode, q, 1, 1.0_wp, gap, 1)
+         state%height = state%height + interval*(state%speed - interval*state%gravity/2)
+         state%speed = state%speed - interval*state%gravity
+         gap = state%start
+         gap(::way) = gap(::way) + state%height
+         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, step%fall, n_mode, motion, 1, 1.0_wp, gap, 1)
          call solve_contact(contact, gap, error)
          if (allocated(error)) return
-         if (contact%last > 0) then
-            impulse = sum(contact%impulse(:contact%last))
-            if (n_mode > 0) call dgemv('N', n_mode, contact%last, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
+         call follow_sliding(contact, state%start)
+         n_gap = contact%last_gap
+         if (n_gap > 0) then
+            impulse = sum(contact%impulse(:n_gap:way))
+            if (n_mode > 0) call dgemv('N', n_mode, n_gap, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
                0.0_wp, push, 1)
-            q = q - step%qv*push
-            v = v - step%vv*push
+            do i = 1, size(motion, 2)
+               motion(:, i) = motion(:, i) - step%factor(:, i, place_v)*push
+            end do
             state%speed = state%speed + impulse/mass
             state%height = state%height + interval*impulse/mass
          end if
          ! The loss by damping lies between the impulse at the beginning and the end of the step.
-         state%loss = state%loss + get_energy(step, old_q, old_v - push) - get_energy(step, q, v)
+         before(:, place_v) = before(:, place_v) - push
+         state%loss = state%loss + sum(get_energies(step, before) - get_energies(step, motion))
       end associate
    end subroutine take_step
 
    !> Scalars of the impact, and the check of the balances.
-   subroutine finish(mass, step, state, history, error)
-      !> Mass of the ball, kg.
-      real(wp), intent(in) :: mass
+   subroutine finish(ball, time, step, state, history, error)
+      type(ball_type), intent(in) :: ball
+      !> Time since first touch, s.
+      real(wp), intent(in) :: time
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball after the contact.
       type(state_type), intent(in) :: state
@@ -323,19 +338,21 @@ contains
       type(force_history_type), intent(inout) :: history
       !> The balance of energy does not close.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: energy
+      real(wp) :: energy, gain, initial
 
-      energy = get_energy(step, state%q, state%v) + state%loss
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
       history%peak_force = maxval(history%floor_force)
       history%peak_elastic_force = history%peak_force
       call continue_to_zero(history)
-      history%restitution = state%speed/history%impact_velocity
-      associate (momentum => mass*(history%impact_velocity + state%speed), initial => mass/2*history%impact_velocity**2)
-         history%impulse_residual = abs(history%impulse - momentum)/momentum
-         history%energy_residual = abs(mass/2*state%speed**2 + energy - initial)/initial
-      end associate
+      ! Back to the end of the contact.
+      history%restitution = (state%speed + state%gravity*(time - history%contact_time))/history%impact_velocity
+      gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
+      history%impulse_residual = abs(history%impulse - gain)/gain
+      initial = ball%mass/2*history%impact_velocity**2
+      energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
+         + sum(get_energies(step, state%motion)) + state%loss
+      history%energy_residual = abs(energy - initial)/initial
       if (.not. history%energy_residual <= max_energy_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
             //to_text(history%energy_residual)//'; allowed: up to '//to_text(max_energy_residual))
@@ -351,14 +368,16 @@ contains
       !> Number of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
+      real(wp) :: energy(size(step%omega))
       integer :: k, place
 
+      energy = get_energies(step, state%motion)
       history%deflection(i) = ball%outer_radius - state%height
       history%velocity(i) = -state%speed
       history%max_deflection = max(history%max_deflection, history%deflection(i))
-      do k = 1, size(state%q)
+      do k = 1, size(energy)
          place = 2 + min(step%harmonic(k), n_family)
-         history%channel(i, place) = history%channel(i, place) + (state%v(k)**2 + (step%omega(k)*state%q(k))**2)/2
+         history%channel(i, place) = history%channel(i, place) + energy(k)
       end do
    end subroutine record_motion
 

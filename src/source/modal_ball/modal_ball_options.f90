@@ -5,6 +5,7 @@ module thud_modal_ball_options
    use thud_field, only: field_type, list_type, name_length
    use thud_kinds, only: wp
    use thud_new_field, only: choice_field, integer_field, list_field, logical_field, real_field
+   use thud_prony, only: check_fractional_loss
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
@@ -16,21 +17,27 @@ module thud_modal_ball_options
    !> Options of the model.
    type, abstract, extends(source_model_type) :: modal_ball_options_type
       !> Highest harmonic n whose modes oscillate.
-      integer :: harmonics = 32
+      integer :: harmonics = 48
       !> Modes of each harmonic that oscillate.
       integer :: radial_modes = 5
       !> Highest harmonic whose static flexibility counts.
-      integer :: static_harmonics = 96
-      !> Rings of the lower half of the surface.
-      integer :: rings = 44
-      !> Loss factor: `constant`, or `rising` in proportion to frequency.
+      integer :: static_harmonics = 180
+      !> Rings of the surface that take the pressure.
+      integer :: rings = 60
+      !> Loss factor: `constant`, `rising` in proportion to frequency, or of a `fractional` law.
       character(len=name_length) :: damping_law = 'constant'
       !> Loss factor, twice the damping ratio.
       real(wp) :: loss_factor = 0.1_wp
-      !> Frequency of this loss factor where it rises, Hz.
+      !> Frequency of this loss factor where it is not constant, Hz; there the ball's modulus is the storage modulus.
       real(wp) :: loss_frequency = 74.0_wp
+      !> Order of the derivative of a fractional law.
+      real(wp) :: fractional_order = 0.3_wp
       !> The gas in the cavity resists changes of its volume.
       logical :: cavity_gas = .true.
+      !> Gravity acts during the contact too.
+      logical :: contact_gravity = .false.
+      !> Friction of the floor: `none`, or `stick`, by which touching rings do not slide.
+      character(len=name_length) :: floor_friction = 'none'
       !> Harmonics that answer statically instead of oscillating.
       type(list_type) :: static_families
    contains
@@ -44,7 +51,7 @@ contains
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(modal_ball_options_type), intent(in), target :: options
-      !> One field per component: [9].
+      !> One field per component: [12].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -52,19 +59,25 @@ contains
          integer_field('radial_modes', options%radial_modes, 'modes of each harmonic that oscillate', '[1, 20]'), &
          integer_field('static_harmonics', options%static_harmonics, &
          'highest harmonic whose static flexibility counts', '[4, 400]'), &
-         integer_field('rings', options%rings, 'rings of the lower half of the surface', '[2, static_harmonics/2]'), &
+         integer_field('rings', options%rings, 'rings of the surface, from the lowest point to 60 degrees', &
+         '[2, static_harmonics/3]'), &
          choice_field('damping_law', options%damping_law, 'loss factor against frequency', &
-         [character(len=8) :: 'constant', 'rising']), &
+         [character(len=10) :: 'constant', 'rising', 'fractional']), &
          real_field('loss_factor', options%loss_factor, '', 'loss factor, twice the damping ratio', &
          '[0, 1.9]'), &
-         real_field('loss_frequency', options%loss_frequency, 'Hz', 'frequency of a rising loss factor', &
-         '[0.1, 100000]'), &
+         real_field('loss_frequency', options%loss_frequency, 'Hz', &
+         'frequency of a loss factor that is not constant; of fractional also of the modulus', '[0.1, 100000]'), &
+         real_field('fractional_order', options%fractional_order, '', &
+         'order of the derivative, of fractional; 1: rising', '(0, 1]'), &
          logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
+         logical_field('contact_gravity', options%contact_gravity, 'gravity acts during the contact too'), &
+         choice_field('floor_friction', options%floor_friction, 'friction of the floor: none, or without end', &
+         [character(len=5) :: 'none', 'stick']), &
          list_field('static_families', options%static_families, '', 'harmonics that answer statically', &
          '[0, harmonics]', whole=.true.)]
    end function get_fields
 
-   !> Refuses rings that are too few for the harmonics.
+   !> Refuses rings that are too few for the harmonics, and losses that no fractional law has.
    subroutine check(ball, options, sampling, error)
       type(ball_type), intent(in) :: ball
       !> The options, each inside its own range.
@@ -72,9 +85,13 @@ contains
       type(sampling_type), intent(in) :: sampling
       type(error_type), allocatable, intent(out) :: error
 
-      if (2*options%rings < options%harmonics) error = input_error('&modal_ball: harmonics = ' &
-         //to_text(options%harmonics)//' is too high for rings = '//to_text(options%rings) &
-         //'; allowed: up to twice the rings')
+      if (3*options%rings < options%harmonics) then
+         error = input_error('&modal_ball: harmonics = '//to_text(options%harmonics)//' is too high for rings = ' &
+            //to_text(options%rings)//'; allowed: up to three times the rings')
+      else if (options%damping_law == 'fractional') then
+         call check_fractional_loss('modal_ball', options%fractional_order, options%loss_factor, options%loss_frequency, &
+            error)
+      end if
    end subroutine check
 
 end module thud_modal_ball_options

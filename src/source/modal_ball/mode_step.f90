@@ -1,64 +1,122 @@
-!> Exact time steps of damped modes of unit modal mass, q'' + 2 zeta omega q' + omega^2 q = 0.
+!> Exact time steps of damped modes of unit modal mass.
+!>
+!> Of a linear viscoelastic material: q'' + 2 zeta omega q' + omega**2 [g q + sum of g_k (q - x_k)] = 0 and
+!> x_k' = (q - x_k)/tau_k, the modulus being that of a spring g, Maxwell branches g_k and a viscosity.
 module thud_mode_step
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: get_energy, mode_step_type, set_factors
+   public :: advance, get_energies, mode_step_type, set_factors
 
-   !> The modes and one step of each: q and v = q' go to (qq q + qv v, vq q + vv v); an impulse p
-   !> at the beginning adds -p (qv, vv).
+   !> Places of amplitude q and rate v in the motion of a mode; the strains x of the branches follow.
+   integer, parameter, public :: place_q = 1, place_v = 2
+
+   !> The modes and one step of each: their motion is multiplied by the factors; an impulse p at the beginning
+   !> adds -p times the factors of the rate.
    type :: mode_step_type
-      !> Angular frequencies, rad/s: [n_mode].
+      !> Angular frequencies of the storage modulus, rad/s: [n_mode].
       real(wp), allocatable :: omega(:)
       !> Harmonic of each mode: [n_mode].
       integer, allocatable :: harmonic(:)
-      !> Factors of one step: [n_mode] each.
-      real(wp), allocatable :: qq(:), qv(:), vq(:), vv(:)
+      !> Long-term modulus over the storage modulus.
+      real(wp) :: spring = 1.0_wp
+      !> Moduli of the branches over the storage modulus, and their relaxation times, s: [n_branch].
+      real(wp), allocatable :: share(:), time(:)
+      !> Factors of one step: [n_mode, 2 + n_branch, 2 + n_branch].
+      real(wp), allocatable :: factor(:, :, :)
       !> Fall of each ring's height by unit amplitude: [n_mode, n_ring].
       real(wp), allocatable :: fall(:, :)
    end type mode_step_type
 
 contains
 
-   !> Factors of one step, also of overdamped modes.
+   !> Factors of one step.
    pure subroutine set_factors(step, damping_ratio, interval)
-      !> The modes, their frequencies set.
+      !> The modes, their frequencies and branches set.
       type(mode_step_type), intent(inout) :: step
-      !> Damping ratio of each mode: [n_mode].
+      !> Damping ratio of each mode, that of the viscosity: [n_mode].
       real(wp), intent(in) :: damping_ratio(:)
       !> Length of a step, s.
       real(wp), intent(in) :: interval
-      real(wp), dimension(size(step%omega)) :: zeta, decay, root, c, s
+      real(wp) :: rates(2 + size(step%time), 2 + size(step%time))
+      integer :: i, k, n
 
-      ! Critical damping has no closed form of either kind; a millionth off makes no difference.
-      zeta = merge(1 + 1.0e-6_wp, damping_ratio, abs(damping_ratio - 1) < 1.0e-6_wp)
-      decay = zeta*step%omega
-      root = step%omega*sqrt(abs(1 - zeta**2))
-      where (zeta < 1)
-         c = exp(-decay*interval)*cos(root*interval)
-         s = exp(-decay*interval)*sin(root*interval)/root
-      else where
-         c = (exp((root - decay)*interval) + exp(-(root + decay)*interval))/2
-         s = (exp((root - decay)*interval) - exp(-(root + decay)*interval))/(2*root)
-      end where
-      step%qq = c + decay*s
-      step%qv = s
-      step%vq = -step%omega**2*s
-      step%vv = c - decay*s
+      n = size(rates, 1)
+      allocate (step%factor(size(step%omega), n, n))
+      do i = 1, size(step%omega)
+         ! The rate over the frequency keeps the elements alike.
+         associate (omega => step%omega(i))
+            rates = 0.0_wp
+            rates(place_q, place_v) = omega
+            rates(place_v, place_q) = -omega*(step%spring + sum(step%share))
+            rates(place_v, place_v) = -2*damping_ratio(i)*omega
+            rates(place_v, 3:) = omega*step%share
+            do k = 3, n
+               rates(k, [place_q, k]) = [1, -1]/step%time(k - 2)
+            end do
+            rates = get_exponential(interval*rates)
+            rates(:, place_v) = rates(:, place_v)/omega
+            rates(place_v, :) = rates(place_v, :)*omega
+         end associate
+         step%factor(i, :, :) = rates
+      end do
    end subroutine set_factors
 
-   !> Energy of the modes, J.
-   pure function get_energy(step, q, v) result(energy)
-      type(mode_step_type), intent(in) :: step
-      !> Amplitudes, m sqrt(kg): [n_mode].
-      real(wp), intent(in) :: q(:)
-      !> Their rates: [n_mode].
-      real(wp), intent(in) :: v(:)
-      !> Kinetic and elastic energy, J.
-      real(wp) :: energy
+   !> Exponential of a matrix, by its series for a small part of it, and squares.
+   pure function get_exponential(matrix) result(exponential)
+      real(wp), intent(in) :: matrix(:, :)
+      !> The same shape.
+      real(wp) :: exponential(size(matrix, 1), size(matrix, 1))
+      real(wp) :: part(size(matrix, 1), size(matrix, 1))
+      ! Of a part with the norm 1/4 the rest of the series is 1e-18.
+      integer, parameter :: n_term = 12
+      integer :: i, k, n_square
 
-      energy = sum(v**2 + (step%omega*q)**2)/2
-   end function get_energy
+      n_square = max(0, exponent(maxval(sum(abs(matrix), dim=2))) + 2)
+      part = matrix/2.0_wp**n_square
+      exponential = 0.0_wp
+      do k = n_term, 0, -1
+         if (k < n_term) exponential = matmul(part, exponential)/(k + 1)
+         do i = 1, size(matrix, 1)
+            exponential(i, i) = exponential(i, i) + 1
+         end do
+      end do
+      do i = 1, n_square
+         exponential = matmul(exponential, exponential)
+      end do
+   end function get_exponential
+
+   !> Motion of the modes a step on.
+   pure subroutine advance(step, before, after)
+      type(mode_step_type), intent(in) :: step
+      !> Motion at the beginning and at the end of the step: [n_mode, 2 + n_branch].
+      real(wp), intent(in) :: before(:, :)
+      real(wp), intent(out) :: after(:, :)
+      integer :: i, k
+
+      do i = 1, size(after, 2)
+         after(:, i) = step%factor(:, i, 1)*before(:, 1)
+         do k = 2, size(before, 2)
+            after(:, i) = after(:, i) + step%factor(:, i, k)*before(:, k)
+         end do
+      end do
+   end subroutine advance
+
+   !> Kinetic and elastic energy of each mode, J.
+   pure function get_energies(step, motion) result(energy)
+      type(mode_step_type), intent(in) :: step
+      !> The motion: [n_mode, 2 + n_branch].
+      real(wp), intent(in) :: motion(:, :)
+      !> The energies: [n_mode].
+      real(wp) :: energy(size(step%omega))
+      integer :: k
+
+      energy = step%spring*motion(:, place_q)**2
+      do k = 1, size(step%share)
+         energy = energy + step%share(k)*(motion(:, place_q) - motion(:, 2 + k))**2
+      end do
+      energy = (motion(:, place_v)**2 + step%omega**2*energy)/2
+   end function get_energies
 
 end module thud_mode_step

@@ -1,5 +1,9 @@
 !> Unilateral contact of surface rings with a plane: impulses p >= 0 and gaps g + A p >= 0 of
 !> which one is zero for every ring, a linear complementarity problem.
+!>
+!> Rings that stick have a second gap, that to the place where they touched first, and a second impulse of any sign.
+!> It closes the gap of the rings that touched in the step before: which these are does not hang on what is sought, so
+!> that there is always one solution, and what a step holds too long or too late goes with the length of the step.
 module thud_ring_contact
    use thud_error, only: error_type, numerical_error
    use thud_kinds, only: wp
@@ -8,7 +12,7 @@ module thud_ring_contact
    implicit none (type, external)
    private
 
-   public :: new_ring_contact, ring_contact_type, solve_contact
+   public :: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
 
    !> Gap that counts as closed, m: rounding of heights.
    real(wp), parameter :: closed = 1.0e-12_wp
@@ -18,25 +22,29 @@ module thud_ring_contact
 
    !> Rings, ordered from the lowest point outwards.
    type :: ring_contact_type
-      !> Gap by unit impulses, m/(N s): [n_ring, n_ring].
+      !> Gaps of a ring: 1, or 2 where it sticks; they follow each other.
+      integer :: n_way = 1
+      !> Gap by unit impulses, m/(N s): [n_gap, n_gap].
       real(wp), allocatable :: response(:, :)
       !> Its Cholesky factor. The touching rings are nearly always the first ones, and the factor of
-      !> a leading block is the leading block of the factor: [n_ring, n_ring].
+      !> a leading block is the leading block of the factor: [n_gap, n_gap].
       real(wp), allocatable :: factor(:, :)
-      !> Impulse of each ring in the last step, N s: [n_ring].
-      real(wp), allocatable :: impulse(:)
-      !> Rings that touched in the last step: [n_ring].
-      logical, allocatable :: touches(:)
-      !> Number of the outermost ring that touches, 0 for none.
-      integer :: last = 0
+      !> Impulses in the last step, N s, and gaps after it, m: [n_gap].
+      real(wp), allocatable :: impulse(:), after(:)
+      !> Rings that touched in the last step, and rings that are held in their places: [n_ring].
+      logical, allocatable :: touches(:), holds(:)
+      !> Number of the outermost ring that touches, and of the last gap that an impulse closed; 0 for none.
+      integer :: last = 0, last_gap = 0
    end type ring_contact_type
 
 contains
 
    !> Prepares the contact.
-   subroutine new_ring_contact(response, contact, failed)
-      !> Gap by unit impulses, symmetric, m/(N s): [n_ring, n_ring].
+   subroutine new_ring_contact(response, n_way, contact, failed)
+      !> Gap by unit impulses, symmetric, m/(N s): [n_gap, n_gap].
       real(wp), intent(in) :: response(:, :)
+      !> Gaps of a ring.
+      integer, intent(in) :: n_way
       !> The contact, nothing touching.
       type(ring_contact_type), intent(out) :: contact
       !> The response is not positive definite.
@@ -46,8 +54,9 @@ contains
       n = size(response, 1)
       allocate (contact%response, source=response)
       allocate (contact%factor, source=response)
-      allocate (contact%impulse(n), source=0.0_wp)
-      allocate (contact%touches(n), source=.false.)
+      contact%n_way = n_way
+      allocate (contact%impulse(n), contact%after(n), source=0.0_wp)
+      allocate (contact%touches(n/n_way), contact%holds(n/n_way), source=.false.)
       call dpotrf('L', n, contact%factor, n, info)
       failed = info /= 0
    end subroutine new_ring_contact
@@ -56,25 +65,23 @@ contains
    subroutine solve_contact(contact, gap, error)
       !> The contact; impulses and touching rings are those of this step afterwards.
       type(ring_contact_type), intent(inout) :: contact
-      !> Gaps without contact, m: [n_ring].
+      !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
       !> The touching rings were not found.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: after(size(gap))
-      logical :: wrong(size(gap))
+      logical :: wrong(size(contact%touches))
       integer :: round, first_wrong
       logical :: failed
 
-      if (.not. any(contact%touches)) contact%touches = gap < 0.0_wp
+      if (.not. any(contact%touches)) contact%touches = gap(::contact%n_way) < 0.0_wp
       do round = 1, max_rounds
          call close_gaps(contact, gap, failed)
          if (failed) exit
-         if (contact%last == 0) then
-            after = gap
-         else
-            after = gap + matmul(contact%response(:, :contact%last), contact%impulse(:contact%last))
-         end if
-         wrong = merge(contact%impulse < 0.0_wp, after < -closed, contact%touches)
+         associate (n => contact%last_gap, way => contact%n_way)
+            contact%after = gap
+            if (n > 0) contact%after = gap + matmul(contact%response(:, :n), contact%impulse(:n))
+            wrong = merge(contact%impulse(::way) < 0.0_wp, contact%after(::way) < -closed, contact%touches)
+         end associate
          if (.not. any(wrong)) return
          if (round < max_rounds/2) then
             contact%touches = contact%touches .neqv. wrong
@@ -88,34 +95,49 @@ contains
          //' rounds; allowed: fewer rings, or more substeps')
    end subroutine solve_contact
 
-   !> Impulses that close the gaps of the touching rings.
+   !> Holds the rings that touch where they are at the end of a step.
+   pure subroutine follow_sliding(contact, start)
+      type(ring_contact_type), intent(inout) :: contact
+      !> Gaps without motion, m: [n_gap].
+      real(wp), intent(inout) :: start(:)
+
+      if (contact%n_way == 1) return
+      where (.not. contact%holds) start(2::2) = start(2::2) - contact%after(2::2)
+      contact%holds = contact%touches
+   end subroutine follow_sliding
+
+   !> Impulses that close the gaps of the touching rings, and those of the rings that are held.
    subroutine close_gaps(contact, gap, failed)
       type(ring_contact_type), intent(inout) :: contact
-      !> Gaps without contact, m: [n_ring].
+      !> Gaps without contact, m: [n_gap].
       real(wp), intent(in) :: gap(:)
       !> The response of the touching rings is not positive definite.
       logical, intent(out) :: failed
       real(wp), allocatable :: matrix(:, :), solution(:, :)
-      integer, allocatable :: touching(:)
+      integer, allocatable :: places(:)
+      logical :: closes(size(gap))
       integer :: i, n, info
 
-      n = count(contact%touches)
+      closes(::contact%n_way) = contact%touches
+      if (contact%n_way == 2) closes(2::2) = contact%holds
+      n = count(closes)
+      contact%last_gap = findloc(closes, .true., dim=1, back=.true.)
       contact%last = findloc(contact%touches, .true., dim=1, back=.true.)
       contact%impulse = 0.0_wp
       failed = .false.
       if (n == 0) return
-      if (contact%last == n) then
+      if (contact%last_gap == n) then
          contact%impulse(:n) = -gap(:n)
          call dtrsv('L', 'N', 'N', n, contact%factor, size(gap), contact%impulse, 1)
          call dtrsv('L', 'T', 'N', n, contact%factor, size(gap), contact%impulse, 1)
       else
-         allocate (touching(n), matrix(n, n), solution(n, 1))
-         touching = pack([(i, i=1, size(gap))], contact%touches)
-         matrix = contact%response(touching, touching)
-         solution(:, 1) = -gap(touching)
+         allocate (places(n), matrix(n, n), solution(n, 1))
+         places = pack([(i, i=1, size(gap))], closes)
+         matrix = contact%response(places, places)
+         solution(:, 1) = -gap(places)
          call dposv('L', n, 1, matrix, n, solution, n, info)
          failed = info /= 0
-         if (.not. failed) contact%impulse(touching) = solution(:, 1)
+         if (.not. failed) contact%impulse(places) = solution(:, 1)
       end if
    end subroutine close_gaps
 

@@ -219,7 +219,7 @@ contains
    !> Flexibility of a whole harmonic, without its modes.
    subroutine get_static_family(basis, harmonic, family, failed)
       type(basis_type), intent(in) :: basis
-      !> Harmonic n, at least 2.
+      !> Harmonic n, any but 1.
       integer, intent(in) :: harmonic
       !> The flexibility; no modes.
       type(family_type), intent(out) :: family

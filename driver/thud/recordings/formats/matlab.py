@@ -42,11 +42,13 @@ NUMBERS = {
 }
 TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16"}
 MATRIX, COMPRESSED = 14, 15
-# Classes of arrays that are text and numbers; cells, structures and others are not read.
+# Classes of arrays that are structures, text and numbers; cells and others are not read.
+STRUCTURE = 2
 CHAR = 4
 NUMERIC = range(6, 16)
 COMPLEX = 0x0800
 MOST_VARIABLES = 1000
+DEEPEST = 8
 MOST_NUMBERS = 2**24
 # Most that is unpacked at once, bytes.
 PIECE = 2**20
@@ -67,11 +69,10 @@ def read_channels(path: Path) -> list[Channel]:
     with path.open("rb") as file:
         order = "<" if file.read(HEADER)[126:128] == b"IM" else ">"
         for element in _variables(file, order, name):
-            key, value = _array(element.data, order, name)
-            if value is not None:
+            for key, value in _arrays(element.data, order, name):
                 values[key] = value
-            if len(values) > MOST_VARIABLES:
-                refuse(f"{name}: more than {MOST_VARIABLES} variables", "a recording")
+                if len(values) > MOST_VARIABLES:
+                    refuse(f"{name}: more than {MOST_VARIABLES} variables", "a recording")
     return channels_of_variables(values, name)
 
 
@@ -129,20 +130,52 @@ def _elements(data: memoryview, order: str, name: str) -> Iterator[_Element]:
         begin = after
 
 
-def _array(data: memoryview, order: str, name: str) -> tuple[str, NDArray[np.generic] | None]:
-    """Return name and values of an array; None where they are no real numbers or text."""
-    found = list(itertools.islice(_elements(data, order, name), 4))
-    flags, shape, title, values = found + [_Element(0, data[:0])] * (4 - len(found))
-    if len(flags.data) < 8:  # noqa: PLR2004 - class and flags, and a size
-        return "", None
-    (bits,) = struct.unpack_from(f"{order}I", flags.data)
+def _arrays(
+    data: memoryview, order: str, name: str, depth: int = 0
+) -> Iterator[tuple[str, NDArray[np.generic]]]:
+    """Yield names and values of an array, or of the fields of a structure of one element."""
+    found = list(itertools.islice(_elements(data, order, name), 3 + MOST_VARIABLES))
+    if len(found) < 4 or len(found[0].data) < 8:  # noqa: PLR2004 - class and flags, and a size
+        return
+    (bits,) = struct.unpack_from(f"{order}I", found[0].data)
+    key = bytes(found[2].data).decode("latin-1")
+    if bits & 0xFF != STRUCTURE:
+        value = _array(found, bits, order, name)
+        if value is not None:
+            yield key, value
+        return
+    if depth == DEEPEST:
+        refuse(f"{name}: structures in more than {DEEPEST} structures", "a recording")
+    number = np.frombuffer(found[3].data, f"{order}i4")
+    length = int(number[0]) if number.size else 0
+    if length < 1 or len(found) < 5:  # noqa: PLR2004 - the names of the fields
+        return
+    names = bytes(found[4].data)
+    words = [
+        names[k : k + length].partition(b"\0")[0].decode("latin-1")
+        for k in range(0, len(names), length)
+    ]
+    # Of several elements, each has all fields.
+    if len(found) - 5 != len(words):
+        refuse(
+            f"{name}: {shown_text(key)} is an array of structures, or damaged",
+            "a structure of one element, or vectors as variables of their own",
+        )
+    for word, field in zip(words, found[5:], strict=True):
+        for inner, value in _arrays(field.data, order, name, depth + 1):
+            yield f"{key}/{word}{inner}", value
+
+
+def _array(found: list[_Element], bits: int, order: str, name: str) -> NDArray[np.generic] | None:
+    """Return the values of an array; None where they are no real numbers or text."""
+    _, shape, title, values = found[:4]
     key = bytes(title.data).decode("latin-1")
     if bits & 0xFF == CHAR and values.kind in TEXTS:
         coding = TEXTS[values.kind]
         coding += ("-le" if order == "<" else "-be") * (coding == "utf-16")
-        return key, np.array(bytes(values.data).decode(coding, "replace"))
+        return np.array(bytes(values.data).decode(coding, "replace"))
     if bits & 0xFF not in NUMERIC or bits & COMPLEX or values.kind not in NUMBERS:
-        return key, None
+        return None
     numbers: NDArray[np.generic] = np.frombuffer(values.data, order + NUMBERS[values.kind])
     if numbers.size > MOST_NUMBERS:
         refuse(
@@ -152,4 +185,4 @@ def _array(data: memoryview, order: str, name: str) -> tuple[str, NDArray[np.gen
     lengths = np.frombuffer(shape.data, f"{order}i4").tolist()
     if math.prod(lengths) != numbers.size or min(lengths, default=0) < 0:
         refuse(f"{name}: {numbers.size} values, {lengths} are due", "an undamaged MATLAB file")
-    return key, numbers.reshape(lengths, order="F")
+    return numbers.reshape(lengths, order="F")

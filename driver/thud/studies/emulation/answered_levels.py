@@ -99,22 +99,28 @@ def within_region(entry: Range, surrogate: Surrogate) -> Range:
     return replace(entry, low=low, high=high, spread=spread)
 
 
-def confirmed(found: Fit, misfit: AnsweredLevels) -> Fit:
-    """Return a fit with the impact of the model itself, and what that says of the surrogate."""
-    impact = compute(found.case)
-    answer = misfit.values(misfit.solve(found.case))
-    missed = (misfit.values(impact) - answer) / misfit.model_error
-    share = misfit.model_error / misfit.deviation
+def confirmed(found: Fit) -> Fit:
+    """Return a fit with the impacts of the model itself, and what these say of the surrogate."""
+    targets = []
+    missed = share = 0.0
+    for target in found.targets:
+        misfit = cast("AnsweredLevels", target.misfit)
+        impact = compute(target.case)
+        off = (misfit.values(impact) - misfit.values(target.impact)) / misfit.model_error
+        missed = max(missed, float(np.abs(off).max()))
+        if misfit.known_noise:
+            share = max(share, float((misfit.model_error / misfit.deviation).max() ** 2))
+        targets.append(replace(target, impact=impact))
     sentences = []
-    if misfit.known_noise:
+    if share:
         sentences.append(
-            f"the errors of the surrogate are up to {100 * float(share.max()) ** 2:.2g} % of the "
-            "variances of the residuals"
+            f"the errors of the surrogate are up to {100 * share:.2g} % of the variances of the "
+            "residuals"
         )
     # One in 15 000 of a normal distribution; held-out errors have longer tails.
-    if np.abs(missed).max() > 4:  # noqa: PLR2004
+    if missed > 4:  # noqa: PLR2004
         sentences.append(
-            "the model itself differs at the result from the surrogate by "
-            f"{np.abs(missed).max():.2g} standard deviations of the surrogate's errors"
+            f"the model itself differs at the result from the surrogate by {missed:.2g} standard "
+            "deviations of the surrogate's errors"
         )
-    return replace(found, impact=impact, warnings=(*found.warnings, *sentences))
+    return replace(found, targets=tuple(targets), warnings=(*found.warnings, *sentences))

@@ -2,38 +2,53 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
 from scipy.signal import ZoomFFT
 
-from thud.checks import refuse, refuse_value, require_choice, require_whole
+from thud.checks import refuse, refuse_value, require_choice, require_number, require_whole
 from thud.impact import FORCES, Impact
 from thud.levels import RECORDED_BAND
 from thud.record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
-from thud.studies.fitting.misfit import Misfit, require_positive
+from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit, require_positive
+from thud.studies.fitting.record_noise import (
+    MIN_HUM,
+    MIN_QUIET,
+    Quiet,
+    Weights,
+    find_pulse,
+    hum_harmonics,
+    new_weights,
+    trimmed,
+)
+from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import ArrayLike, NDArray
 
     from thud._schema import LevelsForce
-    from thud.recordings.estimates import Drop
+    from thud.recordings.noise import Background
 
 # Part of that frequency that rounded times leave open.
 SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
-# A warning needs this many independent values during contact and otherwise, this probability of
-# Fisher's F, and a residual above this part of the peak force, which exceeds sampling errors.
+# A comparison of contact and quiet needs this many independent values of each, and any test a
+# residual above this part of the peak force, which exceeds sampling errors.
 MIN_FREEDOM = 5
-SURE = 0.999
 NUMERICAL = 1e-4
-# Quiet with fewer independent values in the band does not tell the noise.
-MIN_QUIET = 50
+# Standard deviations that make hum worth telling.
+NOTABLE = 3.0
+# Scale of a shift in time, s.
+SHIFT_SCALE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,17 +56,18 @@ class ForceTarget:
     """A force history to be fitted.
 
     Model and record are compared in the frequencies up to `below`: their discrete Fourier
-    transforms over the time of the record. White noise of the record is white there too, so that
-    the residuals are independent and a shift in time is a phase; what lies above is noise, or
-    numerical ripple.
+    transforms over the time of the record, in which a shift in time is a phase. What lies above is
+    noise, or numerical ripple. The residuals are weighted by the covariance of the noise, white,
+    pink and brown, which the quiet before and after the pulse shows (generalised least squares);
+    offset and hum are nuisance parameters. More quiet than 0.1 s on each side does not count.
 
     Attributes
     ----------
     record : Recording, Impact or pair of array_like
         The force; of arrays: time, s, and force, N, both of shape (n_sample,).
     noise : float or None
-        Standard deviation of the noise of one sample, N; None: that of the quiet around a measured
-        drop, in the compared band, and otherwise it is estimated from the residual.
+        Standard deviation of the noise of one sample, white, N; None: the noise is that of the
+        quiet, or with less than 50 independent values of it estimated from the residual, as white.
     force : str or None
         ``"floor"`` (what a force plate measures) or ``"elastic"``: the force of the model, and
         of an impact as target.
@@ -60,10 +76,20 @@ class ForceTarget:
     below : float
         Highest frequency that is compared, Hz.
     window : tuple of float or None
-        Begin and end, s, of the part of the record that counts; None: all of it. The time of a
-        measured drop is 0 at first touch.
+        Begin and end, s, of the part of the record that counts; None: the pulse with 0.1 s on each
+        side. The time of a measured drop is 0 at first touch.
     drop : int
         Number of the drop of a recording that has several, from 1.
+    offset : bool or None
+        An offset is a nuisance parameter; None: where there is enough quiet.
+    hum : float or None
+        Frequency, Hz, of hum whose first five harmonics are nuisance parameters; 0: there is none;
+        None: hum of 50 or 60 Hz, and tones of other frequencies, as far as the quiet shows them.
+    gain : float or None
+        Relative standard uncertainty of the calibration: a factor of the record is fitted, known to
+        be 1 to this extent; infinite: not known; None: it is 1.
+    fixed : mapping of str to object
+        Keys of ball, drop and model that are different for this record, such as the drop height.
     """
 
     record: Recording | Impact | tuple[ArrayLike, ArrayLike]
@@ -73,42 +99,72 @@ class ForceTarget:
     below: float = RECORDED_BAND
     window: tuple[float, float] | None = None
     drop: int = 1
+    offset: bool | None = None
+    hum: float | None = None
+    gain: float | None = None
+    fixed: Mapping[str, object] = field(default_factory=dict)
 
     def misfit(self) -> ForceMisfit:
         """Return what the fit needs of the target."""
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
-        kind = self.force or (self.record.judged() if isinstance(self.record, Impact) else "floor")
-        if self.noise is not None:
-            require_positive("noise", self.noise, "N")
-        require_positive("below", self.below, "Hz")
-        count = len(self.record.drops) if isinstance(self.record, Recording) else 1
-        require_whole("target: drop", self.drop, 1, count)
+        self._require_numbers()
         time, force, rate = self._samples()
         if self.window is not None:
             time, force = _cut(time, force, self.window)
-        shift = not isinstance(self.record, Impact) if self.time_shift is None else self.time_shift
+        elif not isinstance(self.record, Impact | Recording):
+            part = trimmed(force, rate)
+            time, force = time[part], force[part]
         if not 2 / len(time) * rate <= self.below < rate / 2:
             refuse(
                 f"target: below = {self.below} is not allowed",
                 f"{2 / len(time) * rate:g} <= below < {rate / 2:g} Hz",
             )
-        last = force[time > time[-1] - END].mean()
-        if last > OPEN_END * force.max():
+        low = np.quantile(force, 0.1)
+        last = (force[time > time[-1] - END].mean() - low) / (force.max() - low)
+        if last > OPEN_END:
             refuse(
-                f"target: the force ends with {last / force.max():.0%} of its peak",
+                f"target: the force ends with {last:.0%} of its peak",
                 "a record of a whole impact",
             )
-        noise = self.noise
-        if noise is None and isinstance(self.record, Recording):
-            noise = _quiet_noise(self.record.drops[self.drop - 1], self.below)
-        return ForceMisfit(time, force, rate, noise, kind, self.below, free_shift=shift)
+        return ForceMisfit(self, Record(time, force, rate), self._pulse(time, force, rate))
+
+    def _require_numbers(self) -> None:
+        if self.noise is not None:
+            require_positive("noise", self.noise, "N")
+        require_positive("below", self.below, "Hz")
+        count = len(self.record.drops) if isinstance(self.record, Recording) else 1
+        require_whole("target: drop", self.drop, 1, count)
+        if self.hum is not None:
+            require_number("target: hum", self.hum)
+            if self.hum and not MIN_HUM <= self.hum <= self.below:
+                allowed = f"0, or {MIN_HUM:g} to {self.below:g} Hz"
+                refuse_value("target: hum", self.hum, allowed)
+        for name in ("time_shift", "offset"):
+            value = getattr(self, name)
+            if value is not None and not isinstance(value, bool):
+                refuse_value(f"target: {name}", value, "true, false")
+        if self.gain is not None and self.gain != np.inf:
+            require_positive("gain", self.gain, "relative standard uncertainty, or infinite")
+
+    def _pulse(
+        self, time: NDArray[np.float64], force: NDArray[np.float64], rate: float
+    ) -> tuple[int, int]:
+        """Return the first sample that is no quiet, and the one behind the last."""
+        if isinstance(self.record, Impact):
+            return 0, len(force)
+        if not isinstance(self.record, Recording):
+            return find_pulse(force, rate)
+        drop = self.record.drops[self.drop - 1]
+        first, stop = np.searchsorted(time, drop.time[[drop.gate[0], drop.gate[1] - 1]])
+        return int(first), min(int(stop) + 1, len(force))
 
     def _samples(self) -> Record:
         given = self.record
         if isinstance(given, Recording):
             drop = given.drops[self.drop - 1]
-            return Record(drop.time, drop.force, drop.sample_rate)
+            # With what was removed: the fit weighs it itself.
+            return Record(drop.time, drop.force + drop.contact.under, drop.sample_rate)
         if isinstance(given, Impact):
             return Record(given.time, given.force(self.force), given.sample_rate)
         try:
@@ -121,23 +177,6 @@ class ForceTarget:
                 error,
             )
         return read_record(table, "target")
-
-
-def _quiet_noise(drop: Drop, below: float) -> float | None:
-    """Return the deviation of white noise that has the density of the quiet below a frequency, N.
-
-    The deviation of the samples would count what is above that frequency. None where there is too
-    little quiet.
-    """
-    first, stop = drop.gate
-    power, count = 0.0, 0
-    for quiet in (drop.force[:first], drop.force[stop:]):
-        number = 1 + int(below * len(quiet) / drop.sample_rate)
-        if len(quiet) > 1:
-            spectrum = np.fft.rfft(quiet, norm="ortho")[:number]
-            power += float((_parts(spectrum) ** 2).sum())
-            count += 2 * len(spectrum) - 1
-    return float(np.sqrt(power / count)) if count >= MIN_QUIET and power > 0 else None
 
 
 def _cut(
@@ -161,31 +200,76 @@ class ForceMisfit(Misfit):
     """How far the force of an impact is from a record, by frequency."""
 
     deviation_unit = "N"
+    deviation_source = "noise, or 50 independent values of quiet,"
 
-    def __init__(  # noqa: PLR0913, PLR0917 - what `ForceTarget.misfit` has checked
-        self,
-        time: NDArray[np.float64],
-        force: NDArray[np.float64],
-        sample_rate: float,
-        noise: float | None,
-        kind: LevelsForce,
-        below: float,
-        *,
-        free_shift: bool,
-    ) -> None:
-        self.time, self.force, self.sample_rate = time, force, sample_rate
-        self.kind, self.known_noise, self.free_shift = kind, noise is not None, free_shift
-        self.unit_deviation = noise or 1.0
-        self.below = below
-        self.period = len(time) / sample_rate
-        self.frequency = np.arange(int(below * self.period * (1 + SAME)) + 1) / self.period
-        # Orthonormal: white noise of a deviation in time is white noise of that deviation here.
-        self.spectrum = np.fft.rfft(force, norm="ortho")[: len(self.frequency)]
-        self.size = 2 * len(self.frequency) - 1
+    def __init__(self, target: ForceTarget, record: Record, pulse: tuple[int, int]) -> None:
+        self.time, self.force, self.sample_rate = record
+        self.target, self.below = target, target.below
+        given = target.record
+        self.exact = isinstance(given, Impact)
+        self.kind = target.force or (given.judged() if isinstance(given, Impact) else "floor")
+        self.period = len(self.time) / self.sample_rate
+        self.frequency = np.arange(int(self.below * self.period * (1 + SAME)) + 1) / self.period
+        self.count = 2 * len(self.frequency) - 1
+        self.spectrum = np.fft.rfft(self.force, norm="ortho")[: len(self.frequency)]
+        self.quiet = Quiet(self.force, self.sample_rate, pulse, self.below)
+        shown = self.quiet.known and self.quiet.deviation() > NUMERICAL * self.force.max()
+        self.offset = self.quiet.known if target.offset is None else target.offset
+        self.known_noise = shown or target.noise is not None
+        self.noise_freedom = self.quiet.freedom if shown and target.noise is None else None
+        self._shown = shown
+        self.own = {}
+        if not self.exact if target.time_shift is None else target.time_shift:
+            self.own[SHIFT] = "s", SHIFT_SCALE
+        if target.gain is not None:
+            self.own[GAIN] = "", 1.0
+        # What is known of the gain is one more residual.
+        self.prior = target.gain if target.gain is not None and target.gain < np.inf else None
+        if self.prior is not None and not self.known_noise:
+            refuse(
+                f"target: gain = {self.prior:g} is not allowed without a known noise",
+                f"noise, {MIN_QUIET / 2 / self.below:.3g} s of quiet, or inf",
+            )
+        self.size = self.count + (self.prior is not None)
         self._transforms: dict[tuple[int, float], ZoomFFT] = {}
 
-    def model_spectrum(self, impact: Impact, shift: float) -> NDArray[np.complex128]:
-        """Return the transform of the force of an impact that begins at a time, s."""
+    @cached_property
+    def tones(self) -> tuple[float, ...]:
+        """Frequencies of hum that are nuisance parameters, Hz."""
+        if self.target.hum is not None:
+            return hum_harmonics(self.target.hum, self.below)
+        return self.quiet.tones() if self._shown else ()
+
+    @cached_property
+    def background(self) -> Background | None:
+        """The noise of the quiet parts; None where they do not tell."""
+        return self.quiet.background(self.tones) if self._shown else None
+
+    @cached_property
+    def weights(self) -> Weights:
+        """The weights of the residuals."""
+        return new_weights(
+            self.quiet,
+            self.count,
+            background=self.background,
+            noise=self.target.noise,
+            offset=self.offset,
+            tones=self.tones,
+            mains=self.target.hum is None,
+        )
+
+    @property
+    def absorbed(self) -> int:
+        """Number of nuisance parameters that were projected out of the residuals."""
+        return self.offset + 2 * len(self.tones)
+
+    @cached_property
+    def unit_deviation(self) -> float:
+        """Standard deviation of the noise, N; 1 where it is not known."""
+        return self.target.noise or (self.weights.deviation() if self.known_noise else 1.0)
+
+    def model_spectrum(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Return the transform of the force of an impact as the record would show it."""
         count = len(self.frequency)
         shape = len(impact.time), impact.sample_rate
         if shape not in self._transforms:
@@ -193,77 +277,171 @@ class ForceMisfit(Misfit):
             self._transforms[shape] = ZoomFFT(shape[0], band, count, fs=shape[1])
         turned = self._transforms[shape](impact.force(self.kind)).astype(np.complex128)
         turned *= self.sample_rate / impact.sample_rate / np.sqrt(len(self.time))
+        shift = self.value(SHIFT, own)
         phase = np.exp(-2j * np.pi * self.frequency * (shift - self.time[0]))
-        result: NDArray[np.complex128] = turned * phase
+        result: NDArray[np.complex128] = self.value(GAIN, own) * turned * phase
         return result
 
-    def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:
+    def value(self, name: str, own: NDArray[np.float64]) -> float:
+        """Return one of its own parameters, or what it is where it is not fitted."""
+        place = list(self.own).index(name) if name in self.own else None
+        return {SHIFT: 0.0, GAIN: 1.0}[name] if place is None else float(own[place])
+
+    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return model minus target over standard deviation, shape (size,)."""
-        return _parts(self.model_spectrum(impact, shift) - self.spectrum) / self.unit_deviation
+        rest = self._grid(self.model_spectrum(impact, own) - self.spectrum)
+        return self._with_prior(self.weights.matrix @ rest, (self.value(GAIN, own) - 1))
 
-    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:
-        """Return the derivative of the residual with the time of first touch, 1/s."""
-        turned = -2j * np.pi * self.frequency * self.model_spectrum(impact, shift)
-        return _parts(turned) / self.unit_deviation
+    def own_derivatives(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivatives of the residual by its own parameters, shape (size, n_own)."""
+        model = self.model_spectrum(impact, own)
+        slopes = {
+            SHIFT: (-2j * np.pi * self.frequency * model, 0.0),
+            GAIN: (model / self.value(GAIN, own), 1.0),
+        }
+        columns = [
+            self._with_prior(self.weights.matrix @ self._grid(slopes[name][0]), slopes[name][1])
+            for name in self.own
+        ]
+        return np.column_stack(columns) if columns else np.empty((self.size, 0))
 
-    def first_shift(self, impact: Impact) -> float:
-        """Return the time of first touch at which impact and record correlate most, s."""
-        product = self.spectrum * self.model_spectrum(impact, self.time[0]).conj()
+    def _with_prior(self, weighted: NDArray[np.float64], gain: float) -> NDArray[np.float64]:
+        return weighted if self.prior is None else np.append(weighted, gain / self.prior)
+
+    def own_start(self, impact: Impact) -> NDArray[np.float64]:
+        """Return where impact and record correlate most, s, and a gain of 1."""
+        start = {SHIFT: self.time[0], GAIN: 1.0}
+        own = np.array([start[name] for name in self.own])
+        if SHIFT not in self.own:
+            return own
+        product = self.spectrum * self.model_spectrum(impact, own).conj()
         count = 16 * len(product)
         lag = np.argmax(np.fft.irfft(product, count)) / count
         # A pulse that begins shortly before the record does not begin at its end.
-        return float(self.time[0] + (lag - (lag > 3 / 4)) * self.period)
+        own[0] += (lag - (lag > 3 / 4)) * self.period
+        return own
 
     def target_vector(self) -> NDArray[np.float64]:
         """Return the target over standard deviation, shape (size,)."""
-        return _parts(self.spectrum) / self.unit_deviation
+        return self._with_prior(self.weights.matrix @ self._grid(self.spectrum), 1.0)
 
-    def history_columns(self, impact: Impact, shift: float) -> dict[str, NDArray[np.float64]]:
+    def data(self) -> NDArray[np.float64]:
+        """Return the record, N."""
+        return self.force
+
+    def history_columns(
+        self, impact: Impact, own: NDArray[np.float64]
+    ) -> dict[str, NDArray[np.float64]]:
         """Return target and model side by side, s and N: columns by their names."""
-        target = self.history(self.spectrum)
-        model = self.history(self.model_spectrum(impact, shift))
+        model = self.model_spectrum(impact, own)
+        under = self.weights.background(self._grid(self.spectrum - model))
+        background = self.history(np.fft.rfft(under, norm="ortho"))
+        target, force = self.history(self.spectrum), self.history(model)
         return {
             "time_s": self.time,
             "record_N": self.force,
             "target_N": target,
-            "model_N": model,
-            "residual_N": model - target,
+            "background_N": background,
+            "model_N": force,
+            "residual_N": force + background - target,
         }
 
-    def columns(self, impact: Impact, shift: float) -> dict[str, list[object]]:
+    def columns(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, list[object]]:
         """Return target and model side by side, s and N: columns by their names."""
-        columns = self.history_columns(impact, shift)
+        columns = self.history_columns(impact, own)
         return {name: column.tolist() for name, column in columns.items()}
 
-    def doubt(self, impact: Impact, shift: float, count: int) -> str:
-        """Return how the residual differs during contact from before and after, where it does.
-
-        Noise is the same throughout; what the model cannot follow is there during contact only.
-        """
-        residual = self.history(self.model_spectrum(impact, shift) - self.spectrum)
-        inside = (self.time >= shift) & (self.time <= shift + impact.contact_time)
-        rate = 2 * self.frequency[-1] / self.sample_rate
-        during, else_ = rate * inside.sum() - count, rate * (~inside).sum()
-        if min(during, else_) < MIN_FREEDOM:
-            return ""
-        square = (residual[inside] ** 2).sum() / during
-        other = (residual[~inside] ** 2).sum() / else_
-        numerical = (NUMERICAL * self.force.max()) ** 2
-        if square < max(stats.f.ppf(SURE, during, else_) * other, numerical):
-            return ""
-        return (
-            f"the residual is {np.sqrt(square):.3g} N during the contact and {np.sqrt(other):.3g} "
-            "N otherwise: the model does not follow the force to within the noise, and the "
-            "intervals are too narrow"
+    def nuisances(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, tuple[float, float]]:
+        """Return offset and amplitude of hum where they are fitted, and their errors, N."""
+        value, covariance = self.weights.estimates(
+            self._grid(self.spectrum - self.model_spectrum(impact, own))
         )
+        found = {}
+        if self.offset:
+            found["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
+        for place, tone in enumerate(self.tones, start=int(self.offset)):
+            pair = np.array([place, place + len(self.tones)])
+            size = float(np.hypot(*value[pair]))
+            slope = value[pair] / size
+            error = float(np.sqrt(slope @ covariance[np.ix_(pair, pair)] @ slope))
+            found[f"hum of {tone:.4g} Hz"] = size, error
+        if self.background is not None and self.target.hum is None:
+            mains, size, error = self.background.hum
+            if size > NOTABLE * error:
+                found[f"hum of {mains:g} Hz"] = size, error
+        return found
+
+    def doubts(
+        self, impact: Impact, own: NDArray[np.float64], deviation: float, count: int
+    ) -> list[str]:
+        """Return what residuals of a deviation show that `count` parameters cannot explain.
+
+        Noise is the same throughout and independent once it is weighted; what the model cannot
+        follow is there during the contact only.
+        """
+        rest = self._grid(self.spectrum - self.model_spectrum(impact, own))
+        left = rest - self.weights.background(rest)
+        if np.sqrt(np.mean(left**2)) < NUMERICAL * self.force.max():
+            return []
+        weighted = self.weights.matrix @ rest / deviation
+        time = self.time[0] + np.arange(self.count) * self.period / self.count
+        begin = self.value(SHIFT, own)
+        inside = (time >= begin) & (time <= begin + impact.contact_time)
+        unit = deviation * self.unit_deviation
+        found = _contact_doubt(weighted, inside, count, unit)
+        if not found:
+            found = residual_doubts(weighted, time)
+            found += _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
+        if not (self.quiet.known or self.target.offset is not None or self.exact):
+            found.append(
+                f"the record has {1e3 * self.quiet.seconds:.3g} ms of quiet: offset, hum and "
+                "colour of the noise are not known, and the intervals hold for white noise alone"
+            )
+        return found
 
     def history(self, spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
         """Return the history of a transform, N, shape (n_sample,)."""
         whole: NDArray[np.float64] = np.fft.irfft(spectrum, len(self.time), norm="ortho")
         return whole
 
+    def _grid(self, spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
+        """Return the history of a transform on the grid."""
+        grid: NDArray[np.float64] = np.fft.irfft(spectrum, self.count, norm="ortho")
+        return grid
 
-def _parts(spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return a transform as independent real numbers with the sum of squares of its history."""
-    rest = np.sqrt(2) * spectrum[1:]
-    return np.concatenate([spectrum[:1].real, rest.real, rest.imag])
+
+def _contact_doubt(
+    weighted: NDArray[np.float64], inside: NDArray[np.bool_], count: int, unit: float
+) -> list[str]:
+    """Return how residuals differ during contact from before and after, where they do."""
+    during, other = int(inside.sum()) - count, int((~inside).sum())
+    if min(during, other) < MIN_FREEDOM:
+        return []
+    square = float((weighted[inside] ** 2).sum()) / during
+    quiet = float((weighted[~inside] ** 2).sum()) / other
+    if square < stats.f.isf(UNLIKELY, during, other) * quiet:
+        return []
+    told = (
+        f"the residual is {unit * np.sqrt(square):.3g} N during the contact and "
+        f"{unit * np.sqrt(quiet):.3g} N otherwise: the model does not follow the force to within "
+        "the noise, and the intervals are too narrow"
+    )
+    return [told]
+
+
+def _change_doubt(
+    weighted: NDArray[np.float64], before: NDArray[np.bool_], after: NDArray[np.bool_]
+) -> list[str]:
+    """Return how residuals before contact differ from those behind it, where they do."""
+    counts = int(before.sum()), int(after.sum())
+    if min(counts) < MIN_FREEDOM:
+        return []
+    ratio = float(np.mean(weighted[after] ** 2) / np.mean(weighted[before] ** 2))
+    tail = min(stats.f.sf(ratio, *counts[::-1]), stats.f.cdf(ratio, *counts[::-1]))
+    if 2 * tail > UNLIKELY:
+        return []
+    told = (
+        f"the residuals are {np.sqrt(ratio):.3g} times as large behind the contact as before it: "
+        "the noise is not the same throughout, and the intervals do not hold"
+    )
+    return [told]

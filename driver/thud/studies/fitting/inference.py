@@ -26,6 +26,10 @@ MIN_RATIO = 1e-6
 ERRORS = 3.0
 # Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
+# Correlations that are told, and above which two parameters cannot be told apart in practice: the
+# error of any model is larger than what separates them.
+STRONG = 0.9
+INSEPARABLE = 0.998
 # Part of the maximum entry below which a sentence omits a parameter.
 SMALL = 0.05
 
@@ -122,6 +126,47 @@ def weak_sentence(
         f"{_join([name for name, _ in part])} are hardly identifiable: along {_change(part)} "
         f"the {confidence:.0%} interval is +-{share}{_product(part)}"
     )
+
+
+def pair_sentences(
+    names: Sequence[str], correlation: NDArray[np.float64], least: float
+) -> list[str]:
+    """Return the pairs of parameters whose correlation reaches a size, the strongest first."""
+    strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
+    pairs = sorted(np.argwhere(strong >= least).tolist(), key=lambda pair: -strong[*pair])
+    found = []
+    for i, j in pairs:
+        size = strong[i, j]
+        # 1.00 would hide a difference.
+        digits = int(np.clip(np.ceil(-np.log10(max(1 - size, 1e-9))), 2, 9))
+        words = "cannot be told" if size >= INSEPARABLE else "are hard to tell"
+        value = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
+        found.append(f"{names[i]} and {names[j]} {words} apart: correlation {value}")
+    return found
+
+
+def statement(
+    names: Sequence[str],
+    covariance: NDArray[np.float64],
+    correlation: NDArray[np.float64],
+    count: int,
+) -> list[str]:
+    """Return how well parameters can be told apart, from the covariance of their relative values.
+
+    The first `count` parameters are those of the model.
+    """
+    found = []
+    directions = worst_directions(covariance[:count, :count], 0.0)
+    if len(directions) > 1:
+        (worst, direction), (best, _) = directions[0], directions[-1]
+        part = _parts(names[:count], direction)
+        size = 100 * worst * max(abs(float(value)) for value in direction)
+        change = _change(part) if len(part) > 1 else part[0][0]
+        found.append(
+            f"least determined: {change}, standard error {size:.2g} %; a direction that is "
+            f"{worst / best:.3g} times as uncertain as the best determined one"
+        )
+    return found + pair_sentences(names, correlation, STRONG)
 
 
 def _parts(names: Sequence[str], direction: NDArray[np.float64]) -> list[tuple[str, float]]:

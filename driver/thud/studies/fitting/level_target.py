@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +14,7 @@ from thud.levels import BANDWIDTHS, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -50,6 +50,7 @@ class LevelTarget:
     contact_time: tuple[float, float] | None = None
     restitution: tuple[float, float] | None = None
     force: LevelsForce | None = None
+    fixed: Mapping[str, object] = field(default_factory=dict)
 
     def misfit(self) -> LevelMisfit:
         """Return what the fit needs of the target."""
@@ -89,6 +90,7 @@ class LevelMisfit(Misfit):
     """How far levels of an impact are from a target."""
 
     deviation_unit = "dB"
+    deviation_source = "uncertainty"
 
     def __init__(
         self,
@@ -102,6 +104,7 @@ class LevelMisfit(Misfit):
         self.places, self.target, self.deviation, self.extra = places, values, deviation, extra
         self.known_noise = target.uncertainty is not None
         self.size = len(values)
+        self.own = {}
 
     def values(self, impact: Impact) -> NDArray[np.float64]:
         """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""
@@ -109,7 +112,7 @@ class LevelMisfit(Misfit):
         known = {"contact_time": impact.exact_contact_time, "restitution": impact.restitution}
         return np.concatenate([levels, [known[name] for name in self.extra]])
 
-    def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:  # noqa: ARG002
+    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
         """Return model minus target over standard deviation, shape (size,)."""
         return (self.values(impact) - self.target) / self.deviation
 
@@ -117,7 +120,11 @@ class LevelMisfit(Misfit):
         """Return the target over standard deviation, shape (size,)."""
         return self.target / self.deviation
 
-    def columns(self, impact: Impact, shift: float) -> dict[str, list[object]]:  # noqa: ARG002
+    def data(self) -> NDArray[np.float64]:
+        """Return values and deviations of the target, dB, s and 1."""
+        return np.concatenate([self.target, self.deviation])
+
+    def columns(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, list[object]]:  # noqa: ARG002
         """Return target and model side by side, dB, s and 1: columns by their names."""
         nominal = get_bands(self.bands).nominal
         names = [f"{nominal[place]:g} Hz" for place in self.places]

@@ -18,32 +18,50 @@ if TYPE_CHECKING:
     from thud.case import Case
     from thud.impact import Impact
 
+# Names of parameters that records may have of their own.
+SHIFT, GAIN = "time_shift", "gain"
+
 
 class Misfit(ABC):
     """How far an impact is from the target, in standard deviations.
+
+    A target may have parameters of its own, such as the time of first touch in a record.
 
     Attributes
     ----------
     size : int
         Number of residuals.
     known_noise : bool
-        The standard deviations were given; else their common factor is estimated.
-    free_shift : bool
-        The time of first touch is not known.
-    unit_deviation : float
-        Unit of the residuals: the noise of forces, N; 1 for levels.
+        The standard deviations are known; else their common factor is estimated.
+    noise_freedom : int or None
+        Degrees of freedom of the data which the noise is known from; None: it was given.
     deviation_unit : str
         Unit of an estimated standard deviation.
+    deviation_source : str
+        What tells the standard deviations, for messages.
+    own : dict of str to tuple
+        Unit and scale of each parameter of its own, by name.
     """
 
     size: int
     known_noise: bool
-    free_shift: bool = False
-    unit_deviation: float = 1.0
+    noise_freedom: int | None = None
     deviation_unit: ClassVar[str]
+    deviation_source: ClassVar[str]
+    own: Mapping[str, tuple[str, float]]
+
+    @property
+    def unit_deviation(self) -> float:
+        """Unit of the residuals: the noise of forces, N; 1 for levels."""
+        return 1.0
+
+    @property
+    def absorbed(self) -> int:
+        """Number of nuisance parameters that were projected out of the residuals."""
+        return 0
 
     @abstractmethod
-    def residual(self, impact: Impact, shift: float) -> NDArray[np.float64]:
+    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return model minus target over standard deviation, shape (size,)."""
 
     @abstractmethod
@@ -51,24 +69,38 @@ class Misfit(ABC):
         """Return the target over standard deviation, shape (size,)."""
 
     @abstractmethod
-    def columns(self, impact: Impact, shift: float) -> Mapping[str, Sequence[object]]:
+    def data(self) -> NDArray[np.float64]:
+        """Return the numbers of the target as they were given."""
+
+    @abstractmethod
+    def columns(self, impact: Impact, own: NDArray[np.float64]) -> Mapping[str, Sequence[object]]:
         """Return target and model side by side, SI units, dB: columns by their names."""
 
-    def shift_derivative(self, impact: Impact, shift: float) -> NDArray[np.float64]:
-        """Return the derivative of the residual by the time of first touch, 1/s."""
-        raise NotImplementedError
+    def own_derivatives(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return the derivatives of the residual by its own parameters, shape (size, n_own)."""
+        return np.empty((self.size, 0))
 
-    def first_shift(self, impact: Impact) -> float:
-        """Return a time of first touch to start from, s."""
-        raise NotImplementedError
+    def own_start(self, impact: Impact) -> NDArray[np.float64]:  # noqa: ARG002
+        """Return its own parameters to start from."""
+        return np.empty(0)
+
+    def nuisances(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, tuple[float, float]]:  # noqa: ARG002
+        """Return nuisance parameters and their standard errors, N, by name."""
+        return {}
 
     def solve(self, case: Case) -> Impact:
         """Return the impact of a case."""
         return compute(case)
 
-    def doubt(self, impact: Impact, shift: float, count: int) -> str:  # noqa: ARG002
-        """Return what `count` parameters cannot explain, or nothing."""
-        return ""
+    def doubts(
+        self,
+        impact: Impact,  # noqa: ARG002
+        own: NDArray[np.float64],  # noqa: ARG002
+        deviation: float,  # noqa: ARG002
+        count: int,  # noqa: ARG002
+    ) -> list[str]:
+        """Return what residuals of a deviation show that `count` parameters cannot explain."""
+        return []
 
 
 def numbers(name: str, values: object, count: int) -> NDArray[np.float64]:

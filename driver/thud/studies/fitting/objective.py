@@ -1,7 +1,8 @@
-"""The objective of a fit: weighted residuals and their derivatives at a place."""
+"""The objective of a fit: weighted residuals of all targets and their derivatives at a place."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,65 +23,103 @@ if TYPE_CHECKING:
 # sample enters or leaves the contact: 1e-3 would step over these, 1e-5 rarely does, and derivatives
 # are accurate to 1e-7 (with a rising loss factor, where contact is intermittent, to 3e-3).
 STEP = 2e-5
-# Scale of a shift in time, s.
-SHIFT_SCALE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One target of a fit.
+
+    Attributes
+    ----------
+    case : Case
+        The case with what is fixed for this target.
+    misfit : Misfit
+        Its comparison with an impact.
+    place : slice
+        Its own parameters in a place.
+    """
+
+    case: Case
+    misfit: Misfit
+    place: slice
+
+
+def new_parts(targets: list[tuple[Case, Misfit]], count: int) -> list[Part]:
+    """Return the parts of a fit of `count` common parameters."""
+    found = []
+    for case, misfit in targets:
+        behind = count + len(misfit.own)
+        found.append(Part(case, misfit, slice(count, behind)))
+        count = behind
+    return found
 
 
 class Objective:
-    """Residuals and derivatives of a case; parameters are divided by their scales."""
+    """Residuals and derivatives of cases; parameters are divided by their scales."""
 
-    def __init__(self, case: Case, ranges: list[Range], misfit: Misfit, bar: tqdm[Any]) -> None:
-        self.case, self.ranges, self.misfit, self.bar = case, ranges, misfit, bar
+    def __init__(self, parts: list[Part], ranges: list[Range], bar: tqdm[Any]) -> None:
+        self.parts, self.ranges, self.bar = parts, ranges, bar
         self.count = len(ranges)
-        self.scale = np.array([entry.scale for entry in ranges] + [SHIFT_SCALE] * misfit.free_shift)
-        shift = [np.inf] * misfit.free_shift
-        self.low = np.array([entry.low for entry in ranges] + [-x for x in shift]) / self.scale
-        self.high = np.array([entry.high for entry in ranges] + shift) / self.scale
+        own = [scale for part in parts for _, scale in part.misfit.own.values()]
+        unlimited = np.full(len(own), np.inf)
+        self.scale = np.array([entry.scale for entry in ranges] + own)
+        self.low = np.append([entry.low for entry in ranges], -unlimited) / self.scale
+        self.high = np.append([entry.high for entry in ranges], unlimited) / self.scale
         self.evaluations = self.failures = 0
         self.error: ThudError | None = None
-        self._last: tuple[bytes, Impact] | None = None
+        self._last: tuple[bytes, list[Impact]] | None = None
 
-    def case_at(self, place: NDArray[np.float64]) -> Case:
-        """Return the case of a place."""
+    def case_at(self, part: Part, place: NDArray[np.float64]) -> Case:
+        """Return the case of a part at a place."""
         values = place[: self.count] * self.scale[: self.count]
         names = (entry.name for entry in self.ranges)
-        return with_values(self.case, dict(zip(names, values, strict=True)))
+        return with_values(part.case, dict(zip(names, values, strict=True)))
 
-    def impact(self, place: NDArray[np.float64]) -> Impact | None:
-        """Return the impact of a place, or None where there is none."""
+    def impacts(self, place: NDArray[np.float64]) -> list[Impact]:
+        """Return the impacts of a place, one for each part; none where one is impossible."""
         key = place[: self.count].tobytes()
         if self._last and self._last[0] == key:
             return self._last[1]
-        self.evaluations += 1
-        self.bar.update()
-        try:
-            impact = self.misfit.solve(self.case_at(place))
-        except ThudError as error:
-            self.failures += 1
-            self.error = error
-            return None
-        self._last = key, impact
-        return impact
+        found: list[Impact] = []
+        for part in self.parts:
+            self.evaluations += 1
+            self.bar.update()
+            try:
+                found.append(part.misfit.solve(self.case_at(part, place)))
+            except ThudError as error:
+                self.failures += 1
+                self.error = error
+                return []
+        self._last = key, found
+        return found
 
-    def shift(self, place: NDArray[np.float64]) -> float:
-        """Return the time of first touch of a place, s."""
-        return float(place[-1] * SHIFT_SCALE) if self.misfit.free_shift else 0.0
+    def own(self, part: Part, place: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the own parameters of a part at a place."""
+        values: NDArray[np.float64] = place[part.place] * self.scale[part.place]
+        return values
 
     def residual(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the residuals of a place; infinite where there is no impact."""
-        impact = self.impact(place)
-        if impact is None:
-            return np.full(self.misfit.size, np.inf)
-        return self.misfit.residual(impact, self.shift(place))
+        impacts = self.impacts(place)
+        if not impacts:
+            return np.full(sum(part.misfit.size for part in self.parts), np.inf)
+        pairs = zip(self.parts, impacts, strict=True)
+        return np.concatenate([p.misfit.residual(i, self.own(p, place)) for p, i in pairs])
 
     def jacobian(self, place: NDArray[np.float64], step: float = STEP) -> NDArray[np.float64]:
         """Return the derivatives of the residuals, shape (n_residual, n)."""
         here = self.residual(place)
-        columns = [self._column(place, i, step, here) for i in range(self.count)]
-        if self.misfit.free_shift and (impact := self.impact(place)):
-            slope = self.misfit.shift_derivative(impact, self.shift(place))
-            columns.append(SHIFT_SCALE * slope)
-        return np.column_stack(columns)
+        jacobian = np.zeros((len(here), len(place)))
+        first = 0
+        # Before the columns, which compute other impacts.
+        for part, impact in zip(self.parts, self.impacts(place), strict=False):
+            rows = slice(first, first + part.misfit.size)
+            slopes = part.misfit.own_derivatives(impact, self.own(part, place))
+            jacobian[rows, part.place] = slopes * self.scale[part.place]
+            first = rows.stop
+        for i in range(self.count):
+            jacobian[:, i] = self._column(place, i, step, here)
+        return jacobian
 
     def _column(
         self, place: NDArray[np.float64], i: int, step: float, here: NDArray[np.float64]

@@ -15,12 +15,13 @@ from thud.display import Displayed
 from thud.key import check_keywords
 from thud.studies.directory import save
 from thud.studies.fitting.inference import coverage_factor
+from thud.studies.fitting.misfit import SHIFT
 from thud.tables import format_rows
 from thud.units import handy_unit
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -29,9 +30,43 @@ if TYPE_CHECKING:
     from thud.impact import Impact
     from thud.studies.fitting.misfit import Misfit
 
-SHIFT = "time_shift"
 # By parameter: name of a unit, and how many SI units it is.
 Units: TypeAlias = "Mapping[str, tuple[str, float]]"
+
+
+@dataclass(frozen=True, eq=False)
+class FittedTarget:
+    """One target of a fit and what was found for it.
+
+    Attributes
+    ----------
+    case : Case
+        The case with the fitted values, and what is fixed for this target.
+    impact : Impact
+        Its impact.
+    misfit : Misfit
+        The comparison of target and impact.
+    own : ndarray
+        The parameters of this target alone: time of first touch, s, and gain where they are fitted.
+    """
+
+    case: Case
+    impact: Impact
+    misfit: Misfit
+    own: NDArray[np.float64]
+
+    def own_value(self, name: str, default: float) -> float:
+        """Return one of the parameters of this target alone."""
+        return dict(zip(self.misfit.own, map(float, self.own), strict=True)).get(name, default)
+
+    @property
+    def nuisances(self) -> dict[str, tuple[float, float]]:
+        """Offset and amplitude of hum, and their standard errors, N, by name."""
+        return self.misfit.nuisances(self.impact, self.own)
+
+    def columns(self) -> Mapping[str, Sequence[object]]:
+        """Return target and model side by side, SI units, dB: columns by their names."""
+        return self.misfit.columns(self.impact, self.own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +76,8 @@ class Fit(Displayed):
     Attributes
     ----------
     names : tuple of str
-        The parameters; last ``"time_shift"``, the time of first touch in the record, where free.
+        The parameters; last those of the records, where they are free: ``"time_shift"``, the time
+        of first touch, and ``"gain"``, of several records with their number, as ``"gain(2)"``.
     units : tuple of str
         Their units.
     estimate : ndarray, shape (n,)
@@ -55,10 +91,10 @@ class Fit(Displayed):
     confidence : float
         Confidence of the intervals in tables and files.
     noise : float
-        Standard deviation of one residual, given or estimated: N for forces, for levels in units of
+        Standard deviation of one residual of the first target: N for forces, for levels in units of
         their uncertainties, or dB where none were given.
     known_noise : bool
-        The standard deviation was given.
+        The standard deviations were given, or are those of the quiet of the records.
     residuals : ndarray, shape (n_residual,)
         Model minus target over its standard deviation.
     evaluations, failures : int
@@ -66,13 +102,12 @@ class Fit(Displayed):
     converged : bool
         The search has converged.
     warnings : tuple of str
-        Parameters that are not identifiable or at their limits, and a poor model, as sentences.
-    case : Case
-        The case with the fitted values.
-    impact : Impact
-        Its impact.
-    misfit : Misfit
-        The comparison of target and impact.
+        Parameters that are not identifiable or at their limits, residuals that are no noise, and a
+        poor model, as sentences.
+    identifiability : tuple of str
+        How well the parameters can be told apart, as sentences.
+    targets : tuple of FittedTarget
+        Case, impact and comparison of each target.
     """
 
     names: tuple[str, ...]
@@ -89,9 +124,28 @@ class Fit(Displayed):
     failures: int
     converged: bool
     warnings: tuple[str, ...]
-    case: Case
-    impact: Impact
-    misfit: Misfit
+    identifiability: tuple[str, ...]
+    targets: tuple[FittedTarget, ...]
+
+    @property
+    def ends(self) -> list[str]:
+        """What the names of the files of each target end with."""
+        return file_ends(len(self.targets))
+
+    @property
+    def case(self) -> Case:
+        """The case of the first target with the fitted values."""
+        return self.targets[0].case
+
+    @property
+    def impact(self) -> Impact:
+        """The impact of the first target."""
+        return self.targets[0].impact
+
+    @property
+    def misfit(self) -> Misfit:
+        """The comparison of the first target."""
+        return self.targets[0].misfit
 
     @property
     def values(self) -> dict[str, float]:
@@ -114,8 +168,20 @@ class Fit(Displayed):
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Residuals less parameters."""
-        return len(self.residuals) - len(self.names)
+        """Residuals less parameters and nuisance parameters."""
+        absorbed = sum(target.misfit.absorbed for target in self.targets)
+        return len(self.residuals) - len(self.names) - absorbed
+
+    @property
+    def interval_freedom(self) -> int | None:
+        """Degrees of freedom of Student's t in the intervals; None: they are normal.
+
+        Those of the residuals where they tell the noise, or of the quiet of the records.
+        """
+        if not self.known_noise:
+            return self.degrees_of_freedom
+        known = [target.misfit.noise_freedom for target in self.targets]
+        return min((freedom for freedom in known if freedom is not None), default=None)
 
     @property
     def reduced_chi_square(self) -> float:
@@ -125,17 +191,17 @@ class Fit(Displayed):
 
     @property
     def time_shift(self) -> float:
-        """Time of first touch in the record, s."""
-        return self.values.get(SHIFT, 0.0)
+        """Time of first touch in the first record, s."""
+        return self.targets[0].own_value(SHIFT, 0.0)
 
     @check_keywords
     def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
-        """Return confidence intervals by name, Student's t where the noise is estimated.
+        """Return confidence intervals by name, see `interval_freedom`.
 
         They end at the limits of the search. `confidence` is by default that of the fit.
         """
-        freedom = None if self.known_noise else self.degrees_of_freedom
-        factor = coverage_factor(self.confidence if confidence is None else confidence, freedom)
+        asked = self.confidence if confidence is None else confidence
+        factor = coverage_factor(asked, self.interval_freedom)
         half = factor * np.sqrt(np.diag(self.covariance))
         low = np.maximum(self.estimate - half, self.limits[:, 0]).tolist()
         high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()
@@ -174,17 +240,37 @@ class Fit(Displayed):
 
     def _remarks(self) -> list[str]:
         """Return the quality of the fit, one sentence per line."""
-        kind = "given" if self.known_noise else "estimated from the residuals"
-        unit = self.misfit.deviation_unit
-        # Those given with levels may differ.
-        several = self.known_noise and unit == "dB"
-        size = "deviations" if several else f"deviation {self.noise:.3g} {unit},"
         freedom = self.degrees_of_freedom
         quality = f", reduced chi-square {self.reduced_chi_square:.3g}" if freedom else ""
         failures = f", {self.failures} of them impossible" if self.failures else ""
         data = f"{len(self.residuals)} data, {freedom} degrees of freedom{quality}"
-        noise = f"standard {size} {kind}"
-        return [f"{data}; {noise}", f"{self.evaluations} impacts computed{failures}"]
+        # Of a single target on the line of its data.
+        deviations = [self._deviation(target) for target in self.targets]
+        lines = [f"{data}; {deviations[0]}"] if len(deviations) == 1 else [data]
+        for number, target in enumerate(self.targets, start=1):
+            told = [deviations[number - 1]] if len(deviations) > 1 else []
+            told += [
+                f"{name} {value:.3g} ± {error:.2g} N"
+                for name, (value, error) in target.nuisances.items()
+            ]
+            place = f"target {number}: " if len(deviations) > 1 else ""
+            lines += [f"{place}{', '.join(told)}"] if told else []
+        lines += self.identifiability
+        return [*lines, f"{self.evaluations} impacts computed{failures}"]
+
+    def deviation_of(self, target: FittedTarget) -> float:
+        """Return the standard deviation of one residual of a target, see `noise`."""
+        return self.noise / self.misfit.unit_deviation * target.misfit.unit_deviation
+
+    def _deviation(self, target: FittedTarget) -> str:
+        """Return the standard deviation of a target in words."""
+        misfit, unit = target.misfit, target.misfit.deviation_unit
+        if self.known_noise and unit == "dB":  # they may differ
+            return "standard deviations given"
+        size = self.deviation_of(target)
+        source = "given" if misfit.noise_freedom is None else "that of the quiet"
+        source = source if self.known_noise else "estimated from the residuals"
+        return f"standard deviation {size:.3g} {unit}, {source}"
 
     def __str__(self) -> str:
         """Return the fit as text, with its warnings."""
@@ -214,6 +300,14 @@ class Fit(Displayed):
             "reduced_chi_square": _finite(self.reduced_chi_square),
             "noise": self.noise,
             "noise_given": self.known_noise,
+            "nuisances": [
+                {
+                    name: dict(zip(("value", "standard_error"), pair, strict=True))
+                    for name, pair in target.nuisances.items()
+                }
+                for target in self.targets
+            ],
+            "identifiability": list(self.identifiability),
             "evaluations": self.evaluations,
             "failures": self.failures,
             "converged": self.converged,
@@ -227,15 +321,19 @@ class Fit(Displayed):
         return draw_fit(self, self.shown_units(units))
 
     def files(self, **extra: object) -> dict[str, bytes]:
-        """Return ``fit.json``, with further entries, ``fit.csv`` and ``fitted.nml`` by name."""
+        """Return ``fit.json``, with further entries, ``fit.csv`` and ``fitted.nml`` by name.
+
+        Of several targets, table and case have the number of the target, as in ``fit_2.csv``.
+        """
         content = json.dumps({**self.summary(), **extra}, indent=2, allow_nan=False, default=str)
-        columns = self.misfit.columns(self.impact, self.time_shift)
-        rows = [columns, *zip(*columns.values(), strict=True)]
-        return {
-            "fit.json": f"{content}\n".encode(),
-            "fit.csv": "".join(f"{','.join(map(str, row))}\n" for row in rows).encode(),
-            "fitted.nml": case_text(self.case),
-        }
+        files = {"fit.json": f"{content}\n".encode()}
+        for target, end in zip(self.targets, self.ends, strict=True):
+            columns = target.columns()
+            rows = [columns, *zip(*columns.values(), strict=True)]
+            table = "".join(f"{','.join(map(str, row))}\n" for row in rows)
+            files[f"fit{end}.csv"] = table.encode()
+            files[f"fitted{end}.nml"] = case_text(target.case)
+        return files
 
     def save(
         self,
@@ -244,7 +342,7 @@ class Fit(Displayed):
         *,
         figures: bool = True,
     ) -> list[Path]:
-        """Write ``fit.json``, ``fit.csv``, ``fitted.nml`` and figures as PNG and SVG.
+        """Write the files of `files`, and figures as PNG and SVG.
 
         Older files of these names are replaced; their paths are returned. `units` are those of the
         figures, as in `shown_units`; files have SI units. Raises OSError where a file cannot be
@@ -253,6 +351,11 @@ class Fit(Displayed):
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
         return save(folder, self.files(), self.figures(units) if figures else {})
+
+
+def file_ends(count: int) -> list[str]:
+    """Return what the names of the files of targets end with."""
+    return [""] if count == 1 else [f"_{number}" for number in range(1, count + 1)]
 
 
 def _digits(value: float, error: float) -> int:

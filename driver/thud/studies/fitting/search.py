@@ -12,15 +12,19 @@ from tqdm import tqdm
 
 from thud.errors import InputError, NumericalError, ThudError
 from thud.studies.fitting.inference import (
+    INSEPARABLE,
     Inference,
     coverage_factor,
     infer,
     null_sentence,
+    pair_sentences,
+    statement,
     weak_sentence,
     worst_directions,
 )
-from thud.studies.fitting.objective import SHIFT_SCALE, STEP, Objective
-from thud.studies.fitting.result import SHIFT, Fit
+from thud.studies.fitting.objective import STEP, Objective, new_parts
+from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.studies.fitting.result import Fit, FittedTarget
 from thud.units import handy_unit
 
 if TYPE_CHECKING:
@@ -30,6 +34,7 @@ if TYPE_CHECKING:
 
     from thud.case import Case
     from thud.studies.fitting.misfit import Misfit
+    from thud.studies.fitting.objective import Part
     from thud.studies.fitting.ranges import Range
 
 # Relative steps and gains at which the search ends.
@@ -38,32 +43,45 @@ TOLERANCE = 1e-8
 AT_LIMIT = 1e-4
 # Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
-# Probability of the residual below which the model does not explain the data.
-UNLIKELY = 1e-3
 
 
 def search(
-    case: Case, ranges: list[Range], misfit: Misfit, options: Mapping[str, Any], *, progress: bool
+    targets: list[tuple[Case, Misfit]],
+    ranges: list[Range],
+    options: Mapping[str, Any],
+    *,
+    progress: bool,
 ) -> Fit:
-    """Return the best fit of the parameters of a case.
+    """Return the best fit of the parameters of cases to their targets.
 
     `options` are confidence, starts, seed and max_steps of `thud.fit`.
     """
-    _require_data(misfit, len(ranges) + misfit.free_shift)
+    parts = new_parts(targets, len(ranges))
+    _require_data(parts, len(ranges))
     with tqdm(unit="impact", disable=not progress, leave=False) as bar:
-        objective = Objective(case, ranges, misfit, bar)
+        objective = Objective(parts, ranges, bar)
         starts = _spread(ranges, int(options["starts"]), options["seed"])
         place, converged = _search(objective, starts, int(options["max_steps"]))
         return _conclude(objective, place, options["confidence"], converged=converged)
 
 
-def _require_data(misfit: Misfit, count: int) -> None:
-    minimum = count if misfit.known_noise else count + 1
-    if misfit.size < minimum:
+def _require_data(parts: list[Part], count: int) -> None:
+    misfits = [part.misfit for part in parts]
+    known = all(misfit.known_noise for misfit in misfits)
+    for number, misfit in enumerate(misfits, start=1):
+        if len(parts) > 1 and not misfit.known_noise:
+            message = (
+                f"target {number}: the weight of its residuals is not known; "
+                f"allowed: {misfit.deviation_source} where there are several targets"
+            )
+            raise InputError(message)
+    count += sum(len(misfit.own) for misfit in misfits)
+    size = sum(misfit.size - misfit.absorbed for misfit in misfits)
+    minimum = count if known else count + 1
+    if size < minimum:
         message = (
-            f"target: {misfit.size} data for {count} parameters are too few; "
-            f"allowed: {minimum} or more"
-            + ("" if misfit.known_noise else " where no noise is given")
+            f"target: {size} data for {count} parameters are too few; "
+            f"allowed: {minimum} or more" + ("" if known else " where no noise is given")
         )
         raise InputError(message)
 
@@ -97,12 +115,15 @@ def _search(
 
 
 def _descend(objective: Objective, start: NDArray[np.float64], max_steps: int) -> OptimizeResult:
-    first = objective.impact(start)
-    if first is None:
+    first = objective.impacts(start)
+    if not first:
         message = f"the start cannot be computed: {objective.error}"
         raise type(objective.error or NumericalError())(message)
-    if objective.misfit.free_shift:
-        start = np.append(start, objective.misfit.first_shift(first) / SHIFT_SCALE)
+    own = [
+        part.misfit.own_start(impact) / objective.scale[part.place]
+        for part, impact in zip(objective.parts, first, strict=True)
+    ]
+    start = np.concatenate([start, *own])
     return least_squares(
         objective.residual,
         start,
@@ -122,45 +143,56 @@ def _conclude(
     objective: Objective, place: NDArray[np.float64], confidence: float, *, converged: bool
 ) -> Fit:
     residual = objective.residual(place)
-    impact = objective.impact(place)
-    if impact is None:
+    impacts = objective.impacts(place)
+    if not impacts:
         raise NumericalError(str(objective.error))
     jacobian = objective.jacobian(place)
     finer = objective.jacobian(place, STEP / 2)
-    target_size = float(np.linalg.norm(objective.misfit.target_vector()))
+    parts, count = objective.parts, objective.count
+    misfits = [part.misfit for part in parts]
+    target_size = float(np.linalg.norm(np.concatenate([m.target_vector() for m in misfits])))
     # Relative to the values found, a change along a direction reads as one in per cent.
     relative = np.where(np.abs(place) > AT_LIMIT, np.abs(place), 1.0)
-    if objective.misfit.free_shift:
-        relative[-1] = 1.0
+    relative[count:] = 1.0
     known = infer(jacobian * relative, finer * relative, target_size)
-    freedom = len(residual) - len(place)
+    freedom = len(residual) - len(place) - sum(misfit.absorbed for misfit in misfits)
     deviation = 1.0
-    if not objective.misfit.known_noise:
+    if not all(misfit.known_noise for misfit in misfits):
         minimum = np.finfo(float).eps * target_size / np.sqrt(len(residual))
         deviation = max(float(np.sqrt(residual @ residual / freedom)), minimum)
     size = deviation * relative * objective.scale
-    names = [entry.name for entry in objective.ranges] + [SHIFT] * objective.misfit.free_shift
+    own = {
+        name if len(parts) == 1 else f"{name}({number})": unit
+        for number, misfit in enumerate(misfits, start=1)
+        for name, (unit, _) in misfit.own.items()
+    }
     answer = Fit(
-        names=tuple(names),
-        units=(*(entry.unit for entry in objective.ranges), *["s"] * objective.misfit.free_shift),
+        names=(*(entry.name for entry in objective.ranges), *own),
+        units=(*(entry.unit for entry in objective.ranges), *own.values()),
         estimate=place * objective.scale,
         covariance=known.covariance * np.outer(size, size),
         limits=np.column_stack([objective.low, objective.high]) * objective.scale[:, np.newaxis],
         singular_values=known.singular_values,
         confidence=float(confidence),
-        noise=deviation * objective.misfit.unit_deviation,
-        known_noise=objective.misfit.known_noise,
+        noise=deviation * misfits[0].unit_deviation,
+        known_noise=all(misfit.known_noise for misfit in misfits),
         residuals=residual / deviation,
         evaluations=objective.evaluations,
         failures=objective.failures,
         converged=converged,
         warnings=(),
-        case=objective.case_at(place),
-        impact=impact,
-        misfit=objective.misfit,
+        identifiability=(),
+        targets=tuple(
+            FittedTarget(
+                objective.case_at(part, place), impact, part.misfit, objective.own(part, place)
+            )
+            for part, impact in zip(parts, impacts, strict=True)
+        ),
     )
-    doubts = _doubts(objective, answer, place, known, known.covariance * deviation**2)
-    return replace(answer, warnings=tuple(doubts))
+    spread = known.covariance * deviation**2
+    doubts = _doubts(objective, answer, place, known, spread)
+    told = statement(answer.names, spread, answer.correlation, count)
+    return replace(answer, warnings=tuple(doubts), identifiability=tuple(told))
 
 
 def _doubts(
@@ -175,13 +207,15 @@ def _doubts(
     if not answer.converged:
         found.append("the search has not converged; allow more steps, or start elsewhere")
     found += [null_sentence(answer.names, direction) for direction in known.null]
-    freedom = answer.degrees_of_freedom
-    factor = coverage_factor(answer.confidence, None if answer.known_noise else freedom)
+    factor = coverage_factor(answer.confidence, answer.interval_freedom)
     count = objective.count
-    for deviation, direction in worst_directions(covariance[:count, :count], WIDE / factor):
+    wide = worst_directions(covariance[:count, :count], WIDE / factor)
+    for deviation, direction in wide:
         found.append(
             weak_sentence(answer.names[:count], direction, factor * deviation, answer.confidence)
         )
+    if not known.null.size and not wide:
+        found += pair_sentences(answer.names, answer.correlation, INSEPARABLE)
     for entry, value, low, high in zip(
         objective.ranges, place, objective.low, objective.high, strict=False
     ):
@@ -192,12 +226,34 @@ def _doubts(
                 f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
                 + ": its interval is cut there, and all intervals hold inside the limits only"
             )
-    square = float(answer.residuals @ answer.residuals)
-    if answer.known_noise and freedom and stats.chi2.sf(square, freedom) < UNLIKELY:
-        found.append(
-            f"the residuals are {np.sqrt(square / freedom):.3g} times what the given "
-            "uncertainty lets expect: the model does not explain the data"
-        )
-    elif doubt := objective.misfit.doubt(answer.impact, answer.time_shift, len(place)):
-        found.append(doubt)
+    first = 0
+    deviation = answer.noise / answer.targets[0].misfit.unit_deviation
+    for number, target in enumerate(answer.targets, start=1):
+        misfit = target.misfit
+        residuals = answer.residuals[first : first + misfit.size]
+        first += misfit.size
+        shared = len(answer.names) / len(answer.targets)
+        own = _size_doubt(misfit, residuals, misfit.size - misfit.absorbed - shared)
+        own += misfit.doubts(target.impact, target.own, deviation, len(answer.names))
+        place_of = "" if len(answer.targets) == 1 else f"target {number}: "
+        found += [f"{place_of}{told}" for told in own]
     return found
+
+
+def _size_doubt(misfit: Misfit, residuals: NDArray[np.float64], freedom: float) -> list[str]:
+    """Return that residuals are too large for the noise, where they are."""
+    if not misfit.known_noise or freedom <= 0:
+        return []
+    square = float(residuals @ residuals)
+    tail = (
+        stats.chi2.sf(square, freedom)
+        if misfit.noise_freedom is None
+        else stats.f.sf(square / freedom, freedom, misfit.noise_freedom)
+    )
+    if tail > UNLIKELY:
+        return []
+    told = (
+        f"the residuals are {np.sqrt(square / freedom):.3g} times what the given uncertainty lets "
+        "expect: the model does not explain the data"
+    )
+    return [told]

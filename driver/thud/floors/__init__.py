@@ -1,0 +1,1 @@
+"""Rooms below floors: measured levels, their standardisation and rating."""

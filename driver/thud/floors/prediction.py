@@ -1,0 +1,211 @@
+"""Level in the room below, from a force by transient statistical energy analysis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._api import api, call
+from thud.case import Case, case_text
+from thud.checks import refuse, require_kind
+from thud.display import MAKERS, Displayed
+from thud.floors.rating import Rating, rated_bands, rating, standardised_level
+from thud.floors.survey import RoomLevels
+from thud.impact import Impact
+from thud.levels import BANDWIDTHS, get_bands
+from thud.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud._schema import Floor, Room
+
+THIRDS = BANDWIDTHS[1]
+# Modes of a third below which a statistical answer is doubtful.
+FEW_MODES = 5
+# Change of the force by a floor that gives way, dB, from which it is remarked.
+NOTICED = 0.1
+
+
+@dataclass(frozen=True, repr=False)
+class RoomPrediction(Displayed):
+    """Level that an impact causes in the room below: energy means over positions, in thirds.
+
+    Attributes
+    ----------
+    floor, room : Floor and Room
+        What it was predicted for.
+    frequency : ndarray, shape (12,)
+        Rounded mid frequencies of the thirds 50 to 630 Hz.
+    level : ndarray, shape (12,)
+        Maximum Fast levels L_i,Fmax, dB re 20 uPa.
+    time_of_maximum : ndarray, shape (12,)
+        Their times after the impact, s.
+    energy : ndarray, shape (12,)
+        Energy that the impact gives to the floor, J.
+    radiation_factor, loss_factor : ndarray, shape (12,)
+        Radiation factor and total loss factor of the floor.
+    reverberation_time : ndarray, shape (12,)
+        Reverberation time of the room, s.
+    floor_modes, room_modes : ndarray, shape (12,)
+        Expected number of modes in each third.
+    resistance : float
+        Resistance of the infinite plate, N s/m.
+    force_change : float
+        What the peak of the force would change by if the floor gave way, dB: of a linear source
+        with the mass and the contact time of the impact. The prediction uses the force on a rigid
+        floor.
+    """
+
+    floor: Floor
+    room: Room
+    frequency: NDArray[np.float64]
+    level: NDArray[np.float64]
+    time_of_maximum: NDArray[np.float64]
+    energy: NDArray[np.float64]
+    radiation_factor: NDArray[np.float64]
+    loss_factor: NDArray[np.float64]
+    reverberation_time: NDArray[np.float64]
+    floor_modes: NDArray[np.float64]
+    room_modes: NDArray[np.float64]
+    resistance: float
+    force_change: float
+
+    @property
+    def rating(self) -> Rating:
+        """Single numbers of the levels in the room."""
+        return rating(self.level, THIRDS)
+
+    @property
+    def standardised(self) -> NDArray[np.float64]:
+        """L'_i,Fmax,V,T, dB, shape (12,): in a room of 50 m3 and 0.5 s (ISO 16283-2)."""
+        return standardised_level(self.level, self.reverberation_time, self.room.volume)
+
+    @property
+    def standardised_rating(self) -> Rating:
+        """Single numbers of the standardised levels."""
+        return rating(self.standardised, THIRDS)
+
+    @property
+    def has_few_modes(self) -> NDArray[np.bool_]:
+        """Whether a third has few modes of floor or room, shape (12,)."""
+        return np.minimum(self.floor_modes, self.room_modes) < FEW_MODES
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader of the numbers has to know."""
+        few = self.has_few_modes
+        found = []
+        if few.any():
+            bands = ", ".join(f"{f:g}" for f in self.frequency[few])
+            found.append(
+                f"fewer than {FEW_MODES} modes of floor or room at {bands} Hz: levels there are "
+                "means over many floors and rooms, single ones differ by several dB"
+            )
+        if abs(self.force_change) > NOTICED:
+            found.append(
+                f"the floor gives way: the peak of the force would change by about "
+                f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
+            )
+        return tuple(found)
+
+    def difference(self, measured: RoomLevels) -> NDArray[np.float64]:
+        """Return measured less predicted level, dB, shape (12,), in the room as it is.
+
+        Raise InputError where the measured levels are not thirds.
+        """
+        require_kind("measured", measured, RoomLevels)
+        if measured.bands != THIRDS:
+            refuse("measured: the levels are octaves", "thirds, which the prediction has")
+        rated = np.isin(measured.frequency, self.frequency)
+        return np.asarray(measured.level[rated] - self.level)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text, a third each."""
+        head = ("third, Hz", "L_i,Fmax, dB", "standardised, dB", "energy, mJ", "floor modes")
+        columns = (self.level, self.standardised, 1e3 * self.energy, self.floor_modes)
+        forms = (".1f", ".1f", ".3g", ".1f")
+        cells = [
+            [f"{value:{form}}" for value in column]
+            for column, form in zip(columns, forms, strict=True)
+        ]
+        return [head, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+
+    def plot(self, measured: RoomLevels | None = None) -> Figure:
+        """Draw the chain: force, energy, floor and room, with measured levels if given."""
+        figure: Figure = MAKERS["prediction"](self, measured)
+        return figure
+
+    def __repr__(self) -> str:
+        """Return the single numbers."""
+        return (
+            f"<RoomPrediction: L_iA,Fmax {self.rating.rounded} dB, "
+            f"standardised {self.standardised_rating.rounded} dB>"
+        )
+
+
+def predict_level(
+    source: Impact | Recording, floor: Floor | None = None, room: Room | None = None
+) -> RoomPrediction:
+    """Predict the level that an impact causes in the room below.
+
+    Transient statistical energy analysis in thirds: the floor takes the energy of an infinite
+    plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
+    the Fast detector shows its maximum. The force is that on a rigid floor.
+
+    Parameters
+    ----------
+    source
+        Impact of any model, or a recording.
+    floor, room
+        Floor and room; by default those of the impact's case.
+
+    Raises
+    ------
+    InputError
+        Where floor or room are missing or out of range.
+    """
+    require_kind("source", source, Impact | Recording)
+    case = source.case if isinstance(source, Impact) else Case()
+    floor, room = floor or case.floor, room or case.room
+    if floor is None or room is None:
+        refuse(
+            f"{'floor' if floor is None else 'room'} is not given", "an object of Floor and of Room"
+        )
+    levels = (
+        source.levels(THIRDS, force="floor")
+        if isinstance(source, Impact)
+        else source.levels(THIRDS)
+    )
+    rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
+    asked = replace(case, modes=None, floor=floor, room=room)
+    found = call(api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
+    bands = found["bands"]
+    mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+    return RoomPrediction(
+        floor=floor,
+        room=room,
+        resistance=found["resistance"],
+        force_change=_force_change(mass, source.contact_time, found["resistance"]),
+        time_of_maximum=bands.pop("time"),
+        **bands,
+    )
+
+
+def _force_change(mass: float, contact_time: float, resistance: float) -> float:
+    """Return the change of the peak force on a resistance, dB, of a linear source.
+
+    F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0: against the rigid floor the peak is
+    exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2.
+    """
+    stiffness = mass * (math.pi / contact_time) ** 2
+    decay = stiffness / (2 * resistance)
+    square = stiffness / mass - decay**2
+    if not square > 0:
+        return -math.inf
+    rate = math.sqrt(square)
+    return -20 / math.log(10) * decay / rate * math.atan2(rate, decay)

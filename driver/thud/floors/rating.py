@@ -1,0 +1,182 @@
+"""Single numbers of the levels in the room below, and their standardisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud._api import call_direct, level_api
+from thud.checks import refuse, refuse_value, require_array, require_real
+from thud.display import Displayed
+from thud.levels import BANDWIDTHS
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud._schema import BandSet
+
+# Words of the Korean classes.
+CLASSES = ("none", "1", "2", "3", "4")
+
+
+@dataclass(frozen=True, repr=False)
+class Rating(Displayed):
+    """Single numbers of the levels that a heavy/soft impact source causes in the room below.
+
+    Attributes
+    ----------
+    bands : str
+        Bands that it is made of: octaves 63 to 500 Hz, or thirds 50 to 630 Hz.
+    a_weighted : float
+        A-weighted maximum level L_iA,Fmax, dB, not rounded (ISO 717-2 annex D).
+    rounded : int
+        The same as it is stated, a half rounded up, dB.
+    korean_class : int or None
+        Class 1 to 4 of KS F 2863-2 by A-weighted level (at most 37, 41, 45 and 49 dB), 0 for none;
+        None for thirds, which that standard does not use. It is meant for levels that are not
+        standardised.
+    curve : int or None
+        Rating of octaves by the inverse A-weighted curve that KS F 2863-2 used before, dB.
+    """
+
+    bands: BandSet
+    a_weighted: float
+    rounded: int
+    korean_class: int | None
+    curve: int | None
+
+    def __repr__(self) -> str:
+        """Return the numbers."""
+        korea = "" if self.korean_class is None else f", Korean class {CLASSES[self.korean_class]}"
+        return (
+            f"<Rating, {self.bands}s: L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f}){korea}>"
+        )
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        rows: list[tuple[str, ...]] = [
+            ("rating", "value"),
+            ("L_iA,Fmax, dB (ISO 717-2)", f"{self.rounded} ({self.a_weighted:.2f})"),
+        ]
+        if self.korean_class is not None:
+            rows += [
+                ("class (KS F 2863-2)", CLASSES[self.korean_class]),
+                ("inverse A curve, dB (KS F 2863-2, former)", str(self.curve)),
+            ]
+        return rows
+
+
+def rated_bands(bands: BandSet) -> NDArray[np.float64]:
+    """Return the rounded mid frequencies of the bands that a rating is made of, Hz.
+
+    Raise InputError where `bands` is not known.
+    """
+    (count,) = call_direct(level_api.count_rated, bands)
+    nominal: NDArray[np.float64] = level_api.get_rated(bands, count)
+    return nominal
+
+
+def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
+    """Return the single numbers of levels in the room below.
+
+    Parameters
+    ----------
+    levels : array_like, shape (4,) or (12,)
+        Maximum Fast levels of the octaves 63 to 500 Hz, or of the thirds 50 to 630 Hz, dB re
+        20 uPa: measured ones, or standardised ones.
+    bands
+        ``"octave"`` or ``"third"``. Thirds are weighted one by one: maxima of thirds do not add up
+        to those of octaves.
+
+    Raises
+    ------
+    InputError
+        Where there are levels of other bands, or one is not finite.
+
+    Examples
+    --------
+    >>> import thud
+    >>> thud.rating([65.3, 64.5, 58.0, 55.8]).rounded
+    55
+    """
+    frequencies = rated_bands(bands)
+    values = _finite("levels", levels)
+    if values.shape != frequencies.shape:
+        refuse(
+            f"levels have the shape {values.shape}",
+            f"{frequencies.shape}, the {bands}s {frequencies[0]:g} to {frequencies[-1]:g} Hz",
+        )
+    total, rounded, grade, curve = call_direct(level_api.rate, bands, values)
+    has_classes = bands == BANDWIDTHS[0]
+    return Rating(
+        bands,
+        float(total),
+        int(rounded),
+        int(grade) if has_classes else None,
+        int(curve) if has_classes else None,
+    )
+
+
+def standardised_level(
+    level: ArrayLike, reverberation_time: ArrayLike, volume: float
+) -> NDArray[np.float64]:
+    """Return levels in a room of 50 m3 with a reverberation time of 0.5 s (ISO 16283-2).
+
+    L'_i,Fmax,V,T = L_i,Fmax + 10 lg(V/V0) - 10 lg(g(C)/g(C0)) with C = T/1.7275 s and
+    g(C) = C**(-1/(C - 1)): what the Fast detector shows of a decay depends on its length.
+
+    Parameters
+    ----------
+    level : array_like, shape (n,)
+        Maximum Fast levels, dB re 20 uPa.
+    reverberation_time : array_like, shape () or (n,)
+        Reverberation times, s.
+    volume
+        Volume of the room, m3.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Standardised levels, dB.
+
+    Raises
+    ------
+    InputError
+        Where a value is not finite, a time or the volume is not positive, or shapes differ.
+    """
+    values = _finite("level", np.atleast_1d(np.asarray(level)))
+    times = _finite("reverberation_time", np.atleast_1d(np.asarray(reverberation_time)))
+    if len(times) == 1:
+        times = np.full(len(values), times[0])
+    if len(times) != len(values):
+        refuse(
+            f"reverberation_time has {len(times)} values for {len(values)} levels",
+            "one, or one for each level",
+        )
+    if (times <= 0).any():
+        refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
+    found: NDArray[np.float64] = level_api.standardise(values, times, require_volume(volume))
+    return found
+
+
+def require_volume(volume: Any) -> float:  # noqa: ANN401 - of a user
+    """Return a volume, m3; raise InputError where it is not positive and finite."""
+    try:
+        value = float(volume)
+    except (TypeError, ValueError, OverflowError):
+        value = np.nan
+    if not 0 < value < np.inf:
+        refuse_value("volume", volume, "volume > 0, m3")
+    return value
+
+
+def _finite(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    """Return an array of finite numbers; raise InputError for others."""
+    array = require_real(name, require_array(name, values, dimensions=(1,)))
+    if not array.size or not np.isfinite(array).all():
+        refuse(
+            f"{name} {'has a value that is not finite' if array.size else 'is empty'}", "numbers"
+        )
+    return array

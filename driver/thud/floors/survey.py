@@ -1,0 +1,343 @@
+"""Levels measured in a room below: mean of positions, background, standardisation, rating.
+
+The chain is that of ISO 16283-2 for the rubber ball: energy mean over the positions, correction for
+the background, standardisation by reverberation time and volume, rating of ISO 717-2 annex D.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._api import level_api
+from thud.checks import refuse
+from thud.columns import read_titled
+from thud.display import MAKERS, Displayed
+from thud.floors.rating import Rating, rated_bands, rating, require_volume, standardised_level
+from thud.levels import BANDWIDTHS
+
+if TYPE_CHECKING:
+    import os
+
+    from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud._schema import BandSet
+
+# Rounded mid frequencies in a decade (ISO 3, R10), and how far a title may be from one.
+R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
+NEAR = 0.03
+# Minimum number of positions (ISO 16283-2).
+MIN_POSITIONS = 4
+# Columns that are no levels, by their titles without units, small.
+TITLES = {
+    "frequency": "frequency", "f": "frequency", "band": "frequency", "hz": "frequency",
+    "reverberation time": "time", "t": "time", "t20": "time", "t30": "time", "rt": "time",
+    "background": "background", "background level": "background", "noise": "background",
+}  # fmt: skip
+ALLOWED = (
+    "a line of titles, and for each band a line of frequency, Hz, levels, dB, of one or "
+    "more positions, and where they are known the columns background, dB, and "
+    "reverberation_time, s"
+)
+# Levels and times beyond these are mistyped.
+LEVELS, TIMES = (-50.0, 200.0), (0.01, 100.0)
+
+
+@dataclass(frozen=True, repr=False)
+class RoomLevels(Displayed):
+    """Levels of a heavy/soft impact source in the room below, in bands.
+
+    Attributes
+    ----------
+    name : str
+        Name, such as that of the file.
+    bands : str
+        ``"octave"`` or ``"third"``.
+    frequency : ndarray, shape (n_band,)
+        Rounded mid frequencies, Hz, ascending; more than the rated ones may be there.
+    positions : ndarray, shape (n_position, n_band)
+        Maximum Fast levels of each position, dB re 20 uPa.
+    background, reverberation_time : ndarray, shape (n_band,), or None
+        Background level, dB, and reverberation time, s, where they are known.
+    volume : float or None
+        Volume of the room, m3.
+    """
+
+    name: str
+    bands: BandSet
+    frequency: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    background: NDArray[np.float64] | None = None
+    reverberation_time: NDArray[np.float64] | None = None
+    volume: float | None = None
+
+    @property
+    def measured(self) -> NDArray[np.float64]:
+        """Energy mean of the positions, with the background, dB, shape (n_band,)."""
+        mean: NDArray[np.float64] = 10 * np.log10((10 ** (self.positions / 10)).mean(axis=0))
+        return mean
+
+    @property
+    def level(self) -> NDArray[np.float64]:
+        """Energy mean L_i,Fmax without the background, dB, shape (n_band,)."""
+        return self._corrected()[0]
+
+    @property
+    def is_maximum(self) -> NDArray[np.bool_]:
+        """Whether a level is a maximum only: less than 6 dB above the background."""
+        return self._corrected()[1]
+
+    @property
+    def standardised(self) -> NDArray[np.float64] | None:
+        """L'_i,Fmax,V,T, dB, shape (n_band,); None without reverberation time or volume."""
+        if self.reverberation_time is None or self.volume is None:
+            return None
+        return standardised_level(self.level, self.reverberation_time, self.volume)
+
+    @property
+    def spread(self) -> NDArray[np.float64] | None:
+        """Standard deviation of the positions' levels, dB, shape (n_band,); None of one."""
+        return self.positions.std(axis=0, ddof=1) if len(self.positions) > 1 else None
+
+    @property
+    def rating(self) -> Rating:
+        """Single numbers of the levels as they are in the room."""
+        return rating(self.level[self._rated], self.bands)
+
+    @property
+    def standardised_rating(self) -> Rating | None:
+        """Single numbers of the standardised levels; None where there are none."""
+        levels = self.standardised
+        return None if levels is None else rating(levels[self._rated], self.bands)
+
+    @property
+    def position_uncertainty(self) -> float | None:
+        """Standard uncertainty of the single numbers by the scatter of positions, dB.
+
+        The A-weighted energy is a mean over the positions: this is its standard error. It holds
+        nothing else, neither the instruments nor the reverberation time; None of one position.
+        """
+        count = len(self.positions)
+        if count == 1:
+            return None
+        weighted = [rating(levels[self._rated], self.bands).a_weighted for levels in self.positions]
+        energy = 10 ** ((np.array(weighted) - max(weighted)) / 10)
+        error = energy.std(ddof=1) / math.sqrt(count) / energy.mean()
+        return float(10 / math.log(10) * error)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader of the numbers has to know."""
+        found = []
+        if len(self.positions) < MIN_POSITIONS:
+            found.append(
+                f"levels of {self._count}; ISO 16283-2 asks for {MIN_POSITIONS} positions of the "
+                "source or more"
+            )
+        if self.background is None:
+            found.append("the background is not known: levels are not corrected for it")
+        elif self.is_maximum.any():
+            bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_maximum])
+            found.append(
+                f"less than 6 dB above the background at {bands} Hz: levels there are maxima, and "
+                "so is what is made of them"
+            )
+        missing = [
+            word
+            for word, value in (
+                ("reverberation times", self.reverberation_time), ("the volume", self.volume)
+            )
+            if value is None
+        ]  # fmt: skip
+        if missing:
+            found.append(f"not standardised: {' and '.join(missing)} not given")
+        return tuple(found)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text, a band each."""
+        titles = [f"{self.bands}, Hz", "mean, dB"]
+        columns = [self.measured]
+        if self.spread is not None:
+            titles.append("spread, dB")
+            columns.append(self.spread)
+        if self.background is not None:
+            titles += ["background, dB", "L_i,Fmax, dB"]
+            columns += [self.background, self.level]
+        if (standardised := self.standardised) is not None:
+            titles += ["T, s", "standardised, dB"]
+            columns += [np.asarray(self.reverberation_time), standardised]
+        cells = [
+            [f"{value:z.{2 if title == 'T, s' else 1}f}" for value in column]
+            for title, column in zip(titles[1:], columns, strict=True)
+        ]
+        for title, column in zip(titles[1:], cells, strict=True):
+            if title in {"L_i,Fmax, dB", "standardised, dB"}:
+                column[:] = [
+                    f"< {text}" if low else text
+                    for text, low in zip(column, self.is_maximum, strict=True)
+                ]
+        return [tuple(titles), *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+
+    def plot(self) -> Figure:
+        """Draw the levels of positions, their mean, the standardised ones and the background."""
+        figure: Figure = MAKERS["room"](self)
+        return figure
+
+    def __repr__(self) -> str:
+        """Return the single numbers."""
+        after = self.standardised_rating
+        more = "" if after is None else f", standardised {after.rounded} dB"
+        return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{more}>"
+
+    @property
+    def _count(self) -> str:
+        count = len(self.positions)
+        return f"{count} position{'s' if count > 1 else ''}"
+
+    @property
+    def _rated(self) -> NDArray[np.bool_]:
+        wanted = rated_bands(self.bands)
+        return np.isin(self.frequency, wanted)
+
+    def _corrected(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        if self.background is None:
+            return self.measured, np.zeros(len(self.frequency), dtype=bool)
+        level, is_maximum = level_api.remove_background(self.measured, self.background)
+        return level, is_maximum.astype(bool)
+
+
+def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) -> RoomLevels:
+    """Read levels in a room from a table.
+
+    Parameters
+    ----------
+    path
+        Columns with a line of titles: ``frequency``, Hz; ``background``, dB, and
+        ``reverberation_time``, s, where they are known; every other column holds the levels of a
+        position, dB. The bands are the octaves or thirds that a rating needs, and more if wanted.
+    volume
+        Volume of the room, m3.
+
+    Raises
+    ------
+    InputError
+        Names the file, and the column or band that is missing, double or not plausible.
+    """
+    name = Path(path).stem
+    titles, table = read_titled(path, ALLOWED)
+    if len(titles) != table.shape[1]:
+        refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", ALLOWED)
+    kinds = [TITLES.get(_plain(title), "level") for title in titles]
+    columns: dict[str, NDArray[np.float64]] = {}
+    for kind in ("frequency", "background", "time"):
+        if kinds.count(kind) > 1:
+            refuse(f"{path}: more than one column of {kind}", ALLOWED)
+        if kind in kinds:
+            columns[kind] = table[:, kinds.index(kind)]
+    if "frequency" not in columns or "level" not in kinds:
+        missing = "frequency" if "frequency" not in columns else "levels"
+        refuse(f"{path}: there is no column of {missing}", ALLOWED)
+    frequency = np.array([_nominal(f, path) for f in columns["frequency"]])
+    order = np.argsort(frequency)
+    frequency = frequency[order]
+    bands = _bands_of(frequency, path)
+    levels = table[:, [kind == "level" for kind in kinds]].T[:, order]
+    for word, values, limits in (
+        ("level", levels, LEVELS),
+        ("background", columns.get("background"), LEVELS),
+        ("reverberation_time", columns.get("time"), TIMES),
+    ):
+        if values is None:
+            continue
+        good = (values >= limits[0]) & (values <= limits[1])
+        if not good.all():
+            unit = "s" if word == "reverberation_time" else "dB"
+            refuse(
+                f"{path}: {word} = {values[~good][0]:g} {unit} is not allowed",
+                f"{limits[0]:g} to {limits[1]:g} {unit}",
+            )
+    return RoomLevels(
+        name, bands, frequency, levels,
+        columns["background"][order] if "background" in columns else None,
+        columns["time"][order] if "time" in columns else None,
+        None if volume is None else require_volume(volume),
+    )  # fmt: skip
+
+
+def levels_csv(found: RoomLevels) -> bytes:
+    """Return the levels as a table with titles."""
+    columns = {
+        "nominal_Hz": found.frequency, "mean_dB": found.measured, "spread_dB": found.spread,
+        "background_dB": found.background, "level_dB": found.level,
+        "is_maximum": found.is_maximum.astype(int),
+        "reverberation_time_s": found.reverberation_time, "standardised_dB": found.standardised,
+    }  # fmt: skip
+    known = {title: values for title, values in columns.items() if values is not None}
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(known)
+    for row in zip(*known.values(), strict=True):
+        writer.writerow(f"{value:.10g}" for value in row)
+    return text.getvalue().encode()
+
+
+def rating_table(found: RoomLevels) -> list[tuple[str, ...]]:
+    """Return header and rows of the single numbers."""
+    after = found.standardised_rating
+    rows = [*found.rating.rows()]
+    if after is not None:
+        rows = [(*row, more[1]) for row, more in zip(rows, after.rows(), strict=True)]
+        rows[0] = ("rating", "in the room", "standardised")
+        # The classes are meant for levels in the room.
+        rows[2:3] = [(*row[:2], "") for row in rows[2:3]]
+    return rows
+
+
+def _plain(title: str) -> str:
+    """Return a title small and without its unit.
+
+    >>> _plain("Reverberation_time (s)")
+    'reverberation time'
+    """
+    word = re.split(r"[,.;(\[/]", title.strip().strip('"').lower())[0]
+    return re.sub(r"[_\s]+(hz|s|db)$", "", word.strip()).replace("_", " ").strip()
+
+
+def _nominal(frequency: float, path: object) -> float:
+    """Return the rounded mid frequency that is meant."""
+    if 1 <= frequency < 1e5:  # noqa: PLR2004 - bands of sound
+        decade = 10.0 ** math.floor(math.log10(frequency))
+        near = np.append(R10, 10) * decade
+        best = float(near[np.argmin(abs(near / frequency - 1))])
+        if abs(best / frequency - 1) < NEAR:
+            return float(f"{best:.3g}")
+    return refuse(
+        f"{path}: frequency = {frequency:g} Hz is not a mid frequency",
+        "those of octaves or thirds, such as 50, 63, 80",
+    )
+
+
+def _bands_of(frequency: NDArray[np.float64], path: object) -> BandSet:
+    """Return the set of bands; raise InputError where rated ones are missing or double."""
+    double = frequency[1:][np.diff(frequency) <= 0]
+    if double.size:
+        refuse(f"{path}: frequency {double[0]:g} Hz is given twice", "each band once")
+    steps = np.diff(np.log10(frequency))
+    bands: BandSet = BANDWIDTHS[0] if steps.size and steps.min() > 0.2 else BANDWIDTHS[1]  # noqa: PLR2004
+    wanted = rated_bands(bands)
+    missing = wanted[~np.isin(wanted, frequency)]
+    if missing.size:
+        words = ", ".join(f"{f:g}" for f in missing)
+        refuse(
+            f"{path}: there is no level at {words} Hz",
+            f"{bands}s {wanted[0]:g} to {wanted[-1]:g} Hz",
+        )
+    return bands

@@ -1,0 +1,65 @@
+"""Pools of processes that end with the one that started them."""
+
+from __future__ import annotations
+
+import os
+import signal
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+from threading import RLock, Thread
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from multiprocessing import connection
+
+
+@contextmanager
+def process_pool(
+    width: int, prepare: Callable[[], object] | None = None
+) -> Iterator[ProcessPoolExecutor]:
+    """Open a pool of processes; an interrupt ends what they are doing.
+
+    Parameters
+    ----------
+    width
+        Number of processes.
+    prepare
+        Is called in each process before its first work.
+    """
+    # Forked processes would inherit locks held by threads that they do not have.
+    context = get_context("spawn")
+    end, held = context.Pipe(duplex=False)
+    with end, held, ProcessPoolExecutor(width, context, _start, (end, prepare)) as processes:
+        try:
+            yield processes
+        except KeyboardInterrupt:
+            held.close()
+            raise
+
+
+@contextmanager
+def no_interrupt_in_processes() -> Iterator[None]:
+    """Block Ctrl-C, which terminals send to all processes, in those that are started meanwhile."""
+    usual = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, usual)
+
+
+def _start(end: connection.Connection, prepare: Callable[[], object] | None) -> None:
+    """End with the parent process, or when it closes the other end of a pipe."""
+    # The usual lock is a semaphore of the system, which processes that end like this leave behind.
+    tqdm.set_lock(RLock())
+
+    def end_with_it() -> None:
+        end.poll(None)
+        os._exit(1)
+
+    Thread(target=end_with_it, daemon=True).start()
+    if prepare:
+        prepare()

@@ -1,0 +1,132 @@
+"""Measured drops on disk, so that an interrupted measurement goes on where it ended."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import io
+import pickle
+import sys
+import time
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from thud._api import version
+from thud.files import replace_file
+from thud.recordings.estimates import Drop
+
+if TYPE_CHECKING:
+    import os
+    from types import TracebackType
+
+    from thud.recordings.config import Config
+    from thud.recordings.signal import Signal
+
+# Seconds of measurement that an abrupt end may lose.
+INTERVAL = 5.0
+PREFIX, SUFFIX = ".measured-", ".part"
+# What arrays are made of in a pickle.
+NUMPY = {"_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype"}
+
+
+class KeptDrops:
+    """Drops of signals, kept in a directory while others are measured; a context manager.
+
+    Each file holds drops of one signal and one configuration, named by their digest. At the end all
+    are removed, and so is the directory if it is empty; they stay where the process is interrupted
+    or killed.
+
+    Parameters
+    ----------
+    folder
+        Directory of the files, made where it is needed; None keeps nothing.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str] | None) -> None:
+        self.folder = None if folder is None else Path(folder)
+        self._new: dict[int, Drop] = {}
+        self._digest = ""
+        self._written = time.monotonic()
+
+    def __enter__(self) -> Self:
+        """Return the drops."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Remove the files, or add what is not written yet after an interrupt."""
+        if self.folder is None:
+            return
+        if kind is not None and not issubclass(kind, Exception):
+            self._write()
+            return
+        files = list(self.folder.glob(f"{PREFIX}*{SUFFIX}"))
+        for path in files:
+            path.unlink(missing_ok=True)
+        if files:
+            with suppress(OSError):  # it holds something else
+                self.folder.rmdir()
+
+    def open(self, signal: Signal, config: Config) -> dict[int, Drop]:
+        """Return the drops of a signal that were measured before, by their first samples."""
+        if self.folder is None:
+            return {}
+        self._write()
+        told = "\n".join(map(str, (version(), signal.checksum, signal.name, config)))
+        self._digest = hashlib.sha256(told.encode("utf-8", "surrogateescape")).hexdigest()[:32]
+        found: dict[int, Drop] = {}
+        for path in sorted(self.folder.glob(f"{PREFIX}{self._digest}-*{SUFFIX}")):
+            found |= _read(path)
+        return found
+
+    def add(self, start: int, drop: Drop) -> None:
+        """Keep a drop by its first sample; it is on disk after some seconds.
+
+        Raises
+        ------
+        OSError
+            Where it cannot be written.
+        """
+        if self.folder is None:
+            return
+        self._new[start] = drop
+        if time.monotonic() - self._written > INTERVAL:
+            self._write()
+
+    def _write(self) -> None:
+        """Write the new drops to a file of their own."""
+        self._written = time.monotonic()
+        if self.folder is None or not self._new:
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"{PREFIX}{self._digest}-{min(self._new)}{SUFFIX}"
+        replace_file(path, pickle.dumps(self._new))
+        self._new = {}
+
+
+def _read(path: Path) -> dict[int, Drop]:
+    """Return the drops of a file; none of one that is damaged or of another kind."""
+    try:
+        found = _DataOnly(io.BytesIO(path.read_bytes())).load()
+    except Exception:  # noqa: BLE001 - a damaged pickle raises anything; its drops are measured again
+        return {}
+    whole = isinstance(found, dict) and all(isinstance(one, Drop) for one in found.values())
+    return found if whole else {}
+
+
+class _DataOnly(pickle.Unpickler):
+    """Reads data of recordings and arrays, and calls nothing else."""
+
+    def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401 - a class
+        """Return a class; raise UnpicklingError of what is no data."""
+        found = super().find_class(module, name) if module in sys.modules else None
+        ours = module.startswith("thud.recordings.") and dataclasses.is_dataclass(found)
+        if not ours and not (module.partition(".")[0] == "numpy" and name in NUMPY):
+            message = f"{module}.{name} is no data"
+            raise pickle.UnpicklingError(message)
+        return found

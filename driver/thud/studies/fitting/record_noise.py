@@ -1,0 +1,368 @@
+"""Noise of a record below a frequency, from its quiet parts, and how it weights residuals.
+
+Records are compared on a grid of an odd number of points that holds their Fourier coefficients up
+to a frequency: `to_grid` is orthonormal, white noise stays white and keeps its deviation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from thud.recordings.contact import QUIET, cells_between
+from thud.recordings.drops import CELL, FOOT, MARGIN
+from thud.recordings.noise import (
+    DRIFT,
+    MAINS,
+    N_HARMONIC,
+    OFFSET,
+    covariances,
+    fit_background,
+    noise_covariances,
+)
+from thud.studies.fitting.residual_tests import UNLIKELY
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.recordings.noise import Background, Cells
+
+# Quiet with fewer independent values in the band does not tell the noise.
+MIN_QUIET = 50
+# Least frequency of hum, Hz: slower ones are drift within a pulse. Maximum number of its tones that
+# are looked for in the quiet.
+MIN_HUM = 10.0
+MAX_TONES = 3
+# Harmonics of hum count up to this part of the highest frequency.
+HARMONIC_EDGE = 0.95
+# Time from the foot of a pulse to its edge, s: flanks of the models rise to it in 4 ms.
+FLANK = 2 * MARGIN * CELL
+
+
+def to_grid(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return columns of samples on a grid of `count` points."""
+    kept = np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1]
+    grid: NDArray[np.float64] = np.fft.irfft(kept, count, norm="ortho", axis=0)
+    return grid
+
+
+def grid_covariance(lags: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return the covariance on a grid of stationary noise, from that of samples at all lags.
+
+    With X = n^-1/2 sum x_j w^(kj) and w = exp(-2 pi i/n), the sum over equal lags t is geometric:
+    cov(X_k, X_l) = 2 i Im(a_k - a_l)/(n (1 - w^(k - l))), a_k = sum_t c(t) w^(kt); its diagonal is
+    the sum of (1 - |t|/n) c(t) w^(kt).
+    """
+    n = len(lags)
+    order = np.fft.ifftshift(np.arange(count) - count // 2)
+    half = np.fft.fft(lags)[order].imag
+    turn = np.exp(-2j * np.pi * np.subtract.outer(order, order) / n)
+    np.fill_diagonal(turn, 0)
+    covariance = 2j * np.subtract.outer(half, half) / (n * (1 - turn))
+    whole = np.fft.fft((1 - np.arange(n) / n) * lags)[order].real
+    np.fill_diagonal(covariance, 2 * whole - lags[0])
+    result: NDArray[np.float64] = np.fft.fft(np.fft.ifft(covariance, axis=0), axis=1).real
+    return result
+
+
+def find_pulse(force: NDArray[np.float64], rate: float) -> tuple[int, int]:
+    """Return the first sample of the pulse of a record and the one behind it, with room."""
+    width = max(1, round(CELL * rate))
+    smooth = np.convolve(force, np.full(width, 1 / width), mode="same")
+    smooth -= np.quantile(smooth, 0.1)
+    top = int(np.argmax(smooth))
+    low = np.flatnonzero(smooth < FOOT * smooth[top])
+    before, after = low[low < top], low[low > top]
+    room = int(FLANK * rate)
+    first = before[-1] - room if before.size else 0
+    stop = after[0] + room if after.size else len(force)
+    return max(int(first), 0), min(int(stop), len(force))
+
+
+@dataclass(frozen=True, eq=False)
+class Quiet:
+    """Quiet parts of a record.
+
+    Attributes
+    ----------
+    force : ndarray, shape (n_sample,)
+        The record, N.
+    rate : float
+        Samples per second, Hz.
+    pulse : tuple of int
+        First sample that is no quiet, and the one behind the last.
+    below : float
+        Highest frequency that counts, Hz.
+    """
+
+    force: NDArray[np.float64]
+    rate: float
+    pulse: tuple[int, int]
+    below: float
+
+    @property
+    def seconds(self) -> float:
+        """Length of the quiet, s."""
+        return (len(self.force) - self.pulse[1] + self.pulse[0]) / self.rate
+
+    @property
+    def freedom(self) -> int:
+        """Number of independent values in the band, less the offset."""
+        return int(2 * self.below * self.seconds) - 1
+
+    @property
+    def known(self) -> bool:
+        """Whether there is enough of it to tell the noise."""
+        return self.freedom >= MIN_QUIET
+
+    @property
+    def middle(self) -> float:
+        """Middle of the pulse, s from the first sample."""
+        return (self.pulse[0] + self.pulse[1]) / 2 / self.rate
+
+    def deviation(self) -> float:
+        """Return the standard deviation of the quiet samples, N."""
+        first, stop = self.pulse
+        return float(np.std(np.concatenate([self.force[:first], self.force[stop:]])))
+
+    @cached_property
+    def _means(self) -> tuple[Cells, NDArray[np.float64]]:
+        """Cells of the quiet, s from the middle of the pulse, and their means less the median, N.
+
+        They are those of the band: wider ones would not tell the noise of its upper end.
+        """
+        width = max(1, int(self.rate / (2 * self.below)))
+        first, stop = self.pulse
+        edges = (
+            first - width * np.arange(1 + first // width)[::-1],
+            stop + width * np.arange(1 + (len(self.force) - stop) // width),
+        )
+        begins, ends = zip(
+            *(cells_between(side, self.rate, self.middle) for side in edges), strict=True
+        )
+        means = [
+            np.add.reduceat(self.force[: side[-1]], side[:-1]) / width
+            for side in edges
+            if len(side) > 1
+        ]
+        mean = np.concatenate(means)
+        return (np.concatenate(begins), np.concatenate(ends)), mean - np.median(mean)
+
+    def background(self, tones: Sequence[float] = ()) -> Background:
+        """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
+
+        Tones, Hz, are removed first, by least squares.
+        """
+        cells, mean = self._means
+        waves = cell_waves(cells, tones)
+        left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+        peak = float(self.force.max() - np.median(self.force))
+        found = fit_background(cells, left, peak)
+        # What the waves have taken of the noise.
+        scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
+        return replace(found, draws=scale * found.draws)
+
+    def tones(self) -> tuple[float, ...]:
+        """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
+
+        A tone must raise the likelihood by more than the search over all frequencies does.
+        """
+        cells, mean = self._means
+        span = 2 * float(np.abs(cells).max())
+        step = 1 / (4 * span)
+        grid = np.arange(MIN_HUM, HARMONIC_EDGE * self.below, step)
+        # The noise has those of the mains.
+        grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
+        least = float(np.log(len(grid) / UNLIKELY))
+        found: tuple[float, ...] = ()
+        best = _log_likelihood(self.background())
+        while len(found) < MAX_TONES:
+            waves = cell_waves(cells, found)
+            left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+            tried = [
+                (_log_likelihood(self.background((*found, tone))), tone)
+                for whiten in (_trendless(cells), _whitening(self.background(found)))
+                for tone, gain in [_strongest(cells, whiten @ left, whiten, grid)]
+                if gain > least
+            ]
+            likelihood, tone = max(tried, default=(best, 0.0))
+            if likelihood < best + least:
+                break
+            best, found = likelihood, (*found, tone)
+        return found
+
+
+def cell_waves(cells: Cells, tones: Sequence[float]) -> NDArray[np.float64]:
+    """Return a constant, and means of the waves of tones, Hz, over cells: [n_cell, 1 + 2 n]."""
+    middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
+    phase = 2 * np.pi * np.multiply.outer(middle, np.asarray(tones, dtype=np.float64))
+    weight = np.sinc(np.multiply.outer(width, np.asarray(tones, dtype=np.float64)))
+    one = np.ones((len(middle), 1))
+    return np.concatenate([one, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
+
+
+def _strongest(
+    cells: Cells, mean: NDArray[np.float64], whiten: NDArray[np.float64], grid: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Return the frequency of the strongest tone in whitened means, Hz, and its gain.
+
+    The gain is that of the logarithm of the likelihood, the deviation of the noise estimated.
+    """
+    tone = 0.0
+    for _ in range(2):
+        waves = np.moveaxis(cell_waves(cells, grid.tolist())[:, 1:].reshape(-1, 2, len(grid)), 2, 0)
+        basis, _ = np.linalg.qr(whiten @ waves)
+        power = np.sum(np.einsum("kni,n->ki", basis, mean) ** 2, axis=1)
+        place = int(np.argmax(power))
+        tone, step = float(grid[place]), float(np.diff(grid).min())
+        # Once more between the neighbours.
+        grid = np.linspace(tone - step, tone + step, 41)
+    share = min(float(power[place] / (mean @ mean)), 1 - 1e-12)
+    return tone, -0.5 * len(mean) * float(np.log1p(-share))
+
+
+def _trendless(cells: Cells) -> NDArray[np.float64]:
+    """Return the projection that takes offset and drift of white noise out of cells."""
+    middle = (cells[0] + cells[1]) / 2
+    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(middle), middle]))
+    return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
+
+
+def _covariance(background: Background) -> NDArray[np.float64]:
+    """Return the covariance of quiet cells, offset and drift with it, N2."""
+    middle = (background.quiet[0] + background.quiet[1]) / 2
+    trend = OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle)
+    parts = np.tensordot(background.variances, covariances(background.quiet), 1)
+    return np.asarray(parts + background.peak**2 * trend, dtype=np.float64)
+
+
+def _whitening(background: Background) -> NDArray[np.float64]:
+    """Return what makes quiet cells independent and of unit variance."""
+    factor = np.linalg.cholesky(_covariance(background))
+    whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    return np.asarray(whiten, dtype=np.float64)
+
+
+def _log_likelihood(background: Background) -> float:
+    """Return the logarithm of the likelihood of quiet cells."""
+    whiten = _whitening(background)
+    white = whiten @ background.mean
+    return float(np.log(np.diag(whiten)).sum() - 0.5 * white @ white)
+
+
+def trimmed(force: NDArray[np.float64], rate: float) -> slice:
+    """Return the part of a record that holds the pulse and the quiet which counts."""
+    first, stop = find_pulse(force, rate)
+    room = int(QUIET * rate)
+    return slice(max(first - room, 0), min(stop + room, len(force)))
+
+
+class Weights:
+    """Weights of residuals on a grid: generalised least squares, nuisance parameters projected out.
+
+    Attributes
+    ----------
+    covariance : ndarray, shape (n, n)
+        Covariance of the noise, N2.
+    nuisance : ndarray, shape (n, n_nuisance)
+        What each nuisance parameter adds to the record, for 1 N.
+    predicted : ndarray, shape (n, n)
+        The part of the covariance that is predicted from the residual: drift and hum, N2.
+    """
+
+    def __init__(
+        self,
+        covariance: NDArray[np.float64],
+        nuisance: NDArray[np.float64],
+        predicted: NDArray[np.float64],
+    ) -> None:
+        self.covariance, self.nuisance, self.predicted = covariance, nuisance, predicted
+        # In the order of time, the factor makes of each point what those before do not tell.
+        factor = np.linalg.cholesky(covariance)
+        self._whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+        self._basis, self._triangle = np.linalg.qr(self._whiten @ nuisance)
+        self.matrix = self._whiten - self._basis @ (self._basis.T @ self._whiten)
+
+    def deviation(self) -> float:
+        """Return the standard deviation of the noise about its mean over the grid, N."""
+        count = len(self.covariance)
+        noise = self.covariance - self.predicted
+        spread = np.trace(noise) - noise.sum() / count
+        return float(np.sqrt(spread / (count - 1)))
+
+    def estimates(
+        self, rest: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the nuisance parameters of record less model, N, and their covariance, N2."""
+        inverse = np.linalg.inv(self._triangle)
+        return inverse @ (self._basis.T @ (self._whiten @ rest)), inverse @ inverse.T
+
+    def background(self, rest: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return what offset, drift and hum add to the record, N: [n], from record less model."""
+        value, _ = self.estimates(rest)
+        left = self._whiten.T @ (self.matrix @ rest)
+        result: NDArray[np.float64] = self.nuisance @ value + self.predicted @ left
+        return result
+
+
+def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
+    """Return the frequencies of hum and its harmonics, Hz, that lie below another one; 0: none."""
+    count = min(N_HARMONIC, int(HARMONIC_EDGE * below / hum)) if hum else 0
+    return tuple(hum * order for order in range(1, 1 + count))
+
+
+def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
+    quiet: Quiet,
+    count: int,
+    *,
+    background: Background | None,
+    noise: float | None,
+    offset: bool,
+    tones: Sequence[float],
+    mains: bool,
+) -> Weights:
+    """Return the weights of a record.
+
+    Parameters
+    ----------
+    quiet
+        The record.
+    count
+        Number of points of the grid.
+    background
+        The noise of the quiet; None: not known.
+    noise
+        Standard deviation of white noise instead, N; without either it is 1 N.
+    offset
+        An offset is a nuisance parameter.
+    tones
+        Frequencies whose waves are nuisance parameters, Hz.
+    mains
+        Hum of 50 and 60 Hz counts as the background knows it.
+    """
+    n, rate = len(quiet.force), quiet.rate
+    time = np.arange(n) / rate - quiet.middle
+    white, coloured, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
+    drift = 0.0
+    if background is not None:
+        rows = noise_covariances((time[:1], time[:1] + 1 / rate), (time, time + 1 / rate))[:, 0]
+        variances = background.variances
+        if noise is None:
+            white = variances[0] * rate / 2
+            coloured = variances[1:3] @ rows[:2]
+        if mains:
+            humming = variances[3:] @ rows[2:]
+        drift = DRIFT * background.peak if offset else 0.0
+    slope = to_grid(drift * time[:, np.newaxis], count)
+    predicted = grid_covariance(humming, count) + slope @ slope.T
+    covariance = white * np.eye(count) + grid_covariance(coloured, count) + predicted
+    # Covariances of pink and brown noise hold up to a constant, that of an unknown offset.
+    covariance += 10 * np.abs(coloured).max()
+    columns = cell_waves((time, time + 1 / rate), tones)[:, 0 if offset else 1 :]
+    return Weights(covariance, to_grid(columns, count), predicted)

@@ -1,0 +1,136 @@
+"""What the temperature of the ball does to its rubber, by the constants of the user."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud.checks import refuse, refuse_value, require_words
+from thud.keys import TEMPERATURE
+from thud.studies.parameter import checked
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from thud.case import Case
+    from thud.studies.parameter import Parameter
+
+_WORDS = ("reference", "coefficient", "c1", "c2")
+# Keys that hold the law of the loss; its order where the law is not the fractional one.
+_LAW_KEYS = ("viscosity", "damping_law")
+_ORDERS = {"kelvin_voigt": 1.0, "rising": 1.0}
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """Law of the temperature T: the modulus of elasticity, and the shift of the loss.
+
+    The modulus E is E (1 + coefficient (T - reference)) at every frequency. With `c1` and `c2` the
+    material behaves at T and a frequency f as at `reference` and a f, log10 a =
+    -c1 (T - reference)/(c2 + T - reference) (Williams, Landel and Ferry 1955).
+
+    Attributes
+    ----------
+    reference : float
+        Temperature at which the case holds, degC.
+    coefficient : float or None
+        Of the modulus, 1/K.
+    c1, c2 : float or None
+        Of the shift, 1 and K.
+    """
+
+    reference: float
+    coefficient: float | None = None
+    c1: float | None = None
+    c2: float | None = None
+
+    @property
+    def given(self) -> dict[str, float]:
+        """Its table, without what is left out."""
+        return {word: value for word, value in vars(self).items() if value is not None}
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Keys that it changes."""
+        return ("youngs_modulus", "loss_factor") if self.c1 else ("youngs_modulus",)
+
+    def shift(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the factor a of the frequency; not a number where c2 + T - reference <= 0."""
+        if self.c1 is None or self.c2 is None:
+            return np.ones_like(temperature)
+        above = np.asarray(temperature, dtype=float) - self.reference
+        with np.errstate(all="ignore"):
+            power = np.where(self.c2 + above > 0, -self.c1 * above / (self.c2 + above), np.nan)
+            return np.asarray(10.0**power)
+
+    def act(self, case: Case, sets: dict[str, Any]) -> dict[str, Any]:
+        """Return sets with the values of keys at their ``temperature``, shape (n_set,).
+
+        Modulus and loss factor stay those at the `loss_frequency` of the case: of the fractional
+        law 1 + p (cos + i sin) (a**order - 1) with the angle pi order/2 and p = loss factor/sin.
+        """
+        found = dict(sets)
+        temperature = found.pop(TEMPERATURE.name)
+        values = {**vars(case.ball), **vars(case.model), **found}
+        above = temperature - self.reference
+        modulus = values["youngs_modulus"] * (1 + (self.coefficient or 0.0) * above)
+        if self.c1 is not None:
+            order = _ORDERS.get(_loss_law(case), values.get("fractional_order", 1.0))
+            angle = np.pi / 2 * order
+            pot = values["loss_factor"] / np.sin(angle) * self.shift(temperature) ** order
+            storage = 1 - values["loss_factor"] / np.tan(angle) + pot * np.cos(angle)
+            modulus = modulus * storage
+            found["loss_factor"] = pot * np.sin(angle) / storage
+        return {**found, "youngs_modulus": modulus}
+
+
+def _loss_law(case: Case) -> str:
+    """Return the law of the loss of a case."""
+    options = vars(case.model)
+    return next((options[key] for key in _LAW_KEYS if key in options), "none")
+
+
+def read_temperature(
+    given: object, case: Case, parameters: tuple[Parameter, ...]
+) -> Temperature | None:
+    """Return the law in the table ``[temperature]``."""
+    varies = any(parameter.key == TEMPERATURE for parameter in parameters)
+    if varies != (given is not None):
+        refuse(
+            "temperature needs both a parameter and the table [temperature]",
+            "reference, degC, and coefficient, 1/K, or c1 and c2, K, in [temperature]",
+        )
+    if not isinstance(given, Mapping):
+        return None
+    require_words("[temperature]", given, _WORDS)
+    shifts = ["c1", "c2"] if {"c1", "c2"} & set(given) else []
+    changes = ["coefficient"] if "coefficient" in given or not shifts else []
+    words = ["reference", *changes, *shifts]
+    numbers = {
+        word: float(checked(f"[temperature] {word}", TEMPERATURE, given.get(word), 0))
+        for word in words
+    }
+    for word in ("c1", "c2"):
+        if numbers.get(word, 1.0) <= 0:
+            refuse_value(f"[temperature] {word}", given[word], f"0 < {word}")
+    if "c1" in numbers:
+        _require_shift(case, parameters)
+    return Temperature(**numbers)
+
+
+def _require_shift(case: Case, parameters: tuple[Parameter, ...]) -> None:
+    """Raise InputError where the law of the loss cannot be shifted."""
+    law = _loss_law(case)
+    names = {parameter.name for parameter in parameters}
+    varied = next((key for key in _LAW_KEYS if key in names), None)
+    if varied:
+        refuse(f"[temperature] c1 has no use where {varied} varies", f"{varied} in [fixed]")
+    if law not in {"fractional", *_ORDERS}:
+        refuse(
+            f"[temperature] c1 cannot shift the loss of {case.model.name} ({law})",  # type: ignore[union-attr]
+            "viscosity = 'fractional' or 'kelvin_voigt' of finite_element, damping_law = "
+            "'fractional' or 'rising' of modal_ball",
+        )

@@ -1,0 +1,348 @@
+!> Slow compression of the ball by finite elements: the elements of the impact at rest, between two rigid plates
+!> without friction, one at height 0 and one coming down on the ball.
+!>
+!> Newton's method, with the nodes that touch found on the way (a primal-dual active set): nodes below a plate are put
+!> on it, nodes that it would have to pull are let go. The tangent comes from differences of the forces, in 18
+!> evaluations for any mesh: nodes three apart share no element.
+module thud_pressed_ball
+   use thud_ball, only: ball_type
+   use thud_cavity, only: add_gas_forces, cavity_type, get_gas_energy, get_gas_pressure, get_volume
+   use thud_elastic_body, only: body_state_type, elastic_body_type, get_internal_forces, new_elastic_body, no_failure
+   use thud_error, only: error_type, numerical_error
+   use thud_interrupt, only: check_interrupt
+   use thud_kinds, only: wp
+   use thud_lapack, only: dgbsv
+   use thud_material, only: material_type
+   use thud_mesh, only: mesh_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: get_energy, new_pressed_ball, press, pressed_ball_type
+
+   !> Iterations for one approach of the plates, and halvings of a step that does not converge.
+   integer, parameter :: max_iterations = 25, max_halvings = 8
+
+   !> Force on a node that counts as none, over shear modulus times wall squared.
+   real(wp), parameter :: balanced = 1.0e-9_wp
+
+   !> Displacement of the differences, over the thickness of an element.
+   real(wp), parameter :: trial = 1.0e-7_wp
+
+   !> Maximum approach in a step over the wall thickness.
+   real(wp), parameter :: max_step = 0.05_wp
+
+   !> The ball; arrays over nodes are [0:n_polar, 0:n_radial, 2].
+   type :: pressed_ball_type
+      !> The body, without gas: its pressure is a force on every node of the cavity at once.
+      type(elastic_body_type) :: body
+      type(cavity_type) :: cavity
+      !> Positions over the lower plate, m.
+      real(wp), allocatable :: position(:, :, :)
+      !> Nodes of the outer surface that lie on the lower and on the upper plate: [0:n_polar, 2].
+      logical, allocatable :: touches(:, :)
+      !> Approach of the plates, m.
+      real(wp) :: deflection = 0.0_wp
+      !> Force on the plates, N.
+      real(wp) :: force = 0.0_wp
+      !> Diameter of the undeformed ball, m; force on a node that counts as none, N.
+      real(wp) :: diameter = 0.0_wp, tolerance = 0.0_wp
+      !> Thickness of the wall and of an element, m.
+      real(wp) :: wall = 0.0_wp, thickness = 0.0_wp
+   end type pressed_ball_type
+
+contains
+
+   !> The ball at rest between plates that just touch it. A slow press finds the long-term modulus.
+   pure function new_pressed_ball(ball, mesh, material) result(pressed)
+      type(ball_type), intent(in) :: ball
+      !> Mesh of order 1.
+      type(mesh_type), intent(in) :: mesh
+      type(material_type), intent(in) :: material
+      type(pressed_ball_type) :: pressed
+      type(material_type) :: relaxed
+      integer :: n
+
+      n = mesh%n_polar
+      relaxed = material
+      relaxed%viscosity = 0.0_wp
+      relaxed%branch_modulus = material%branch_modulus(:0)
+      relaxed%branch_time = material%branch_time(:0)
+      pressed%body = new_elastic_body(ball, mesh, relaxed)
+      pressed%cavity = pressed%body%cavity
+      pressed%body%cavity%pressure = 0.0_wp
+      pressed%body%cavity%ambient = 0.0_wp
+      pressed%diameter = 2*ball%outer_radius
+      pressed%tolerance = balanced*material%shear_modulus*ball%wall_thickness**2
+      pressed%wall = ball%wall_thickness
+      pressed%thickness = ball%wall_thickness/mesh%n_radial
+      allocate (pressed%position(0:n, 0:mesh%n_radial, 2))
+      pressed%position(:, :, 1) = mesh%r
+      pressed%position(:, :, 2) = mesh%z + ball%outer_radius
+      allocate (pressed%touches(0:n, 2), source=.false.)
+      pressed%touches(0, 1) = .true.
+      pressed%touches(n, 2) = .true.
+   end function new_pressed_ball
+
+   !> Brings the plates to an approach.
+   subroutine press(pressed, deflection, error)
+      type(pressed_ball_type), intent(inout) :: pressed
+      !> The approach, not less than before, m.
+      real(wp), intent(in) :: deflection
+      !> There is no state of rest, or none that was found.
+      type(error_type), allocatable, intent(out) :: error
+      type(pressed_ball_type) :: next
+      real(wp) :: step
+      integer :: halvings
+      logical :: converged
+
+      halvings = 0
+      do while (pressed%deflection < deflection)
+         step = min(deflection - pressed%deflection, max_step*pressed%wall/2**halvings)
+         next = pressed
+         next%deflection = merge(deflection, pressed%deflection + step, step >= deflection - pressed%deflection)
+         call find_rest(next, converged, error)
+         if (allocated(error)) return
+         if (converged) then
+            pressed = next
+            halvings = max(0, halvings - 1)
+         else
+            halvings = halvings + 1
+         end if
+         if (has_met(pressed)) then
+            error = numerical_error('&compression: max_deflection: at '//to_text(pressed%deflection) &
+               //' m the walls of the cavity meet; allowed: less')
+            return
+         end if
+         if (halvings > max_halvings) then
+            error = numerical_error('&compression: max_deflection: no state of rest was found beyond ' &
+               //to_text(pressed%deflection)//' m; allowed: less, or more polar_elements')
+            return
+         end if
+      end do
+   end subroutine press
+
+   !> Whether the cavity has closed somewhere between the plates.
+   pure function has_met(pressed) result(met)
+      type(pressed_ball_type), intent(in) :: pressed
+      !> A node of its lower half has come to the middle.
+      logical :: met
+
+      associate (middle => (pressed%diameter - pressed%deflection)/2)
+         met = any(pressed%body%mesh%z(:, 0) < -pressed%thickness .and. pressed%position(:, 0, 2) >= middle)
+      end associate
+   end function has_met
+
+   !> Newton's method at one approach of the plates.
+   subroutine find_rest(pressed, converged, error)
+      !> The ball; its positions start from those of another approach.
+      type(pressed_ball_type), intent(inout) :: pressed
+      !> It is at rest.
+      logical, intent(out) :: converged
+      !> An interrupt.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force, target, change
+      logical :: fixed(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2)
+      logical :: found(0:pressed%body%mesh%n_polar, 2)
+      integer :: iteration, last, plate
+      logical :: failed, same
+
+      last = pressed%body%mesh%n_radial
+      converged = .false.
+      do iteration = 1, max_iterations
+         call check_interrupt(error)
+         if (allocated(error)) return
+         fixed = .false.
+         fixed([0, pressed%body%mesh%n_polar], :, 1) = .true.
+         fixed(:, last, 2) = any(pressed%touches, 2)
+         target = pressed%position
+         where (pressed%touches(:, 1)) target(:, last, 2) = 0.0_wp
+         where (pressed%touches(:, 2)) target(:, last, 2) = pressed%diameter - pressed%deflection
+         call get_forces(pressed, pressed%position, force, failed)
+         if (.not. failed) call get_newton_step(pressed, force, fixed, target - pressed%position, change, failed)
+         if (failed) return
+         pressed%position = pressed%position + change
+         call get_forces(pressed, pressed%position, force, failed)
+         if (failed) return
+         do plate = 1, 2
+            associate (height => get_heights(pressed, plate), push => merge(-1, 1, plate == 1)*force(:, last, 2))
+               found(:, plate) = merge(push > -pressed%tolerance, height < 0.0_wp, pressed%touches(:, plate))
+            end associate
+         end do
+         same = all(found .eqv. pressed%touches)
+         pressed%touches = found
+         converged = same .and. maxval(abs(force), mask=.not. fixed) < pressed%tolerance
+         if (.not. any(found(:, 1)) .or. .not. any(found(:, 2))) return
+         if (converged) exit
+      end do
+      pressed%force = -sum(force(:, last, 2), mask=pressed%touches(:, 1))
+   end subroutine find_rest
+
+   !> Distances of the nodes of the outer surface from a plate.
+   pure function get_heights(pressed, plate) result(height)
+      type(pressed_ball_type), intent(in) :: pressed
+      !> 1 for the lower plate, 2 for the upper one.
+      integer, intent(in) :: plate
+      !> Distances, m: [0:n_polar].
+      real(wp) :: height(0:pressed%body%mesh%n_polar)
+
+      height = pressed%position(:, pressed%body%mesh%n_radial, 2)
+      if (plate == 2) height = pressed%diameter - pressed%deflection - height
+   end function get_heights
+
+   !> Forces of stress and gas on the nodes.
+   pure subroutine get_forces(pressed, position, force, failed)
+      !> The ball; it stays as it is.
+      type(pressed_ball_type), intent(inout) :: pressed
+      !> Positions of the nodes, m.
+      real(wp), intent(in), contiguous :: position(0:, 0:, :)
+      !> Forces, N.
+      real(wp), intent(out), contiguous :: force(0:, 0:, :)
+      !> An element is turned inside out, or the cavity is closed.
+      logical, intent(out) :: failed
+      type(body_state_type) :: state
+      real(wp) :: pressure
+
+      call get_internal_forces(pressed%body, position, 0*position, 1.0_wp, .false., force, state)
+      failed = state%failure /= no_failure
+      if (failed) return
+      pressure = get_gas_pressure(pressed%cavity, get_volume(position(:, 0, 1), position(:, 0, 2)))
+      call add_gas_forces(pressure, position(:, 0, 1), position(:, 0, 2), force(:, 0, 1), force(:, 0, 2))
+      force([0, pressed%body%mesh%n_polar], :, 1) = 0.0_wp
+   end subroutine get_forces
+
+   !> Energy of the ball.
+   subroutine get_energy(pressed, energy)
+      !> The ball; it stays as it is.
+      type(pressed_ball_type), intent(inout) :: pressed
+      !> Strain energy and work done on the gas, J.
+      real(wp), intent(out) :: energy
+      type(body_state_type) :: state
+      real(wp), dimension(0:pressed%body%mesh%n_polar, 0:pressed%body%mesh%n_radial, 2) :: force
+
+      call get_internal_forces(pressed%body, pressed%position, 0*pressed%position, 1.0_wp, .false., force, state)
+      energy = state%strain_energy + get_gas_energy(pressed%cavity, get_volume(pressed%position(:, 0, 1), &
+         pressed%position(:, 0, 2)))
+   end subroutine get_energy
+
+   !> Change of the positions that balances the forces.
+   subroutine get_newton_step(pressed, force, fixed, shift, change, failed)
+      !> The ball; it stays as it is.
+      type(pressed_ball_type), intent(inout) :: pressed
+      !> Forces where it is, N.
+      real(wp), intent(in) :: force(0:, 0:, :)
+      !> Coordinates that are given, and their changes, m.
+      logical, intent(in) :: fixed(0:, 0:, :)
+      real(wp), intent(in) :: shift(0:, 0:, :)
+      !> Changes of all coordinates, m.
+      real(wp), intent(out) :: change(0:, 0:, :)
+      !> The tangent is singular, or cannot be had.
+      logical, intent(out) :: failed
+      real(wp) :: gradient(0:ubound(force, 1), 0:ubound(force, 2), 2)
+      real(wp), allocatable :: band(:, :), solution(:, :)
+      integer, allocatable :: pivot(:)
+      real(wp) :: volume, slope, nearby
+      integer :: n, width, info
+
+      change = 0.0_wp
+      n = size(force)
+      ! Nodes of neighbouring lines and rings, two coordinates each.
+      width = 2*size(force, 2) + 3
+      allocate (band(3*width + 1, n), solution(n, 2), pivot(n))
+      call get_tangent(pressed, fixed, width, band, failed)
+      if (failed) return
+      ! The gas ties all nodes of the cavity together: its pressure changes with the volume, whose gradient is the force
+      ! of a unit pressure.
+      gradient = 0.0_wp
+      associate (r => pressed%position(:, 0, 1), z => pressed%position(:, 0, 2))
+         call add_gas_forces(1.0_wp, r, z, gradient(:, 0, 1), gradient(:, 0, 2))
+         volume = get_volume(r, z)
+      end associate
+      nearby = volume*(1 - sqrt(epsilon(1.0_wp)))
+      slope = (get_gas_pressure(pressed%cavity, volume) - get_gas_pressure(pressed%cavity, nearby))/(volume - nearby)
+      solution(:, 1) = in_order(merge(shift, force, fixed))
+      solution(:, 2) = in_order(merge(0.0_wp, gradient, fixed))
+      call dgbsv(n, width, width, 2, band, size(band, 1), pivot, solution, n, info)
+      failed = info /= 0
+      if (failed) return
+      ! Sherman and Morrison: the tangent is the banded one less slope gradient gradient^T.
+      associate (row => in_order(gradient))
+         solution(:, 1) = solution(:, 1) + solution(:, 2)*(slope*dot_product(row, solution(:, 1)) &
+            /(1 - slope*dot_product(row, solution(:, 2))))
+      end associate
+      change = reshape(solution(:, 1), shape(change), order=[3, 2, 1])
+   end subroutine get_newton_step
+
+   !> A field over the nodes in the order of the unknowns: components, then rings, then lines.
+   pure function in_order(field) result(vector)
+      !> The field: [0:n_polar, 0:n_radial, 2].
+      real(wp), intent(in) :: field(0:, 0:, :)
+      !> The same: [n].
+      real(wp) :: vector(size(field))
+
+      vector = reshape(reshape(field, [size(field, 3), size(field, 2), size(field, 1)], order=[3, 2, 1]), [size(field)])
+   end function in_order
+
+   !> Derivatives of the forces, negative, with the gas at its pressure.
+   subroutine get_tangent(pressed, fixed, width, band, failed)
+      type(pressed_ball_type), intent(in) :: pressed
+      !> Coordinates that are given; their rows become those of the unit matrix.
+      logical, intent(in) :: fixed(0:, 0:, :)
+      !> Diagonals on each side.
+      integer, intent(in) :: width
+      !> The matrix as LAPACK stores bands: [3 width + 1, n].
+      real(wp), intent(out) :: band(:, :)
+      !> A position could not be tried.
+      logical, intent(out) :: failed
+      real(wp), dimension(0:ubound(fixed, 1), 0:ubound(fixed, 2), 2) :: here, there, moved
+      type(pressed_ball_type) :: held
+      real(wp) :: step
+      integer :: i, j, k, first, second
+
+      band = 0.0_wp
+      step = trial*pressed%thickness
+      held = pressed
+      ! A gas whose pressure does not depend on its volume.
+      held%cavity = cavity_type(volume=1.0_wp, exponent=0.0_wp, pressure=get_gas_pressure(pressed%cavity, &
+         get_volume(pressed%position(:, 0, 1), pressed%position(:, 0, 2))))
+      call get_forces(held, held%position, here, failed)
+      do k = 1, 2
+         do first = 0, 2
+            do second = 0, 2
+               if (failed) return
+               moved = held%position
+               moved(first::3, second::3, k) = moved(first::3, second::3, k) + step
+               call get_forces(held, moved, there, failed)
+               there = (here - there)/step
+               do i = second, ubound(fixed, 2), 3
+                  do j = first, ubound(fixed, 1), 3
+                     call add_column(j, i, k)
+                  end do
+               end do
+            end do
+         end do
+      end do
+
+   contains
+
+      !> Enters the derivatives by one coordinate.
+      subroutine add_column(line, ring, component)
+         !> Its node and component.
+         integer, intent(in) :: line, ring, component
+         integer :: a, b, c, row, column
+
+         column = 2*(line*size(fixed, 2) + ring) + component
+         do a = max(0, line - 1), min(ubound(fixed, 1), line + 1)
+            do b = max(0, ring - 1), min(ubound(fixed, 2), ring + 1)
+               do c = 1, 2
+                  row = 2*(a*size(fixed, 2) + b) + c
+                  if (.not. fixed(a, b, c)) band(2*width + 1 + row - column, column) = there(a, b, c)
+               end do
+            end do
+         end do
+         if (fixed(line, ring, component)) band(2*width + 1, column) = 1.0_wp
+      end subroutine add_column
+
+   end subroutine get_tangent
+
+end module thud_pressed_ball

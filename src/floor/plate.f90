@@ -1,0 +1,162 @@
+!> A homogeneous rectangular floor: the mobility of the infinite plate, radiation and losses after ISO 12354-1.
+module thud_plate
+   use thud_constants, only: pi
+   use thud_field, only: field_type, name_length
+   use thud_kinds, only: wp
+   use thud_new_field, only: choice_field, real_field
+   implicit none (type, external)
+   private
+
+   public :: air_type, get_critical_frequency, get_mode_density, get_plate_fields, get_radiation_factor, get_resistance
+   public :: get_surface_mass, get_total_loss, plate_type
+
+   !> Air of the rooms.
+   type :: air_type
+      !> Density, kg/m3.
+      real(wp) :: density = 1.2_wp
+      !> Speed of sound, m/s.
+      real(wp) :: sound_speed = 343.0_wp
+   end type air_type
+
+   !> A floor; the defaults are a concrete floor in a laboratory.
+   type :: plate_type
+      !> Sides, m.
+      real(wp) :: length = 5.0_wp, width = 4.0_wp
+      !> Thickness, m.
+      real(wp) :: thickness = 0.18_wp
+      !> Density, kg/m3.
+      real(wp) :: density = 2300.0_wp
+      !> Speed of longitudinal waves in the plate, m/s.
+      real(wp) :: wave_speed = 3500.0_wp
+      !> Internal loss factor.
+      real(wp) :: loss_factor = 0.005_wp
+      !> Losses at the edges: `laboratory`, or by their `absorption`.
+      character(len=name_length) :: edges = 'laboratory'
+      !> Sum of the edges' lengths times their absorption coefficients, m.
+      real(wp) :: edge_absorption = 0.0_wp
+   end type plate_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&floor`.
+   function get_plate_fields(plate) result(fields)
+      !> The plate that the fields read and set.
+      type(plate_type), intent(in), target :: plate
+      !> One field per component: [8].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('length', plate%length, 'm', 'length of the floor', '[0.5, 100]'), &
+         real_field('width', plate%width, 'm', 'width of the floor', '[0.5, 100]'), &
+         real_field('thickness', plate%thickness, 'm', 'thickness of the floor', '[0.001, 2]'), &
+         real_field('density', plate%density, 'kg/m3', 'density of the floor', '[10, 20000]'), &
+         real_field('wave_speed', plate%wave_speed, 'm/s', 'speed of longitudinal waves in the floor', '[100, 10000]'), &
+         real_field('loss_factor', plate%loss_factor, '', 'internal loss factor of the floor', '[0, 1]'), &
+         choice_field('edges', plate%edges, 'losses at the edges of the floor', &
+         [character(len=10) :: 'laboratory', 'absorption']), &
+         real_field('edge_absorption', plate%edge_absorption, 'm', &
+         'sum of lengths times absorption coefficients of the edges, of absorption', '[0, 1000]')]
+   end function get_plate_fields
+
+   !> Mass per area.
+   elemental function get_surface_mass(plate) result(mass)
+      type(plate_type), intent(in) :: plate
+      !> The mass, kg/m2.
+      real(wp) :: mass
+
+      mass = plate%density*plate%thickness
+   end function get_surface_mass
+
+   !> Bending stiffness over width, B' = m'' c_L**2 h**2/12.
+   elemental function get_bending_stiffness(plate) result(stiffness)
+      type(plate_type), intent(in) :: plate
+      !> The stiffness, N m.
+      real(wp) :: stiffness
+
+      stiffness = get_surface_mass(plate)*(plate%wave_speed*plate%thickness)**2/12
+   end function get_bending_stiffness
+
+   !> Resistance of the infinite plate, 8 sqrt(B' m'').
+   elemental function get_resistance(plate) result(resistance)
+      type(plate_type), intent(in) :: plate
+      !> The resistance, N s/m.
+      real(wp) :: resistance
+
+      resistance = 8*sqrt(get_bending_stiffness(plate)*get_surface_mass(plate))
+   end function get_resistance
+
+   !> Critical frequency, c0**2/(2 pi) sqrt(m''/B'); ISO 12354 rounds it to c0**2/(1.8 c_L h).
+   elemental function get_critical_frequency(plate, air) result(frequency)
+      type(plate_type), intent(in) :: plate
+      type(air_type), intent(in) :: air
+      !> The frequency, Hz.
+      real(wp) :: frequency
+
+      frequency = air%sound_speed**2/(2*pi)*sqrt(get_surface_mass(plate)/get_bending_stiffness(plate))
+   end function get_critical_frequency
+
+   !> Bending modes per hertz, S/2 sqrt(m''/B').
+   elemental function get_mode_density(plate) result(density)
+      type(plate_type), intent(in) :: plate
+      !> Modes per hertz, s.
+      real(wp) :: density
+
+      density = plate%length*plate%width/2*sqrt(get_surface_mass(plate)/get_bending_stiffness(plate))
+   end function get_mode_density
+
+   !> Radiation factor for free waves (ISO 12354-1 annex B).
+   elemental function get_radiation_factor(frequency, critical, length, width, sound_speed) result(sigma)
+      !> Frequency and critical frequency, Hz.
+      real(wp), intent(in) :: frequency, critical
+      !> Sides of the plate, m; speed of sound, m/s.
+      real(wp), intent(in) :: length, width, sound_speed
+      !> The factor, at most 2.
+      real(wp) :: sigma
+      real(wp) :: first, above, plate_modes, diffuse, edge, corner, lambda
+
+      associate (f => frequency, c0 => sound_speed, area => length*width, perimeter => 2*(length + width))
+         first = c0**2/(4*critical)*(1/length**2 + 1/width**2)
+         above = 2.0_wp
+         if (f > critical) above = min(2.0_wp, 1/sqrt(1 - critical/f))
+         plate_modes = 4*area*(f/c0)**2
+         diffuse = sqrt(2*pi*f*(length + width)/(16*c0))
+         if (first > critical/2) then
+            sigma = diffuse
+            if (f < critical) sigma = min(sigma, plate_modes)
+            if (f > critical) sigma = min(sigma, above)
+         else if (f >= critical) then
+            sigma = above
+         else
+            lambda = sqrt(f/critical)
+            edge = ((1 - lambda**2)*log((1 + lambda)/(1 - lambda)) + 2*lambda)/(4*pi**2*(1 - lambda**2)**1.5_wp)
+            corner = 0.0_wp
+            if (f <= critical/2) corner = 8*c0**2*(1 - 2*lambda**2)/(critical**2*pi**4*area*lambda*sqrt(1 - lambda**2))
+            sigma = perimeter/area*(c0/critical)*edge + corner
+            if (f < first .and. first < critical/2) sigma = min(sigma, plate_modes)
+         end if
+         sigma = min(sigma, 2.0_wp)
+      end associate
+   end function get_radiation_factor
+
+   !> Total loss factor: internal, radiation of both sides, edges (ISO 12354-1 annex C).
+   elemental function get_total_loss(plate, air, frequency) result(loss_factor)
+      type(plate_type), intent(in) :: plate
+      type(air_type), intent(in) :: air
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      real(wp) :: loss_factor
+      real(wp) :: critical, sigma
+
+      if (plate%edges == 'laboratory') then
+         ! Radiation is part of it.
+         loss_factor = plate%loss_factor + get_surface_mass(plate)/(485*sqrt(frequency))
+         return
+      end if
+      critical = get_critical_frequency(plate, air)
+      sigma = get_radiation_factor(frequency, critical, plate%length, plate%width, air%sound_speed)
+      loss_factor = plate%loss_factor &
+         + 2*air%density*air%sound_speed*sigma/(2*pi*frequency*get_surface_mass(plate)) &
+         + air%sound_speed/(pi**2*plate%length*plate%width*sqrt(frequency*critical))*plate%edge_absorption
+   end function get_total_loss
+
+end module thud_plate

@@ -1,0 +1,74 @@
+!> The level in the room below as text: the file and the table on the screen.
+module thud_room_report
+   use thud_band, only: get_band_name
+   use thud_case, only: case_type
+   use thud_kinds, only: wp
+   use thud_plate, only: get_resistance
+   use thud_rating, only: get_rounded
+   use thud_room, only: few_modes, room_level_type
+   use thud_text, only: fixed, newline, to_text
+   implicit none (type, external)
+   private
+
+   public :: get_room_csv, get_room_table
+
+   !> Width of a column of the table.
+   integer, parameter :: column = 13
+
+contains
+
+   !> Level and what it is made of, per third.
+   subroutine get_room_csv(prediction, text)
+      type(room_level_type), intent(in) :: prediction
+      !> Text of `room_levels.csv`.
+      character(len=:), allocatable, intent(out) :: text
+      integer :: i, j
+
+      text = 'nominal_Hz,level_dB,time_of_maximum_s,energy_J,radiation_factor,loss_factor,reverberation_time_s,' &
+         //'floor_modes,room_modes'//newline
+      do i = 1, size(prediction%bands)
+         associate (numbers => [prediction%bands(i)%nominal, prediction%level(i), prediction%time(i), prediction%energy(i), &
+            prediction%radiation_factor(i), prediction%loss_factor(i), prediction%reverberation_time(i), &
+            prediction%floor_modes(i), prediction%room_modes(i)])
+            do j = 1, size(numbers)
+               if (j > 1) text = text//','
+               text = text//to_text(numbers(j))
+            end do
+         end associate
+         text = text//newline
+      end do
+   end subroutine get_room_csv
+
+   !> The levels for the screen; thirds of few modes are marked.
+   subroutine get_room_table(case, prediction, text)
+      type(case_type), intent(in) :: case
+      type(room_level_type), intent(in) :: prediction
+      !> The table.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=1) :: mark
+      integer :: i
+
+      text = '  '//padded('room below')//padded('L_i,Fmax')//padded('floor modes')//'room modes'//newline
+      do i = 1, size(prediction%bands)
+         mark = merge('*', ' ', min(prediction%floor_modes(i), prediction%room_modes(i)) < few_modes)
+         text = text//'  '//padded(get_band_name(prediction%bands(i))//' Hz') &
+            //padded(fixed(prediction%level(i), 1)//' dB '//mark)//padded(fixed(prediction%floor_modes(i), 1)) &
+            //fixed(prediction%room_modes(i), 1)//newline
+      end do
+      text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
+         //fixed(prediction%a_weighted, 2)//'), ISO 717-2 annex D: blocked force, statistical mean over positions.'//newline
+      text = text//'  Resistance of the floor '//fixed(get_resistance(case%floor)/1.0e3_wp, 1)//' kN s/m.'
+      if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
+         //fixed(few_modes, 0)//' modes, where single rooms and positions differ by several dB.'
+      text = text//newline
+   end subroutine get_room_table
+
+   !> A text of a column's width.
+   pure function padded(text) result(cell)
+      character(len=*), intent(in) :: text
+      character(len=column) :: cell
+
+      cell = text
+   end function padded
+
+end module thud_room_report

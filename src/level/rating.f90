@@ -1,0 +1,177 @@
+!> Levels of heavy impacts in the room below: their standardisation (ISO 16283-2) and the single numbers made of
+!> them (ISO 717-2 annex D, KS F 2863-2).
+module thud_rating
+   use thud_band, only: band_type, get_bands
+   use thud_error, only: error_type, input_error
+   use thud_kinds, only: wp
+   use thud_text, only: join_quoted, quoted
+   implicit none (type, external)
+   private
+
+   public :: correct_for_background, find_rated_bands, get_a_weighted_level, get_grade, get_legacy_rating, get_rounded
+   public :: get_standardisation, rated_set_names
+
+   !> Maximum number of bands of a rating.
+   integer, parameter :: max_rated = 12
+
+   !> A set of bands that a rating is made of.
+   type :: rated_set_type
+      !> Name of the set of bands.
+      character(len=24) :: name
+      !> Rounded mid frequency of the lowest band, Hz, and number of bands.
+      real(wp) :: lowest
+      integer :: n_band
+      !> A-weighting as ISO 717-2 annex D rounds it, dB: the first n_band count.
+      real(wp) :: a_weighting(max_rated)
+   end type rated_set_type
+
+   !> All sets. Thirds are not summed into octaves first: the maximum of a sum is not the sum of maxima.
+   type(rated_set_type), parameter :: rated_sets(*) = [ &
+      rated_set_type('octave', 63.0_wp, 4, [-26.2_wp, -16.2_wp, -8.7_wp, -3.2_wp, spread(0.0_wp, 1, max_rated - 4)]), &
+      rated_set_type('third', 50.0_wp, 12, [-30.3_wp, -26.2_wp, -22.4_wp, -19.1_wp, -16.2_wp, -13.2_wp, -10.8_wp, &
+      -8.7_wp, -6.6_wp, -4.8_wp, -3.2_wp, -1.9_wp])]
+
+   !> Names of the sets: [n_set].
+   character(len=24), parameter :: rated_set_names(*) = rated_sets%name
+
+   !> Reference volume, m3, and reverberation time, s (ISO 16283-2).
+   real(wp), parameter :: reference_volume = 50.0_wp, reference_time = 0.5_wp
+
+   !> Reverberation time, s, of the decay that the Fast detector's time constant, 0.125 s, has: 0.125 s * 6 ln 10.
+   real(wp), parameter :: fast_reverberation = 1.7275_wp
+
+   !> Where C is nearer to 1 than this, ln C/(C - 1) is taken from its series, to 1e-16.
+   real(wp), parameter :: near_one = 1.0e-5_wp
+
+   !> Maximum A-weighted levels of the classes 1 to 4, dB (KS F 2863-2).
+   real(wp), parameter :: class_limits(*) = [37.0_wp, 41.0_wp, 45.0_wp, 49.0_wp]
+
+   !> Reference curve in the octaves 63 to 500 Hz, dB (KS F 2863-2).
+   real(wp), parameter :: legacy_curve(*) = [83.0_wp, 73.0_wp, 66.0_wp, 60.0_wp]
+
+   !> Sum of the excesses over it that is allowed, dB.
+   real(wp), parameter :: max_excess = 8.0_wp
+
+   !> Difference to the background, dB, below which a level is corrected, and below which only by that of this difference.
+   real(wp), parameter :: clear_difference = 15.0_wp, least_difference = 6.0_wp
+
+contains
+
+   !> Bands that a rating is made of.
+   subroutine find_rated_bands(name, bands, error)
+      !> One of `rated_set_names`.
+      character(len=*), intent(in) :: name
+      !> The bands, ascending: [n_band].
+      type(band_type), allocatable, intent(out) :: bands(:)
+      !> There is no rating in bands of that name.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: at, first
+
+      at = findloc(rated_set_names == name, .true., dim=1)
+      if (at == 0) then
+         error = input_error('bands = '//quoted(name)//' is not known; allowed: '//join_quoted(rated_set_names))
+         allocate (bands(0))
+         return
+      end if
+      bands = get_bands(name)
+      first = minloc(abs(bands%nominal - rated_sets(at)%lowest), dim=1)
+      bands = bands(first:first + rated_sets(at)%n_band - 1)
+   end subroutine find_rated_bands
+
+   !> A-weighted maximum level of the bands of a set (ISO 717-2 annex D), not rounded.
+   pure function get_a_weighted_level(name, level) result(total)
+      !> One of `rated_set_names`.
+      character(len=*), intent(in) :: name
+      !> Levels of its rated bands, dB: [n_band].
+      real(wp), intent(in) :: level(:)
+      !> The level, dB.
+      real(wp) :: total
+      integer :: at
+
+      at = findloc(rated_set_names == name, .true., dim=1)
+      total = 10*log10(sum(10**((level + rated_sets(at)%a_weighting(:size(level)))/10)))
+   end function get_a_weighted_level
+
+   !> A single number as it is stated: a half is rounded up.
+   elemental function get_rounded(level) result(rounded)
+      !> The level, dB.
+      real(wp), intent(in) :: level
+      !> The whole number, dB.
+      integer :: rounded
+
+      rounded = floor(level + 0.5_wp)
+   end function get_rounded
+
+   !> Class (grade) of an A-weighted level that is not standardised (KS F 2863-2).
+   pure function get_grade(level) result(grade)
+      !> The level, dB.
+      real(wp), intent(in) :: level
+      !> 1 to 4; 0 above the last.
+      integer :: grade
+
+      grade = findloc(get_rounded(level) <= class_limits, .true., dim=1)
+   end function get_grade
+
+   !> Rating by the inverse A-weighted reference curve (KS F 2863-2, before the A-weighted level replaced it).
+   pure function get_legacy_rating(level) result(rating)
+      !> Levels of the octaves 63 to 500 Hz, dB: [4].
+      real(wp), intent(in) :: level(:)
+      !> Level of the shifted curve at 500 Hz, dB.
+      integer :: rating
+      integer :: shift
+
+      ! From where every excess is above its limit.
+      shift = floor(minval(level - legacy_curve) - max_excess) - 1
+      do while (sum(max(0.0_wp, level - legacy_curve - shift)) > max_excess)
+         shift = shift + 1
+      end do
+      rating = nint(legacy_curve(size(legacy_curve))) + shift
+   end function get_legacy_rating
+
+   !> What a standardised level is above the measured one: 10 lg(V/V0) - 10 lg(g(C)/g(C0)) (ISO 16283-2).
+   !>
+   !> g(C) is the maximum of a decay of reverberation time T as the Fast detector shows it, over that of a decay
+   !> without end: C**(-1/(C - 1)) with C = T/1.7275 s; the printed form is the same with more terms.
+   elemental function get_standardisation(reverberation_time, volume) result(difference)
+      !> Reverberation time, s; volume, m3.
+      real(wp), intent(in) :: reverberation_time, volume
+      !> The difference, dB.
+      real(wp) :: difference
+
+      difference = 10*log10(volume/reference_volume) &
+         - 10/log(10.0_wp)*(get_log_gain(reverberation_time) - get_log_gain(reference_time))
+   end function get_standardisation
+
+   !> ln g = -ln C/(C - 1).
+   elemental function get_log_gain(reverberation_time) result(log_gain)
+      !> Reverberation time, s.
+      real(wp), intent(in) :: reverberation_time
+      real(wp) :: log_gain
+      real(wp) :: excess
+
+      excess = reverberation_time/fast_reverberation - 1
+      if (abs(excess) < near_one) then
+         log_gain = -1 + excess*(0.5_wp - excess*(1/3.0_wp - excess/4))
+      else
+         log_gain = -log(1 + excess)/excess
+      end if
+   end function get_log_gain
+
+   !> Level without the background (ISO 16283-2): the energy of the background is subtracted where the level is 6 to
+   !> 15 dB above it; below, what 6 dB give is subtracted, and the result is a maximum.
+   elemental subroutine correct_for_background(level, background, corrected, is_maximum)
+      !> Levels with and of the background, dB.
+      real(wp), intent(in) :: level, background
+      !> The level without it, dB.
+      real(wp), intent(out) :: corrected
+      !> The level is less than 6 dB above the background: the true one is at most the corrected one.
+      logical, intent(out) :: is_maximum
+      real(wp) :: difference
+
+      difference = level - background
+      is_maximum = difference < least_difference
+      corrected = level
+      if (difference < clear_difference) corrected = level + 10*log10(1 - 10**(-max(difference, least_difference)/10))
+   end subroutine correct_for_background
+
+end module thud_rating

@@ -1,0 +1,93 @@
+!> Slow compression of the ball between two rigid plates, as in a press: what is asked for, and its answer.
+module thud_compression
+   use thud_ball, only: ball_type
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, name_length
+   use thud_kinds, only: wp
+   use thud_new_field, only: choice_field, integer_field, real_field
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: check_compression, compression_options_type, compression_type, get_compression_fields, get_deflections, &
+      get_pressed_ball
+
+   !> What the group `&compression` asks for.
+   type :: compression_options_type
+      !> Maximum approach of the plates, m.
+      real(wp) :: max_deflection = 0.04_wp
+      !> Points of the curve, the undeformed ball included.
+      integer :: points = 41
+      !> What the gas in the ball does: `vented`, `isothermal` or `adiabatic`.
+      character(len=name_length) :: gas = 'vented'
+   end type compression_options_type
+
+   !> Force against deflection.
+   type :: compression_type
+      !> Approach of the plates, m: [n].
+      real(wp), allocatable :: deflection(:)
+      !> Force on each plate, N: [n].
+      real(wp), allocatable :: force(:)
+   end type compression_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&compression`.
+   function get_compression_fields(options) result(fields)
+      !> The options that the fields read and set.
+      type(compression_options_type), intent(in), target :: options
+      !> One field per component: [3].
+      type(field_type) :: fields(3)
+
+      fields = [ &
+         real_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '(0, 10]'), &
+         integer_field('points', options%points, 'points of the curve, the undeformed ball included', '[2, 10000]'), &
+         choice_field('gas', options%gas, 'gas in the ball: leaves by the hole, or is sealed in', &
+         [character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]
+   end function get_compression_fields
+
+   !> Refuses a compression that the ball does not allow.
+   subroutine check_compression(options, ball, error)
+      !> The options, each inside its own range.
+      type(compression_options_type), intent(in) :: options
+      type(ball_type), intent(in) :: ball
+      type(error_type), allocatable, intent(out) :: error
+
+      if (options%max_deflection >= 2*ball%outer_radius) then
+         error = input_error('&compression: max_deflection = '//to_text(options%max_deflection) &
+            //' m is not allowed; allowed: less than the diameter, '//to_text(2*ball%outer_radius)//' m')
+      else if (options%gas == 'vented' .and. ball%gauge_pressure > 0.0_wp) then
+         error = input_error("&compression: gas = 'vented' with gauge_pressure = "//to_text(ball%gauge_pressure) &
+            //" Pa is not allowed; allowed: 'isothermal', 'adiabatic', or no overpressure")
+      end if
+   end subroutine check_compression
+
+   !> Deflections of the points, from 0 on with equal spacing.
+   pure function get_deflections(options) result(deflection)
+      type(compression_options_type), intent(in) :: options
+      !> Approach of the plates, m: [points].
+      real(wp) :: deflection(options%points)
+      integer :: i
+
+      deflection = [(options%max_deflection*real(i, wp)/(options%points - 1), i=0, options%points - 1)]
+   end function get_deflections
+
+   !> The ball with the gas that it has in the press.
+   pure function get_pressed_ball(options, ball) result(pressed)
+      type(compression_options_type), intent(in) :: options
+      type(ball_type), intent(in) :: ball
+      type(ball_type) :: pressed
+
+      pressed = ball
+      select case (options%gas)
+      case ('vented')
+         ! Without pressures there is no overpressure at any volume.
+         pressed%ambient_pressure = 0.0_wp
+      case ('isothermal')
+         pressed%heat_capacity_ratio = 1.0_wp
+      case default
+         continue
+      end select
+   end function get_pressed_ball
+
+end module thud_compression

@@ -1,0 +1,111 @@
+!> Slow compression of the modal ball: the static flexibility of every harmonic, at the long-term modulus, under
+!> unilateral contact with two plates.
+module thud_modal_compression
+   use thud_ball, only: ball_type
+   use thud_error, only: error_type, numerical_error
+   use thud_interrupt, only: check_interrupt
+   use thud_kinds, only: wp
+   use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_modal_damping, only: set_damping
+   use thud_mode_step, only: mode_step_type
+   use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
+   use thud_sphere_modes, only: basis_type, family_type, get_static_family, new_basis
+   use thud_surface_rings, only: new_surface_rings, surface_rings_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: compress_modal_ball, new_press
+
+   !> Maximum approach of the plates in a step where rings stick, over the outer radius.
+   real(wp), parameter :: max_step = 1.0e-3_wp
+
+contains
+
+   !> Force on each of two plates against their approach.
+   subroutine compress_modal_ball(ball, options, deflection, force, error)
+      type(ball_type), intent(in) :: ball
+      !> Harmonics and rings.
+      class(modal_ball_options_type), intent(in) :: options
+      !> Approach of the plates, ascending, m: [n].
+      real(wp), intent(in) :: deflection(:)
+      !> The force, N: [n].
+      real(wp), intent(out) :: force(:)
+      !> The rings cannot be distinguished, or the ball lies on the outermost one.
+      type(error_type), allocatable, intent(out) :: error
+      type(surface_rings_type) :: rings
+      type(ring_contact_type) :: contact
+      real(wp), allocatable :: start(:), gap(:)
+      real(wp) :: before, now
+      integer :: i, k, n_step
+
+      force = 0.0_wp
+      rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
+      call new_press(ball, options, rings, contact, error)
+      if (allocated(error)) return
+      allocate (start(size(contact%impulse)), gap(size(contact%impulse)), source=0.0_wp)
+      start(::rings%n_way) = ball%outer_radius*(1 - rings%height)
+      before = 0.0_wp
+      do i = 1, size(deflection)
+         ! Where rings stick, the way there counts.
+         n_step = 1
+         if (rings%n_way == 2) n_step = 1 + int((deflection(i) - before)/(max_step*ball%outer_radius))
+         do k = 1, n_step
+            call check_interrupt(error)
+            if (allocated(error)) return
+            now = before + (deflection(i) - before)*k/n_step
+            gap = start
+            gap(::rings%n_way) = gap(::rings%n_way) - now/2
+            call solve_contact(contact, gap, error)
+            if (allocated(error)) return
+            call follow_sliding(contact, start)
+         end do
+         before = deflection(i)
+         if (contact%last == options%rings) then
+            error = numerical_error('&compression: max_deflection: at '//to_text(deflection(i)) &
+               //' m the ball lies on its outermost ring; allowed: less')
+            return
+         end if
+         force(i) = sum(contact%impulse(::rings%n_way))
+      end do
+   end subroutine compress_modal_ball
+
+   !> The rings under forces, where those of a step take impulses.
+   subroutine new_press(ball, options, rings, contact, error)
+      type(ball_type), intent(in) :: ball
+      !> Harmonics and rings.
+      class(modal_ball_options_type), intent(in) :: options
+      type(surface_rings_type), intent(in) :: rings
+      !> Its response is the gap by unit force, m/N.
+      type(ring_contact_type), intent(out) :: contact
+      !> The rings cannot be distinguished.
+      type(error_type), allocatable, intent(out) :: error
+      type(basis_type) :: basis
+      type(family_type) :: family
+      real(wp) :: response(rings%n_way*options%rings, rings%n_way*options%rings)
+      type(ball_type) :: relaxed
+      type(mode_step_type) :: no_modes
+      real(wp) :: no_damping(0)
+      logical :: failed
+      integer :: n
+
+      allocate (no_modes%omega(0))
+      call set_damping(options, no_modes, no_damping)
+      relaxed = ball
+      relaxed%youngs_modulus = no_modes%spring*ball%youngs_modulus
+      basis = new_basis(relaxed, options%static_harmonics, options%cavity_gas)
+      response = 0.0_wp
+      ! Both poles are pressed alike: even harmonics move by twice the force, odd ones stay.
+      do n = 0, options%static_harmonics, 2
+         call get_static_family(basis, n, family, failed)
+         if (failed) exit
+         associate (fall => rings%fall(:, :, n))
+            response = response + 2*matmul(fall, matmul(family%flexibility, transpose(fall)))
+         end associate
+      end do
+      if (.not. failed) call new_ring_contact(response, rings%n_way, contact, failed)
+      if (failed) error = numerical_error('&modal_ball: rings = '//to_text(options%rings) &
+         //' cannot be distinguished; allowed: fewer rings, or more static_harmonics')
+   end subroutine new_press
+
+end module thud_modal_compression

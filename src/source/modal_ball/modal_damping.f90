@@ -1,0 +1,40 @@
+!> The loss of the modes.
+module thud_modal_damping
+   use thud_constants, only: pi
+   use thud_fractional_loss, only: new_fractional_loss
+   use thud_kinds, only: wp
+   use thud_modal_ball_options, only: modal_ball_options_type
+   use thud_mode_step, only: mode_step_type
+   use thud_prony, only: fit_fractional_loss, get_storage_ratio
+   implicit none (type, external)
+   private
+
+   public :: set_damping
+
+contains
+
+   !> Branches and damping ratios of the modes.
+   subroutine set_damping(options, step, damping_ratio)
+      class(modal_ball_options_type), intent(in) :: options
+      !> The modes; get their branches.
+      type(mode_step_type), intent(inout) :: step
+      !> Damping ratios: [n_mode].
+      real(wp), intent(out) :: damping_ratio(:)
+      real(wp) :: viscosity
+
+      allocate (step%share(0), step%time(0))
+      select case (options%damping_law)
+      case ('rising')
+         damping_ratio = options%loss_factor/2*step%omega/(2*pi*options%loss_frequency)
+      case ('fractional')
+         call fit_fractional_loss(new_fractional_loss(options%fractional_order, options%loss_factor, &
+            options%loss_frequency), step%share, step%time, viscosity)
+         step%spring = 1/get_storage_ratio(step%share, step%time, 2*pi*options%loss_frequency)
+         step%share = step%share*step%spring
+         damping_ratio = step%omega*viscosity*step%spring/2
+      case default
+         damping_ratio = options%loss_factor/2
+      end select
+   end subroutine set_damping
+
+end module thud_modal_damping

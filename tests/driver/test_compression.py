@@ -1,0 +1,106 @@
+"""Slow compression: from Python, from a file, and what it refuses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import thud
+from thud import cli
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+def test_curve_has_points_table_and_figure() -> None:
+    curve = thud.compress(model="modal_ball", max_deflection=0.03, points=13, gas="adiabatic")
+    np.testing.assert_allclose(curve.deflection, np.linspace(0, 0.03, 13), rtol=1e-14)
+    assert curve.force[0] == 0
+    assert np.all(np.diff(curve.force) > 0)
+    assert repr(curve) == f"<CompressionCurve, modal_ball: {curve.force[-1]:.1f} N at 30.0 mm>"
+    assert "deflection, mm" in curve._repr_html_()
+    table = curve.to_dataframe()
+    assert table["force_N"].tolist() == curve.force.tolist()
+    (axes,) = curve.plot().axes
+    assert axes.get_xlabel() == "Approach of the plates, mm"
+    assert axes.lines[0].get_ydata()[-1] == curve.force[-1]  # type: ignore[index]
+    named = thud.plot.compression({"modal ball": curve})
+    assert [text.get_text() for text in named.legends[0].get_texts()] == ["modal ball"]
+
+
+def test_gas_that_leaves_gives_no_force() -> None:
+    ball = thud.Ball(youngs_modulus=1.0)
+    forces = {
+        gas: thud.compress(ball, "hollow_sphere", gas=gas).force[-1]  # type: ignore[arg-type]
+        for gas in ("vented", "isothermal", "adiabatic")
+    }
+    assert forces["vented"] < 1e-3
+    assert 1.3 * forces["isothermal"] < forces["adiabatic"] < 1.6 * forces["isothermal"]
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"model": "measured_modes"}, "this model has no static compression; allowed: one that"),
+        (
+            {"model": thud.HuntCrossley(contact_time=0.02)},
+            "stiffness = 0 is not allowed with &compression, as contact_time gives one for a drop",
+        ),
+        ({"max_deflection": 0.178}, "max_deflection = 0.178 m is not allowed; allowed: less than"),
+        ({"max_deflection": 0.12}, "max_deflection = 0.12 m closes the shell; allowed: less than"),
+        ({"max_deflection": 0.0}, "max_deflection = 0.0 is not allowed; allowed: 0 < max"),
+        ({"model": "modal_ball", "max_deflection": 0.15}, "the ball lies on its outermost ring"),
+        ({"points": 1}, "points = 1 is not allowed; allowed: 2 <= points <= 10000"),
+        ({"gas": "hot"}, "gas = 'hot' is not allowed; allowed: 'vented', 'isothermal', 'adiab"),
+        ({"ball": thud.Ball(gauge_pressure=1e3)}, "gas = 'vented' with gauge_pressure = 1000.0"),
+        ({"depth": 0.1}, "'depth' is not known; allowed: ball, model, max_deflection, points, gas"),
+    ],
+)
+def test_impossible_compressions_are_refused(options: dict[str, object], sentence: str) -> None:
+    if options.get("model") == "measured_modes":
+        options = {"model": thud.MeasuredModes([30.0], [0.1], [2.5])}
+    with pytest.raises(thud.ThudError) as caught:
+        thud.compress(**options)  # type: ignore[arg-type]
+    assert sentence in str(caught.value)
+
+
+CASE = "&drop / &ball poisson_ratio = 0.45 / &model name = 'modal_ball' / "
+
+
+def test_file_asks_for_a_compression(run: Run, tmp_path: Path) -> None:
+    case = tmp_path / "ball.nml"
+    case.write_text(CASE + "&compression max_deflection = 0.02 points = 5 gas = 'isothermal' /")
+    done = run(case)
+    assert done.returncode == 0, done.stderr
+    folder = tmp_path / "outputs/ball"
+    found = np.genfromtxt(folder / "compression.csv", delimiter=",", names=True)
+    curve = thud.compress(
+        thud.Ball(poisson_ratio=0.45), "modal_ball", max_deflection=0.02, points=5, gas="isothermal"
+    )
+    assert found["deflection_m"].tolist() == curve.deflection.tolist()
+    assert found["force_N"].tolist() == curve.force.tolist()
+    assert f"force there {curve.force[-1]:20.1f} N" in done.stdout
+    again = thud.read_results(folder)
+    assert again.case.compression == thud.Compression(0.02, 5, "isothermal")
+    assert "slow compression" in repr(again.case)
+
+
+def test_compression_takes_a_model(run: Run, tmp_path: Path) -> None:
+    case = tmp_path / "ball.nml"
+    case.write_text("&modes / &compression /")
+    done = run(case)
+    assert done.returncode == 1
+    assert "&compression in line 1 does nothing with &modes alone" in done.stderr
+
+
+def test_driver_draws_the_compression_of_a_case(tmp_path: Path) -> None:
+    case = tmp_path / "ball.nml"
+    case.write_text(CASE + "&compression points = 5 /")
+    assert cli.main(["run", "-q", "-o", str(tmp_path / "out"), str(case)]) == 0
+    assert {"compression.csv", "compression.png"} <= {p.name for p in (tmp_path / "out").iterdir()}

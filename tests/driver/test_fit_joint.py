@@ -1,0 +1,235 @@
+"""Several records in one fit, and what it says of parameters that cannot be told apart."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud import cli
+from thud.studies.fit import KIND
+from thud.studies.fitting.inference import pair_sentences
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+RATE = 44100.0
+HEIGHTS = (0.1, 1.0, 1.6)
+QUIET = 1000
+# A miss by four standard errors has a probability of 6e-5.
+FAR = 4.0
+# From 0.1 m contacts are the longest.
+CASE = thud.Case(ball=thud.Ball(youngs_modulus=1.8e6), sampling=thud.Sampling(duration=0.03))
+TRUTH = {"youngs_modulus": 1.8e6, "mass": 2.5}
+STUDY = """
+fixed.duration = 0.03
+
+[[target]]
+file = "drop_1.csv"
+fixed = { height = { value = 10, unit = "cm" } }
+
+[[target]]
+file = "drop_2.csv"
+fixed = { height = 1.0 }
+gain = 0.02
+
+[parameters]
+youngs_modulus = { start = 1.6, unit = "MPa" }
+mass = { start = 2.4 }
+"""
+
+
+def record(
+    case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the force of a drop with quiet, white noise and an offset."""
+    impact = thud.solve_case(replace(case, drop=thud.Drop(height)))
+    contact = int(impact.contact_time * RATE) + 2
+    force = np.pad(impact.floor_force[:contact], QUIET) + offset
+    force += np.random.default_rng(seed).normal(scale=noise, size=len(force))
+    return np.arange(len(force)) / RATE, force
+
+
+@pytest.fixture(scope="module")
+def drops() -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Return records from three heights, each with its own noise and offset."""
+    return [
+        record(CASE, height, noise, seed, 4.0 * seed)
+        for seed, (height, noise) in enumerate(zip(HEIGHTS, (1.0, 5.0, 8.0), strict=True))
+    ]
+
+
+def test_three_heights_give_modulus_and_mass(
+    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+) -> None:
+    targets = [
+        thud.ForceTarget(drop, fixed={"height": height})
+        for drop, height in zip(drops, HEIGHTS, strict=True)
+    ]
+    fit = thud.fit(targets, {"youngs_modulus": 1.6e6, "mass": 2.4}, CASE)
+    assert not fit.warnings
+    assert fit.names[2:] == ("time_shift(1)", "time_shift(2)", "time_shift(3)")
+    for name, value in TRUTH.items():
+        assert abs(fit.values[name] - value) < FAR * fit.standard_errors[name]
+    for number, target in enumerate(fit.targets):
+        assert target.case.drop.height == HEIGHTS[number]
+        offset, error = target.nuisances["offset"]
+        assert abs(offset - 4.0 * number) < FAR * error
+    # 40 ms of quiet hold some 60 values.
+    found = re.search(r"target 3: standard deviation (\S+) N, that of the quiet", str(fit))
+    assert found
+    assert float(found[1]) == pytest.approx(8.0, rel=FAR / np.sqrt(2 * 60))
+
+
+def test_information_of_records_adds() -> None:
+    # One common parameter, the times of first touch apart: 1/variance is the sum of those alone.
+    targets = [
+        thud.ForceTarget(record(CASE, height, noise, 1), noise=noise, fixed={"height": height})
+        for height, noise in ((0.5, 5.0), (1.0, 9.0))
+    ]
+    alone = [thud.fit(target, ["youngs_modulus"], CASE) for target in targets]
+    both = thud.fit(targets, ["youngs_modulus"], CASE)
+    errors = np.array([fit.standard_errors["youngs_modulus"] for fit in alone])
+    values = np.array([fit.values["youngs_modulus"] for fit in alone])
+    weight = errors**-2
+    assert both.standard_errors["youngs_modulus"] == pytest.approx(weight.sum() ** -0.5, rel=2e-3)
+    mean = float(weight @ values / weight.sum())
+    assert abs(both.values["youngs_modulus"] - mean) < 0.02 * errors.min()
+
+
+def test_forces_and_levels_are_fitted_together() -> None:
+    impact = thud.solve_case(replace(CASE, drop=thud.Drop(0.5)))
+    targets = [
+        thud.ForceTarget(record(CASE, 1.0, 5.0, 3)),
+        thud.LevelTarget(impact.levels(force="floor"), 0.1, fixed={"height": 0.5}),
+    ]
+    fit = thud.fit(targets, ["youngs_modulus"], CASE)
+    assert abs(fit.values["youngs_modulus"] - 1.8e6) < FAR * fit.standard_errors["youngs_modulus"]
+    assert "target 2: standard deviations given" in str(fit)
+    assert list(fit.figures()) == ["fit_1", "fit_2", "confidence"]
+
+
+def test_record_that_does_not_fit_the_others_is_named(
+    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+) -> None:
+    time, force = drops[1]
+    targets = [
+        thud.ForceTarget(drops[0], fixed={"height": 0.1}),
+        thud.ForceTarget((time, 1.05 * force), fixed={"height": 1.0}),
+    ]
+    with pytest.warns(thud.FitWarning) as caught:
+        thud.fit(targets, list(TRUTH), CASE)
+    assert any(str(one.message).startswith("target 2: ") for one in caught)
+    free = [targets[0], replace(targets[1], gain=np.inf)]
+    fit = thud.fit(free, list(TRUTH), CASE)
+    assert abs(fit.values["gain(2)"] - 1.05) < FAR * fit.standard_errors["gain(2)"]
+
+
+def test_heights_do_not_tell_modulus_from_wall(
+    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+) -> None:
+    targets = [
+        thud.ForceTarget(drop, fixed={"height": height})
+        for drop, height in zip(drops[:2], HEIGHTS, strict=False)
+    ]
+    with pytest.warns(thud.FitWarning, match=r"only youngs_modulus \* wall_thickness\^2 is determ"):
+        fit = thud.fit(targets, ["youngs_modulus", "wall_thickness"], CASE)
+    assert np.isinf(fit.standard_errors["youngs_modulus"])
+
+
+def test_pairs_that_cannot_be_told_apart_are_named() -> None:
+    correlation = np.array([[1, -0.9993, 0.2], [-0.9993, 1, 0.93], [0.2, 0.93, 1]])
+    names = ["loss_factor", "fractional_order", "youngs_modulus"]
+    assert pair_sentences(names, correlation, 0.9) == [
+        "loss_factor and fractional_order cannot be told apart: correlation −0.9993",
+        "fractional_order and youngs_modulus are hard to tell apart: correlation 0.93",
+    ]
+    infinite = np.full((3, 3), np.nan)
+    assert pair_sentences(names, infinite, 0.9) == []
+
+
+def test_fit_says_what_is_hard_to_tell_apart() -> None:
+    # The force scales with the mass, and nearly with the root of the height.
+    fit = thud.fit(
+        thud.ForceTarget(record(CASE, 1.0, 5.0, 2)), ["youngs_modulus", "mass", "height"], CASE
+    )
+    told = " ".join(fit.identifiability)
+    assert "youngs_modulus and mass are hard to tell apart: correlation 0.9" in told
+    assert fit.identifiability[0].startswith("least determined: ")
+    assert fit.identifiability[0] in str(fit)
+    assert fit.summary()["identifiability"] == list(fit.identifiability)
+
+
+@pytest.fixture
+def folder(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    drops: list[tuple[NDArray[np.float64], NDArray[np.float64]]],
+) -> Path:
+    """Write two drops as tables and go to their directory."""
+    monkeypatch.chdir(tmp_path)
+    for number, drop in enumerate(drops[:2], start=1):
+        np.savetxt(f"drop_{number}.csv", np.column_stack(drop), delimiter=",", fmt="%.9f")
+    return tmp_path
+
+
+def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "study.toml").write_text(STUDY)
+    assert cli.main(["fit", "-o", "found", "study.toml"]) == 0
+    assert "gain(2)" in capsys.readouterr().out
+    names = {path.name for path in (folder / "found").iterdir()}
+    assert {"fit_1.csv", "fit_2.csv", "fitted_2.nml", "fit_2.png", "fit.json"} < names
+    assert names == {"fit.json", *KIND.other_files(thud.read_study("study.toml", "fit"))}
+    saved = json.loads((folder / "found/fit.json").read_text())
+    for name, truth in TRUTH.items():
+        entry = saved["parameters"][name]
+        assert abs(entry["value"] - truth) < FAR * entry["standard_error"]
+    assert not saved["warnings"]
+    assert thud.read_case(folder / "found/fitted_1.nml").drop.height == 0.1
+    # The same study takes the directory again, another height does not.
+    again = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
+    (folder / "study.toml").write_text(STUDY.replace("height = 1.0", "height = 1.01"))
+    assert cli.main(again) == 1
+    assert "[target_2] fixed = {'height': 1.0} is now {'height': 1.01}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("height = 1.0", "mass = 2.0", "target 2: fixed mass is not allowed"),
+        ("height = 1.0", "heigth = 1.0", "target 2: fixed: 'heigth' is not a key|'heigth' is not"),
+        ('unit = "cm"', 'unit = "N"', "target 1: fixed height: unit 'N' does not fit"),
+        ("gain = 0.02", "gain = 'no'", r"target 2: gain = 'no' is not allowed|gain = 'no'"),
+        ("gain = 0.02", "hum = 3", r"target 2: hum = 3 is not allowed"),
+        ("gain = 0.02", "window = [0.02, 0.05]", r"target 2: the weight of its residuals is not"),
+        ("drop_2.csv", "drop_9.csv", "drop_9.csv: cannot be read"),
+    ],
+)
+def test_bad_records_are_named(folder: Path, old: str, new: str, words: str) -> None:
+    assert old in STUDY
+    (folder / "study.toml").write_text(STUDY.replace(old, new))
+    with pytest.raises(thud.InputError, match=words) as caught:
+        KIND.run("study.toml")
+    assert "\n" not in str(caught.value)
+
+
+def test_lists_of_something_else_are_refused() -> None:
+    for targets in ([], [3], [thud.solve()]):
+        with pytest.raises(thud.InputError, match="target is a list of something else"):
+            thud.fit(targets, ["youngs_modulus"])  # type: ignore[arg-type]
+    for given in ([], [3]):
+        with pytest.raises(thud.InputError, match=r"allowed: a table \[target\], or several"):
+            thud.read_study({"target": given, "parameters": {"mass": {}}}, "fit")
+
+
+def test_study_of_the_repository_can_be_read() -> None:
+    study = thud.read_study(REPOSITORY / "inputs/studies/fit_heights.toml", "fit")
+    assert [case.drop.height for case, _ in study.pairs()] == list(HEIGHTS)

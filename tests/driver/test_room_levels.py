@@ -1,0 +1,129 @@
+"""Levels measured in the room below: mean, background, standardisation, rating."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud.cli import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PUBLISHED = REPOSITORY / "inputs" / "floors" / "field_levels.csv"
+OCTAVES = (63.0, 125.0, 250.0, 500.0)
+
+
+def write(path: Path, text: str) -> Path:
+    """Write a table and return its path."""
+    file = path / "levels.csv"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_published_measurement_is_standardised_and_rated() -> None:
+    found = thud.read_room_levels(PUBLISHED, volume=41.4)
+    printed = [76.3, 57.2, 47.2, 44.8, 38.1, 37.0, 35.3, 30.7, 24.5, 22.2, 16.8, 15.1]
+    # Printed to 0.1 dB; its own rounding of the table of g(C) leaves 0.07 dB.
+    assert found.standardised == pytest.approx(printed, abs=0.1)
+    assert found.rating.a_weighted == pytest.approx(46.97, abs=0.01)
+    assert found.standardised_rating.a_weighted == pytest.approx(46.24, abs=0.01)
+    assert (found.rating.rounded, found.standardised_rating.rounded) == (47, 46)
+    assert found.rating.korean_class is None
+
+
+def test_example_of_iso_717_2_is_rated() -> None:
+    found = thud.rating([65.3, 64.5, 58.0, 55.8])
+    assert found.rounded == 55
+    assert found.a_weighted == pytest.approx(55.3507, abs=1e-4)
+    assert found.curve == 51
+    assert found.korean_class == 0
+
+
+def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
+    rng = np.random.default_rng(5)
+    levels = 60 + 3 * rng.standard_normal((6, 4))
+    background = np.array([45.0, 52.0, 57.0, 20.0])
+    lines = ["frequency,background," + ",".join(f"P{i}" for i in range(1, 7))]
+    lines += [
+        ",".join(map(str, (f, b, *row)))
+        for f, b, row in zip(OCTAVES, background, levels.T.tolist(), strict=True)
+    ]
+    found = thud.read_room_levels(write(tmp_path, "\n".join(lines)))
+    mean = (10 ** (levels / 10)).mean(axis=0)
+    assert found.measured == pytest.approx(10 * np.log10(mean))
+    near = found.measured - background
+    expected = np.where(
+        near >= 15, 10 * np.log10(mean),
+        found.measured + 10 * np.log10(1 - 10 ** (-np.maximum(near, 6) / 10)),
+    )  # fmt: skip
+    assert found.level == pytest.approx(expected)
+    assert found.is_maximum.tolist() == (near < 6).tolist()
+    assert found.is_maximum.any()
+    # The A-weighted energy of each position, and the standard error of their mean.
+    energy = np.array([10 ** (thud.rating(one).a_weighted / 10) for one in levels])
+    error = energy.std(ddof=1) / np.sqrt(6) / energy.mean() * 10 / np.log(10)
+    assert found.position_uncertainty == pytest.approx(error)
+    assert any("maxima" in remark for remark in found.remarks)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "no numbers"),
+        ("63,60\n125,60\n250,60\n500,60\n", "0 titles over 2 columns"),
+        ("level,P1\n63,60\n", "no column of frequency"),
+        ("frequency,T\n63,1\n125,1\n250,1\n500,1\n", "no column of levels"),
+        ("frequency,P1\n63,60\n125,60\n250,60\n", "no level at 500 Hz"),
+        ("frequency,P1\n63,60\n63,60\n250,60\n500,6\n", "63 Hz is given twice"),
+        ("frequency,P1\n63,60\n125,60\n250,60\n470,60\n", "470 Hz is not a mid frequency"),
+        ("frequency,P1\n63,60\n125,600\n250,60\n500,60\n", "level = 600 dB"),
+        ("frequency,P1\n63,60\n125,nan\n250,60\n500,60\n", "level = nan dB"),
+        ("frequency,T,P1\n63,0,60\n125,1,60\n250,1,60\n500,1,60\n", "reverberation_time = 0 s"),
+        ("frequency,T,T20,P1\n63,1,1,60\n125,1,1,60\n", "more than one column of time"),
+        ("frequency,P1\n63,60\n125\n", "line 3: 1 columns, 2 above it"),
+    ],
+)
+def test_tables_that_cannot_be_rated_are_refused(tmp_path: Path, text: str, words: str) -> None:
+    with pytest.raises(thud.InputError, match=words) as refused:
+        thud.read_room_levels(write(tmp_path, text))
+    assert "allowed: " in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (([60.0] * 3,), r"shape \(3,\); allowed: \(4,\)"),
+        (([60.0] * 4, "third"), r"allowed: \(12,\)"),
+        (([60.0] * 4, "fifth"), "bands = 'fifth' is not known"),
+        (([60.0, np.inf, 60.0, 60.0],), "not finite"),
+    ],
+)
+def test_levels_that_cannot_be_rated_are_refused(arguments: tuple[object, ...], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.rating(*arguments)
+
+
+@pytest.mark.parametrize(("time", "volume"), [(0.0, 50.0), (-1.0, 50.0), (0.5, 0.0), (0.5, -3.0)])
+def test_rooms_that_cannot_be_are_refused(time: float, volume: float) -> None:
+    with pytest.raises(thud.InputError, match="> 0"):
+        thud.standardised_level([60.0], time, volume)
+
+
+def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "out"
+    assert main(["rate", str(PUBLISHED), "--volume", "41.4", "--output", str(folder)]) == 0
+    shown = capsys.readouterr()
+    assert "47 (46.97)" in shown.out
+    assert "46 (46.24)" in shown.out
+    assert "the background is not known" in shown.err
+    assert {path.name for path in folder.iterdir()} == {
+        "room_levels.csv", "room_levels.png", "room_levels.svg",
+    }  # fmt: skip
+    lines = (folder / "room_levels.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 13
+    assert "standardised_dB" in lines[0]

@@ -1,0 +1,29 @@
+"""The flagship by finite elements against a second element code of other make."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from quadratic_impact import HARD, Body, Rubber, drop_of_library
+
+# What 2 x 16 elements read more than 6 x 48 of the same code: docs/finite_elements.md.
+COARSE = np.array([0.09, 0.28, 0.29, -0.24, 0.63])
+
+
+def test_flagship_is_that_of_a_second_code() -> None:
+    found, impact = Body(Rubber(), 2, 16).drop(HARD), drop_of_library(8)
+    # Its steps of 1e-6 s are of first order in the losses.
+    assert found.impulse_residual < 1e-5
+    assert found.energy_residual < 1e-4
+    # The coarse mesh is 0.25 ms off.
+    assert impact.contact_time == pytest.approx(found.contact_time + 0.25e-3, abs=0.1e-3)
+    assert impact.restitution == pytest.approx(found.restitution - 0.0014, abs=0.002)
+    difference = np.abs(impact.levels() - (found.levels - COARSE))
+    assert difference[:4].max() < 0.05
+    # 8 x 64 elements of the library are not converged at 500 Hz.
+    assert difference[4] < 0.2
