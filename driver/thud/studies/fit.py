@@ -195,10 +195,9 @@ def _search(
     """Return the best fit by the model or, where there is one, by a surrogate."""
     if surrogate is None:
         return search(pairs, ranges, options, progress=progress)
+    by_answers = _answered(pairs, surrogate, ranges)
     inside = [within_region(entry, surrogate) for entry in ranges]
-    return confirmed(
-        search(_answered(pairs, surrogate, ranges), inside, options, progress=progress)
-    )
+    return confirmed(search(by_answers, inside, options, progress=progress))
 
 
 def _answered(
