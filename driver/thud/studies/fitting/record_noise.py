@@ -205,7 +205,7 @@ class Quiet:
         cells, mean = self._means
         tone = MAINS[int(np.argmax(background.variances[3:]))]
         others = np.append(background.variances[:3], np.zeros(len(MAINS)))
-        whiten = _whitening(replace(background, variances=others))
+        whiten = _whitening(replace(background, draws=others[np.newaxis]))
         basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone])[:, 1:])
         inverse = np.linalg.inv(triangle)
         return (tone, *wave_size(inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T))
