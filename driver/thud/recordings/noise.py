@@ -193,7 +193,9 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
     return np.concatenate([white[None], noise_covariances(cells, cells)])
 
 
-def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Background:
+def fit_background(
+    quiet: Cells, mean: NDArray[np.float64], peak: float, few_cells: int = FEW_CELLS
+) -> Background:
     """Return the background of the most likely noise, by average-information steps.
 
     Parameters
@@ -204,6 +206,8 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
         Mean force of each, N.
     peak
         Peak force, N.
+    few_cells
+        Number of cells below which the variances are means over their posterior.
     """
     parts = covariances(quiet)
     middle = (quiet[0] + quiet[1]) / 2
@@ -242,7 +246,7 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
     doubt = np.linalg.inv(curvature + 0.05 * np.eye(5))
     # The mean of a variance that is known to a factor is larger than its most likely value.
     likely = theta * np.exp(np.minimum(0.5 * np.diagonal(doubt), MOST_DOUBT))
-    if len(mean) < FEW_CELLS:
+    if len(mean) < few_cells:
         likely = _mean_variances(likely, value, doubt, rough / scale, parts, trend, mean)
     return Background(quiet, mean, likely, peak)
 

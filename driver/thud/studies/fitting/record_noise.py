@@ -39,6 +39,10 @@ MIN_QUIET = 50
 # are looked for in the quiet.
 MIN_HUM = 10.0
 MAX_TONES = 3
+# Quiet below this, s, leaves the parts of the noise in doubt: see `fit_background`.
+SHORT_QUIET = 0.06
+# Gain of the logarithm of the likelihood that shows a search to have ended beside the maximum.
+CLEARLY = 3.0
 # Harmonics of hum count up to this part of the highest frequency.
 HARMONIC_EDGE = 0.95
 # Time from the foot of a pulse to its edge, s: flanks of the models rise to it in 4 ms.
@@ -108,8 +112,9 @@ class Quiet:
 
     @property
     def seconds(self) -> float:
-        """Length of the quiet, s."""
-        return (len(self.force) - self.pulse[1] + self.pulse[0]) / self.rate
+        """Length of the quiet that counts, s."""
+        sides = (self.pulse[0] / self.rate, (len(self.force) - self.pulse[1]) / self.rate)
+        return sum(min(side, QUIET) for side in sides)
 
     @property
     def freedom(self) -> int:
@@ -135,13 +140,16 @@ class Quiet:
     def _means(self) -> tuple[Cells, NDArray[np.float64]]:
         """Cells of the quiet, s from the middle of the pulse, and their means less the median, N.
 
-        They are those of the band: wider ones would not tell the noise of its upper end.
+        They are those of the band: wider ones would not tell the noise of its upper end. Quiet
+        farther than 0.1 s away is left out, whatever the window.
         """
         width = max(1, int(self.rate / (2 * self.below)))
         first, stop = self.pulse
+        most = int(QUIET * self.rate)
+        counts = [min(length, most) // width for length in (first, len(self.force) - stop)]
         edges = (
-            first - width * np.arange(1 + first // width)[::-1],
-            stop + width * np.arange(1 + (len(self.force) - stop) // width),
+            first - width * np.arange(1 + counts[0])[::-1],
+            stop + width * np.arange(1 + counts[1]),
         )
         begins, ends = zip(
             *(cells_between(side, self.rate, self.middle) for side in edges), strict=True
@@ -163,7 +171,10 @@ class Quiet:
         waves = cell_waves(cells, tones)
         left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
         peak = float(self.force.max() - np.median(self.force))
-        found = fit_background(cells, left, peak)
+        found = fit_background(cells, left, peak, 0)
+        if self.seconds < SHORT_QUIET or _is_beside(found):
+            # So short a quiet does not tell slow noise, however fine its cells are.
+            found = fit_background(cells, left, peak, len(mean) + 1)
         # What the waves have taken of the noise.
         scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
         return replace(found, variances=scale * found.variances)
@@ -267,6 +278,25 @@ def _whitening(background: Background) -> NDArray[np.float64]:
     factor = np.linalg.cholesky(_covariance(background))
     whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
     return np.asarray(whiten, dtype=np.float64)
+
+
+def _is_beside(background: Background) -> bool:
+    """Return whether pink or brown noise alone is more likely than what the search has found.
+
+    The search may end beside the maximum; the mean over the posterior does not depend on it.
+    """
+    middle = (background.quiet[0] + background.quiet[1]) / 2
+    trend = np.column_stack([np.ones_like(middle), middle])
+    free = np.linalg.qr(trend, mode="complete")[0][:, 2:]
+    left = free.T @ background.mean
+    best = _log_likelihood(background)
+    for part, covariance in enumerate(covariances(background.quiet)[1:3], start=1):
+        size = left @ np.linalg.solve(free.T @ covariance @ free, left) / len(left)
+        variances = np.zeros_like(background.variances)
+        variances[[0, part]] = 1e-3 * background.variances[0], size
+        if _log_likelihood(replace(background, variances=variances)) > best + CLEARLY:
+            return True
+    return False
 
 
 def _log_likelihood(background: Background) -> float:
