@@ -108,8 +108,9 @@ class Quiet:
 
     @property
     def seconds(self) -> float:
-        """Length of the quiet, s."""
-        return (len(self.force) - self.pulse[1] + self.pulse[0]) / self.rate
+        """Length of the quiet that counts, s."""
+        sides = (self.pulse[0] / self.rate, (len(self.force) - self.pulse[1]) / self.rate)
+        return sum(min(side, QUIET) for side in sides)
 
     @property
     def freedom(self) -> int:
@@ -135,13 +136,16 @@ class Quiet:
     def _means(self) -> tuple[Cells, NDArray[np.float64]]:
         """Cells of the quiet, s from the middle of the pulse, and their means less the median, N.
 
-        They are those of the band: wider ones would not tell the noise of its upper end.
+        They are those of the band: wider ones would not tell the noise of its upper end. Quiet
+        farther than 0.1 s away is left out, whatever the window.
         """
         width = max(1, int(self.rate / (2 * self.below)))
         first, stop = self.pulse
+        most = int(QUIET * self.rate)
+        counts = [min(length, most) // width for length in (first, len(self.force) - stop)]
         edges = (
-            first - width * np.arange(1 + first // width)[::-1],
-            stop + width * np.arange(1 + (len(self.force) - stop) // width),
+            first - width * np.arange(1 + counts[0])[::-1],
+            stop + width * np.arange(1 + counts[1]),
         )
         begins, ends = zip(
             *(cells_between(side, self.rate, self.middle) for side in edges), strict=True
