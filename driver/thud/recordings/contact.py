@@ -31,7 +31,7 @@ GROWTH = 0.15
 CONTACT_CELL = 2e-4
 # The gate of the levels reaches this many samples beyond the contact, and more at low rates,
 # whose anti-aliasing filter comes close to the octave of 500 Hz: (GATE_RATE/rate)2 more.
-GATE_SAMPLES = 4
+GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
