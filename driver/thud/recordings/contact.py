@@ -68,8 +68,8 @@ class Contact:
         First sample of the part with its background removed, and the one behind it.
     force : ndarray, shape (span[1] - span[0],)
         Force of the part, N.
-    offset : float
-        Mean background that was removed from the gate, N.
+    under : ndarray, shape (span[1] - span[0],)
+        Background that was removed, N.
     gate : tuple of int
         First sample of the contact with its margins, and the one behind it.
     covariance : ndarray, shape (n_cell, n_cell)
@@ -87,7 +87,7 @@ class Contact:
     peak: float
     span: tuple[int, int]
     force: NDArray[np.float64]
-    offset: float
+    under: NDArray[np.float64]
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
     quiet: tuple[float, float]
@@ -189,7 +189,7 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         background.peak,
         span,
         force[slice(*span)] - under,
-        float(under[gate[0] - span[0] : gate[1] - span[0]].mean()),
+        under,
         gate,
         covariance,
         (left / rate, (len(force) - right) / rate),
