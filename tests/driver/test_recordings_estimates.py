@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import time
 import tracemalloc
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 from synthetic import band_limited, coloured_noise, half_sine, make_recording
 
 import thud
+from thud.levels import record_force
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
+from thud.recordings.levels import measure_levels
 from thud.recordings.quantities import average_mass
 from thud.recordings.restitution import Fall
 from thud.recordings.signal import Signal
@@ -41,8 +43,7 @@ def drops(force: np.ndarray, rate: float, **knowledge: float) -> list[Drop]:
 
 
 def levels(drop: Drop) -> np.ndarray:
-    energies = [drop.band_energy(*edges)[0] for edges in zip(BANDS.lower, BANDS.upper, strict=True)]
-    return 10 * np.log10(energies)
+    return measure_levels(drop).level
 
 
 @pytest.mark.parametrize("before", [0.01, 0.1])
@@ -326,21 +327,18 @@ class Hour:
         return self.part[np.arange(start, stop) % len(self.part)].astype(np.float64)
 
 
-def test_search_of_an_hour_is_fast_and_small() -> None:
+def test_search_of_many_drops_is_small() -> None:
     part = half_sine(51.2e3, 1.0, int(7.2 * 51.2e3)) + 5 * np.random.default_rng(1).normal(
         size=int(7.2 * 51.2e3)
     )
-    hour = Hour(part.astype(np.float32), 500 * len(part))
+    # A quarter of an hour, 350 MB as it is read: memory does not grow with the number of drops.
+    hour = Hour(part.astype(np.float32), 125 * len(part))
     tracemalloc.start()
-    begin = time.process_time()
     windows = find_windows(hour)  # type: ignore[arg-type]
-    spent = time.process_time() - begin
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    assert len(windows) == 500
-    assert most < 200e6
-    # Reading by index, above, takes most of it; 200 times real time are 18 s.
-    assert spent < 18
+    assert len(windows) == 125
+    assert most < 60e6
 
 
 def test_coloured_noise_has_its_deviation() -> None:
@@ -348,3 +346,51 @@ def test_coloured_noise_has_its_deviation() -> None:
     for colour in ("white", "pink", "brown"):
         parts = [coloured_noise(4000, 8e3, 2.0, colour, rng) for _ in range(200)]
         assert np.sqrt(np.mean(np.square(parts))) == pytest.approx(2.0, rel=0.1)
+
+
+def test_releases_of_hertz_were_late() -> None:
+    """A force that fades as t**1.5 was continued by a line: 0.3 to 0.5 ms too late at 50 dB."""
+    case = thud.read_case("inputs/tyre.nml")
+    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.03)))
+    truth = impact.exact_contact_time
+    for seed in range(3):
+        force, _ = make_recording(pulse(impact), FINE, rate=48e3, noise_db=50, seed=seed)
+        (drop,) = drops(force, 48e3)
+        assert abs(drop.contact_time.value - truth) < 0.25e-3
+        assert abs(drop.contact_time.value - truth) < 3 * drop.contact_time.uncertainty
+
+
+def test_noise_raised_the_peak() -> None:
+    errors = []
+    for seed in range(6):
+        force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=20, seed=seed)
+        (drop,) = drops(force, 48e3)
+        low = record_force(np.pad(drop.contact.gated, 2), 48e3).max()
+        errors.append((low - 1500, drop.peak_force.value - 1500, drop.peak_force.uncertainty))
+    maximum, stated, doubt = np.mean(errors, axis=0)
+    assert stated < 0.75 * maximum
+    assert abs(stated) < 2 * doubt / np.sqrt(6) + doubt
+
+
+def test_levels_know_hum() -> None:
+    """Of hum of 15 to 30 N in 25 to 35 ms of quiet, 95 % intervals covered 75 to 94 %."""
+    pulls = []
+    for seed in range(16):
+        rng = np.random.default_rng(seed)
+        before, after = rng.uniform(0.025, 0.035, 2)
+        force, clean = make_recording(
+            HALF_SINE, FINE, rate=16e3, noise_db=50, seed=seed, before=before, after=after,
+            hum=((50.0, 60.0)[seed % 2], rng.uniform(15, 30)),
+        )  # fmt: skip
+        (drop,) = drops(force, 16e3)
+        found = measure_levels(drop)
+        pulls.append((found.level - thud.force_exposure_levels(clean, 16e3)) / found.uncertainty)
+    # Sums of 16 squares, in each of five bands.
+    assert (np.square(pulls).sum(axis=0) < chi2.ppf(1 - 1e-3, 16)).all(), pulls
+
+
+def test_noise_that_rises_with_frequency_leaves_the_background_alone() -> None:
+    white = np.random.default_rng(0).normal(scale=10, size=int(0.22 * 24e3) + 2)
+    for noise in (np.diff(white)[1:], np.diff(white, 2)):
+        (drop,) = drops(half_sine(24e3, 0.1, len(noise)) + noise + 12, 24e3)
+        np.testing.assert_allclose(drop.contact.under, 12, rtol=0, atol=0.01 * noise.std())

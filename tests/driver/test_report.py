@@ -466,7 +466,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
 
 
 def test_levels_and_criteria_that_disagreed_on_uncertainty(one: Recording) -> None:
-    plate = PlateConfig(f0=1600.0, Q=20.0)
+    plate = PlateConfig(f0=1600.0, Q=20.0, f0_uncertainty=0.005)
     for recording in (one, many(one, 5), many(one, 5, plate=plate)):
         data = report_data(recording)
         found = data["levels"]["octave"]

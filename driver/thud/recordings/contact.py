@@ -100,11 +100,6 @@ class Contact:
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
 
-    @property
-    def noise_doubt(self) -> float:
-        """Relative standard deviation of the noise's density, from the number of quiet cells."""
-        return math.sqrt(2 / max(len(self.background.mean) - 2, 1))
-
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance of linear functionals of the gate's samples, shape (k, n)."""
         white = self.background.variances[0] * self.sample_rate / 2
@@ -222,12 +217,13 @@ def _search(
         quiet, mean = quiet_means(force, left, right, rate, middle)
         if known is None:
             known = fit_background(quiet, mean, peak)
-        background = Background(quiet, mean, known.variances, peak)
+        background = Background(quiet, mean, known.draws, peak)
+        likely = Background(quiet, mean, known.variances[None], peak)
         found = []
         for sign, (near, bounds) in zip((1, -1), ((left, touch), (right, release)), strict=True):
             ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
             edges = sign * flank_edges(sign * near, ahead, rate, fine=last > 0)
-            found.append(find_edge(force, edges, bounds, background, rate, middle, searches))
+            found.append(find_edge(force, edges, bounds, likely, rate, middle, searches))
         (t0, s0), (t1, s1) = found
         if last + 1 < passes:
             room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
@@ -286,10 +282,18 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     covariance += (FLOOR * background.peak) ** 2 * np.eye(len(value))
     time = (cells[0] + cells[1]) / 2 + middle
     if turned:
-        flank = Flank(-time[::-1], value[::-1], covariance[::-1, ::-1], background.peak, 1 / rate)
+        flank = Flank(
+            -time[::-1],
+            value[::-1],
+            covariance[::-1, ::-1],
+            background.peak,
+            1 / rate,
+            release=True,
+        )
         touch, deviation = find_touch(flank, -bounds[1], -bounds[0], searches)
         return -touch, deviation
-    return find_touch(Flank(time, value, covariance, background.peak, 1 / rate), *bounds, searches)
+    flank = Flank(time, value, covariance, background.peak, 1 / rate, release=False)
+    return find_touch(flank, *bounds, searches)
 
 
 def flank_edges(

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Drop", "Estimate", "measure_drop"]
 
+# Draws of noise that show what it adds to the maximum.
+PEAK_DRAWS = 32
 # Quiet below which it is told, s.
 SHORT_QUIET = 0.005
 # Edges of the octave of 500 Hz, Hz; the part of the rate above which content folds back, and the
@@ -56,8 +58,8 @@ class Drop:
     onset : float
         Time of first touch in the file, s.
     gate : tuple of int
-        First sample of the contact with its margins, and the one behind it: levels are computed
-        over ``force[gate[0]:gate[1]]`` and the expected energy of the noise is subtracted.
+        First sample of the contact with its margins, and the one behind it: levels are those of
+        ``force[gate[0]:gate[1]]``.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
         In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
     restitution_shared : dict of str to float
@@ -96,14 +98,25 @@ class Drop:
     remarks: tuple[str, ...]
     contact: Contact
 
-    def band_energy(
-        self, lower: float, upper: float, *, exact: bool = False
-    ) -> tuple[float, float, float]:
-        """Return the energy of the force in a band, N2 s, that of the noise, and a deviation.
+    def band_noise(self, lower: float, upper: float) -> tuple[float, float]:
+        """Return the expected energy of the noise of the gate in a band, and a deviation, N2 s.
 
-        The energy is that of the gate less the expected energy of the noise in it; the last is
-        its standard deviation (docs/recordings_theory.md, section 4). Where the force is exact,
-        without noise, nothing is subtracted.
+        The second is the standard deviation of the energy of the force when the first is subtracted
+        from what is measured (docs/recordings_theory.md, section 4).
+        """
+        value, covariance = self.band_values(lower, upper)
+        noise, squares = float(np.trace(covariance)), float((covariance**2).sum())
+        # The first term is too large by twice the second, on the mean.
+        variance = max(4 * float(value @ covariance @ value) - 2 * squares, 2 * squares)
+        density, doubt = self.contact.background.density((lower + upper) / 2)
+        return noise, math.sqrt(variance + (noise * doubt / density) ** 2)
+
+    def band_values(
+        self, lower: float, upper: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return values whose squares add up to the energy of the gate in a band, N2 s.
+
+        Linear functionals of the force, [n], and the covariance of the noise in them, [n, n].
         """
         first, stop = self.gate
         force, time = self.force[first:stop], self.time[first:stop]
@@ -113,16 +126,7 @@ class Drop:
         phase = 2 * np.pi * frequency[:, None] * time
         scale = np.sqrt((upper - lower) * weights)[:, None] / self.sample_rate
         functionals = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
-        value = functionals @ force
-        covariance = self.contact.covariance_of(functionals)
-        noise = float(np.trace(covariance))
-        second = float((covariance**2).sum())
-        variance = 4 * float(value @ covariance @ value) + 2 * second
-        if exact:
-            return float(value @ value), noise, math.sqrt(variance)
-        # The first term is too large by twice the second, on the mean.
-        variance = max(variance - 4 * second, 2 * second) + (noise * self.contact.noise_doubt) ** 2
-        return float(value @ value) - noise, noise, math.sqrt(variance)
+        return functionals @ force, self.contact.covariance_of(functionals)
 
 
 def measure_drop(  # noqa: PLR0913 - what a laboratory knows
@@ -245,12 +249,22 @@ def _impulse(contact: Contact) -> Estimate:
 
 
 def _peak(contact: Contact) -> Estimate:
-    """Return the maximum of the force below 1.25 kHz, N."""
-    low = record_force(np.pad(contact.gated, 2), contact.sample_rate)
+    """Return the maximum of the force below 1.25 kHz, N, less what noise adds to a maximum.
+
+    That is what further noise of the same density adds (bootstrap), a part of it where there is
+    much noise; as much again counts as uncertain.
+    """
+    force = np.pad(contact.gated, 2)
+    low = record_force(force, contact.sample_rate)
     place = int(np.argmax(low)) * len(contact.covariance) // len(low)
-    variance = contact.background.variances[0] * min(RECORDED_BAND, contact.sample_rate / 2)
+    density, _ = contact.background.density(RECORDED_BAND)
+    deviation = math.sqrt(density * contact.sample_rate / 2)
+    draws = np.random.default_rng(0).normal(scale=deviation, size=(PEAK_DRAWS, len(force)))
+    higher = [record_force(force + noise, contact.sample_rate).max() for noise in draws]
+    excess = max(float(np.mean(higher) - low.max()), 0.0)
+    variance = density * min(RECORDED_BAND, contact.sample_rate / 2) + excess**2
     variance += contact.covariance[place, place]
-    return Estimate(float(low.max()), math.sqrt(variance))
+    return Estimate(float(low.max()) - excess, math.sqrt(variance))
 
 
 def _noise(contact: Contact) -> Noise:

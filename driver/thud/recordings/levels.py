@@ -10,7 +10,6 @@ import numpy as np
 
 from thud.checks import refuse, require_choice
 from thud.levels import force_exposure_levels, get_bands
-from thud.recordings.background import noise_energies
 from thud.recordings.bank import filter_levels
 from thud.recordings.low_pass import attenuation, low_pass_force
 from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
@@ -24,18 +23,16 @@ if TYPE_CHECKING:
     from thud.recordings.estimates import Drop
 
 METHODS = ("exact", "fft", "filter")
-# Level above the background, dB, below which a level is only an upper bound, and up to which the
-# background is subtracted (ISO 10140-4, ISO 16283-2).
+# Level above the background, dB, below which a level is only an upper bound, and below which the
+# standards demand the correction (ISO 10140-4, ISO 16283-2).
 BACKGROUND = (6.0, 15.0)
-# Minimum of the silence that the gate holds before and after the contact, s: what the low-pass
-# spreads beyond it moves no octave by more than 2e-4 dB at 8 kHz and above, 3e-3 dB below.
+# Silence on both sides of the gate for what the low-pass spreads, s: what lies beyond moves no
+# octave by more than 2e-4 dB at 8 kHz and above, 3e-3 dB below.
 MARGIN = 3e-3
-# Gates are rounded up to this, s, so that drops share the quadrature.
-STEP = 1e-3
 # dB per relative change of an energy.
 ENERGY_DECIBEL = 10 / math.log(10)
 # Contributions that differ from drop to drop, so that the scatter of drops shows them.
-WITHIN_REPEATABILITY = ("noise", "window")
+WITHIN_REPEATABILITY = ("noise",)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +44,17 @@ class LevelEstimate:
     name, bands, method : str
         Name of the drop, ``"octave"`` or ``"third"``, and how the levels were measured.
     level : ndarray, shape (n_band,)
-        Force exposure levels, dB; corrected for the background where `flag` says so.
+        Force exposure levels, dB, corrected for the background.
     uncertainty : ndarray, shape (n_band,)
         Combined standard uncertainty of `contributions`, dB.
     measured, background : ndarray, shape (n_band,)
         Levels before the correction, and the level of the noise over the same gate, dB.
     flag : ndarray of str, shape (n_band,)
-        ``""``; ``"corrected"``: 6 to 15 dB above the background, which was subtracted;
+        ``""``: more than 15 dB above the background; ``"corrected"``: 6 to 15 dB above it;
         ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
         the sample rate is too low for the band.
     contributions : dict of ndarray, shape (n_band,)
-        Standard uncertainties, dB: noise, window, method, filter, background.
+        Standard uncertainties, dB: noise, method, filter.
     steps : tuple of str
         What was done, a sentence each.
     """
@@ -92,11 +89,11 @@ class AverageLevels:
         Combined standard uncertainty, dB.
     flag : ndarray of str, shape (n_band,)
         As that of a drop, from the mean energies.
-    spread, standard_error : ndarray, shape (n_band,)
-        Standard deviation of the drops' levels, and of the average, dB; NaN for a single drop.
+    spread : ndarray, shape (n_band,)
+        Standard deviation of the drops' levels, dB; NaN for a single drop.
     contributions : dict of ndarray, shape (n_band,)
         Standard uncertainties of the average, dB. The repeatability, of ``n_drop - 1`` degrees of
-        freedom, holds noise and window, which differ from drop to drop, where it is known.
+        freedom, holds the noise, which differs from drop to drop, where it is known.
     outliers : tuple of Outlier
         Drops that differ from the others.
     """
@@ -110,7 +107,6 @@ class AverageLevels:
     uncertainty: NDArray[np.float64]
     flag: NDArray[np.str_]
     spread: NDArray[np.float64]
-    standard_error: NDArray[np.float64]
     contributions: dict[str, NDArray[np.float64]]
     outliers: tuple[Outlier, ...] = field(default=())
 
@@ -120,9 +116,9 @@ def measure_levels(
 ) -> LevelEstimate:
     """Return the levels of a drop, corrected for the background, with their uncertainty.
 
-    The force within a gate, the contact and at least 3 ms before and after it, is taken; outside,
-    it is zero. All methods read this force: ``"exact"`` its band energy, ``"fft"`` the 1 Hz bins of
-    a window of 1 s, ``"filter"`` the energy behind filters of class 1.
+    The force within the gate of the drop is taken; outside, it is zero. All methods read this
+    force: ``"exact"`` its band energy, ``"fft"`` the 1 Hz bins of a window of 1 s, ``"filter"`` the
+    energy behind filters of class 1. The expected energy of the noise is subtracted.
 
     Parameters
     ----------
@@ -138,24 +134,22 @@ def measure_levels(
     Raises
     ------
     InputError
-        Where the method or the bands are not known, or the contact time of the drop is not.
+        Where the method or the bands are not known.
     """
     require_choice("method", method, METHODS)
     force, steps = _gated(drop, low_pass=low_pass)
     rate, edges = drop.sample_rate, get_bands(bands)
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
-    noise, spread, shift = noise_energies(drop, force, bands)
+    bounds = zip(edges.lower, edges.upper, strict=True)
+    noise, deviation = np.array([drop.band_noise(*bound) for bound in bounds]).T
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(noise)
-    level, flag, left = _corrected(measured, background)
-    energy = 10 ** (level / 10)
+    level, flag = _corrected(measured, background)
     contributions = {
-        "noise": ENERGY_DECIBEL * spread / energy,
-        "window": ENERGY_DECIBEL * shift / energy,
+        "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
         "method": np.abs(measured - exact) / math.sqrt(3),
         "filter": attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
-        "background": left,
     }
     steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
     return LevelEstimate(
@@ -187,31 +181,26 @@ def average_levels(estimates: Sequence[LevelEstimate]) -> AverageLevels:
     energies = np.array([10 ** (e.measured / 10) for e in estimates])
     with np.errstate(divide="ignore"):
         background = 10 * np.log10(np.mean([10 ** (e.background / 10) for e in estimates], axis=0))
-    level, flag, left = _corrected(10 * np.log10(energies.mean(axis=0)), background)
+    level, flag = _corrected(10 * np.log10(energies.mean(axis=0)), background)
     unknown = np.full(level.shape, np.nan)
-    weights = energies / energies.sum(axis=0)
-    parts = {
-        name: np.array([e.contributions[name] for e in estimates]) for name in first.contributions
-    }
-    # Relative to the energy of the average, as the energies of the drops add.
-    contributions = {
-        name: np.sqrt(((weights * part) ** 2).sum(axis=0))
-        if name in WITHIN_REPEATABILITY
-        else (weights * part).sum(axis=0)
-        for name, part in parts.items()
-    }
-    contributions["background"] = left
-    error = unknown
+    weights = 10 ** (drops / 10)
+    weights /= weights.sum(axis=0)
+    contributions = {}
+    for name in first.contributions:
+        parts = weights * np.array([e.contributions[name] for e in estimates])
+        # Relative to the energy of the average, as the energies of the drops add.
+        own = name in WITHIN_REPEATABILITY
+        contributions[name] = np.sqrt((parts**2).sum(axis=0)) if own else parts.sum(axis=0)
     if count > 1:
-        deviation = energies.std(axis=0, ddof=1) / math.sqrt(count)
-        error = ENERGY_DECIBEL * deviation / 10 ** (level / 10)
+        error = energies.std(axis=0, ddof=1) / math.sqrt(count)
+        error *= ENERGY_DECIBEL / 10 ** (level / 10)
         contributions = {"repeatability": error, **contributions}
     counted = {
         n: c for n, c in contributions.items() if count == 1 or n not in WITHIN_REPEATABILITY
     }
     return AverageLevels(
         first.bands, first.method, tuple(e.name for e in estimates), drops, level, background,
-        _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown, error,
+        _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown,
         contributions, _level_outliers(estimates, drops),
     )  # fmt: skip
 
@@ -225,26 +214,16 @@ _DESCRIPTIONS = {
 
 
 def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Return the force of the contact with some silence, zero where not recorded, and the steps."""
-    contact, doubt = float(drop.contact_time), drop.contact_time.uncertainty
-    if not math.isfinite(contact) or contact <= 0:
-        refuse(f"{drop.name}: the contact time is not known", "a drop with one contact")
-    force, steps = drop.force, list[str]()
+    """Return the force of the gate, low-passed with some silence on both sides, and the steps."""
+    first, stop = drop.gate
+    force = drop.force[first:stop]
+    begin, end = 1e3 * drop.time[[first, stop - 1]]
+    steps = [f"gate: {begin:.1f} to {end:.1f} ms after first touch, zero outside"]
     if low_pass:
+        force = np.pad(force, math.ceil(MARGIN * drop.sample_rate))
         force, sentence = low_pass_force(force, drop.sample_rate)
         steps.append(sentence)
-    margin = max(MARGIN, 3 * doubt if math.isfinite(doubt) else MARGIN)
-    count = math.ceil(math.ceil((contact + 2 * margin) / STEP) * STEP * drop.sample_rate)
-    start = round(float((-margin - drop.time[0]) * drop.sample_rate))
-    gated = np.zeros(count)
-    source = slice(max(start, 0), max(min(start + count, len(force)), 0))
-    if drop.bounces:
-        later = math.floor((drop.bounces[0] - drop.time[0]) * drop.sample_rate)
-        source = slice(source.start, min(source.stop, later))
-    part = force[source]
-    gated[source.start - start : source.start - start + len(part)] = part
-    words = f"gate: {-1e3 * margin:.1f} to {1e3 * (count / drop.sample_rate - margin):.1f} ms"
-    return gated, (*steps, f"{words} after first touch, zero outside")
+    return force, tuple(steps)
 
 
 def _levels(
@@ -258,20 +237,17 @@ def _levels(
 
 def _corrected(
     measured: NDArray[np.float64], background: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.str_], NDArray[np.float64]]:
-    """Return levels corrected for the background, flags, and the correction not made, dB.
+) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
+    """Return levels corrected for the background, and flags.
 
-    Below 6 dB the correction is that at 6 dB. Above 15 dB there is none, as in the standards; the
-    correction left out, up to 0.14 dB, counts as an uncertainty.
+    Below 6 dB the correction is that at 6 dB. The standards ask for none above 15 dB; it is made
+    there too, up to 0.14 dB, as the measured energy is too large by that of the noise.
     """
     low, high = BACKGROUND
     above = measured - background
-    correction = -10 * np.log10(1 - 10 ** (-np.maximum(above, low) / 10))
-    made = above <= high
-    level = measured - np.where(made, correction, 0.0)
-    flag = np.where(above < low, "background", np.where(made, "corrected", ""))
-    flag = np.where(np.isnan(measured), "rate", flag)
-    return level, flag, np.where(made, 0.0, correction)
+    level = measured + 10 * np.log10(1 - 10 ** (-np.maximum(above, low) / 10))
+    flag = np.where(above < low, "background", np.where(above <= high, "corrected", ""))
+    return level, np.where(np.isnan(measured), "rate", flag)
 
 
 def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
@@ -299,9 +275,7 @@ def _level_outliers(
     """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
     nominal = get_bands(estimates[0].bands).nominal
     names = [e.name for e in estimates]
-    own = np.array(
-        [np.hypot(e.contributions["noise"], e.contributions["window"]) for e in estimates]
-    )
+    own = np.array([e.contributions["noise"] for e in estimates])
     return tuple(
         outlier
         for band, middle in enumerate(nominal)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import cho_solve, lapack, solve_triangular
+from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
 if TYPE_CHECKING:
@@ -25,16 +26,19 @@ OFFSET = 1.0
 DRIFT = 0.1
 # Squared lag over mean squared length of two cells below which their covariance is exact.
 NEAR = 8.0
-# Fewer quiet cells than these do not tell the parts of the noise: draws of the variances, over
-# ranges of their size if each part were all of the fast changes of the cells. Slow noise and hum
-# may be much larger than fast changes show.
-FEW_CELLS = 60
-N_DRAW = 256
-RANGES = np.array([[1e-3, 3.0], [1e-3, 30.0], [1e-2, 300.0], [1e-2, 1e3], [1e-2, 1e3]])
-# Iterations of the likelihood, the change of its logarithm that ends them, and the largest
-# logarithm of a mean variance over the most likely one.
+# Priors of the logarithms of the variances: these powers of the variance, up to a deviation of a
+# quiet cell of this part of the peak force; falling beyond.
+SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
+LARGE = 0.03
+# Standard deviation of each quiet cell that is no noise, over the peak force: digits.
+DIGITS = 1e-6
+# Draws of the variances from their posterior, and those that are kept.
+N_DRAW = 64
+N_KEPT = 16
+# Degrees of freedom of the distribution that they are drawn from.
+FREEDOM = 5
+# Iterations of the posterior's maximum, and the change of its logarithm that ends them.
 MAX_ITERATIONS = 25
-MOST_DOUBT = 0.4
 TOLERANCE = 0.02
 
 
@@ -116,75 +120,112 @@ class Background:
 
     Attributes
     ----------
-    variances : ndarray, shape (5,)
-        Densities of white, pink and brown noise, N2/Hz, and variances of hum, N2.
+    quiet : Cells
+        Begins and ends of the quiet cells, s.
+    mean : ndarray, shape (n_cell,)
+        Their mean forces, N.
+    draws : ndarray, shape (n_draw, 5)
+        Draws of what the variances may be: densities of white, pink and brown noise, N2/Hz, and
+        variances of hum of 50 and of 60 Hz, N2. One where they are known.
     peak : float
         Scale of the priors of offset and drift, N.
     """
 
     quiet: Cells
     mean: NDArray[np.float64]
-    variances: NDArray[np.float64]
+    draws: NDArray[np.float64]
     peak: float
 
+    @property
+    def variances(self) -> NDArray[np.float64]:
+        """Mean of the draws."""
+        return np.asarray(self.draws.mean(axis=0), dtype=np.float64)
+
+    def density(self, frequency: float) -> tuple[float, float]:
+        """Return the density of the noise at a frequency, N2/Hz, and its standard deviation."""
+        draws = self.draws[:, :3] @ (1 / frequency ** np.arange(3))
+        return float(draws.mean()), float(draws.std())
+
     @cached_property
-    def _factor(self) -> NDArray[np.float64]:
-        """Return the factor of the covariance of the quiet cells."""
-        parts = covariances(self.quiet)
-        total = np.tensordot(self.variances, parts, 1) + self._trend(self.quiet, self.quiet)
-        return np.asarray(np.linalg.cholesky(total), dtype=np.float64)
+    def _factors(self) -> list[NDArray[np.float64]]:
+        """Return the factor of the covariance of the quiet cells for each draw."""
+        parts, fixed = covariances(self.quiet), _fixed(self.quiet, self.peak)
+        return [
+            np.asarray(np.linalg.cholesky(np.tensordot(draw, parts, 1) + fixed), dtype=np.float64)
+            for draw in self.draws
+        ]
+
+    @cached_property
+    def _weights(self) -> list[NDArray[np.float64]]:
+        """Return the inverse covariance of the quiet cells times their means for each draw."""
+        return [cho_solve((f, True), self.mean, check_finite=False) for f in self._factors]
 
     def predict(self, cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return the background of cells, N, and the covariance of its error, N2.
 
-        The covariance lacks the white noise of the cells themselves.
+        Both are those of the mixture of all draws. The covariance lacks the white noise of the
+        cells themselves.
         """
-        across = self._covariance(self.quiet, cells)
-        half = solve_triangular(self._factor, across, lower=True, check_finite=False)
-        mean = solve_triangular(self._factor, self.mean, lower=True, check_finite=False) @ half
-        return mean, self._covariance(cells, cells) - half.T @ half
+        across = noise_covariances(self.quiet, cells)
+        trend = _trend(self.quiet, cells, self.peak)
+        total = np.tensordot(self.variances[1:], noise_covariances(cells, cells), 1)
+        total += _trend(cells, cells, self.peak)
+        means = np.empty((len(self.draws), len(cells[0])))
+        for k, (draw, factor) in enumerate(zip(self.draws, self._factors, strict=True)):
+            one = np.tensordot(draw[1:], across, 1) + trend
+            half = solve_triangular(factor, one, lower=True, check_finite=False)
+            means[k] = self._weights[k] @ one
+            total -= half.T @ half / len(self.draws)
+        mean = means.mean(axis=0)
+        means -= mean
+        return mean, total + means.T @ means / len(self.draws)
 
     def predict_mean(self, cells: Cells) -> NDArray[np.float64]:
         """Return the background of cells, N."""
-        mean: NDArray[np.float64] = self._weights @ self._covariance(self.quiet, cells)
-        return mean
-
-    def _covariance(self, one: Cells, other: Cells) -> NDArray[np.float64]:
-        """Return the covariance of cells, without white noise."""
-        parts = noise_covariances(one, other)
-        total: NDArray[np.float64] = np.tensordot(self.variances[1:], parts, 1)
-        return total + self._trend(one, other)
-
-    def _trend(self, one: Cells, other: Cells) -> NDArray[np.float64]:
-        """Return the prior covariance of offset and drift."""
-        time = np.multiply.outer((one[0] + one[1]) / 2, (other[0] + other[1]) / 2)
-        return self.peak**2 * (OFFSET**2 + DRIFT**2 * time)
-
-    @cached_property
-    def _weights(self) -> NDArray[np.float64]:
-        """Return the inverse covariance of the quiet cells times their means."""
-        weights: NDArray[np.float64] = cho_solve(
-            (self._factor, True), self.mean, check_finite=False
-        )
-        return weights
+        across = noise_covariances(self.quiet, cells)
+        mean = np.mean(self._weights, axis=0) @ _trend(self.quiet, cells, self.peak)
+        for draw, weights in zip(self.draws, self._weights, strict=True):
+            mean += np.tensordot(draw[1:], weights @ across, 1) / len(self.draws)
+        return np.asarray(mean, dtype=np.float64)
 
     @property
     def drift(self) -> tuple[float, float]:
         """Drift, N/s, and its standard deviation."""
         prior = (self.peak * DRIFT) ** 2
         middle = (self.quiet[0] + self.quiet[1]) / 2
-        half = solve_triangular(self._factor, middle, lower=True, check_finite=False)
-        value = prior * float(middle @ self._weights)
-        return value, float(np.sqrt(max(prior - prior**2 * half @ half, 0)))
+        known = [
+            float(np.sum(solve_triangular(factor, middle, lower=True, check_finite=False) ** 2))
+            for factor in self._factors
+        ]
+        values = prior * np.array([middle @ weights for weights in self._weights])
+        variance = max(prior - prior**2 * float(np.mean(known)), 0.0) + float(values.var())
+        return float(values.mean()), float(np.sqrt(variance))
 
     @property
     def hum(self) -> tuple[float, float, float]:
         """Frequency of the stronger hum, Hz, its amplitude and the deviation of that, N."""
         k = int(np.argmax(self.variances[3:]))
         waves = _waves(self.quiet, MAINS[k])
-        part = self.variances[3 + k] * waves @ (waves.T @ self._weights)
+        part = (
+            waves
+            @ waves.T
+            @ np.mean(
+                [draw[3 + k] * w for draw, w in zip(self.draws, self._weights, strict=True)], axis=0
+            )
+        )
         noise = np.mean(self.variances[0] / 2 / (self.quiet[1] - self.quiet[0]))
         return MAINS[k], float(np.sqrt(2 * np.mean(part**2))), float(np.sqrt(2 * noise / len(part)))
+
+
+def _trend(one: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
+    """Return the prior covariance of offset and drift."""
+    time = np.multiply.outer((one[0] + one[1]) / 2, (other[0] + other[1]) / 2)
+    return np.asarray(peak**2 * (OFFSET**2 + DRIFT**2 * time), dtype=np.float64)
+
+
+def _fixed(cells: Cells, peak: float) -> NDArray[np.float64]:
+    """Return the covariance of quiet cells that no variance scales: offset, drift and digits."""
+    return _trend(cells, cells, peak) + (DIGITS * peak) ** 2 * np.eye(len(cells[0]))
 
 
 def covariances(cells: Cells) -> NDArray[np.float64]:
@@ -194,7 +235,7 @@ def covariances(cells: Cells) -> NDArray[np.float64]:
 
 
 def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Background:
-    """Return the background of the most likely noise, by average-information steps.
+    """Return the background with the variances that quiet cells allow, drawn from their posterior.
 
     Parameters
     ----------
@@ -206,102 +247,92 @@ def fit_background(quiet: Cells, mean: NDArray[np.float64], peak: float) -> Back
         Peak force, N.
     """
     parts = covariances(quiet)
-    middle = (quiet[0] + quiet[1]) / 2
-    trend = peak**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(middle, middle))
-    # Half of the size of fast changes, spread over all.
+    scale = np.array([np.mean(np.diagonal(parts[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
+    posterior = _Posterior(parts, _fixed(quiet, peak), mean, (LARGE * peak) ** 2 / scale)
+    # Half of the size of fast changes.
     adjoining = quiet[0][1:] - quiet[1][:-1] < 1e-3 * (quiet[1] - quiet[0])[1:]
     changes = np.diff(mean)[adjoining]
-    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (1e-5 * peak) ** 2
-    scale = np.array([np.mean(np.diagonal(parts[0])), 1.0, np.pi**2 * 0.02, 1.0, 1.0])
-    least = np.array([0.01, 1e-9, 1e-9, 1e-9, 1e-9]) * rough / scale
-    theta = np.array([rough, 0.1 * rough, 0.1 * rough, 0.05 * rough, 0.05 * rough]) / scale
-    value, score, information = _likelihood(theta, parts, trend, mean)
-    for _ in range(MAX_ITERATIONS):
-        # Steps in the logarithms: all variances stay positive.
-        gradient, curvature = score * theta, information * np.multiply.outer(theta, theta)
-        free = (theta > 2 * least) | (gradient > 0)
-        damping = 0.02 * np.trace(curvature) / 5 + 0.05
-        step = np.zeros(5)
-        step[free] = np.linalg.solve(
-            curvature[np.ix_(free, free)] + damping * np.eye(int(free.sum())), gradient[free]
-        )
-        step = np.clip(step, -3, 2)
-        for _halving in range(6):
-            trial = np.maximum(theta * np.exp(step), least)
-            result = _likelihood(trial, parts, trend, mean)
-            if result[0] >= value:
-                break
-            step /= 3
-        gain = result[0] - value
-        if gain < 0:
-            break
-        theta, (value, score, information) = trial, result
-        if gain < TOLERANCE:
-            break
-    curvature = information * np.multiply.outer(theta, theta)
-    doubt = np.linalg.inv(curvature + 0.05 * np.eye(5))
-    # The mean of a variance that is known to a factor is larger than its most likely value.
-    likely = theta * np.exp(np.minimum(0.5 * np.diagonal(doubt), MOST_DOUBT))
-    if len(mean) < FEW_CELLS:
-        likely = _mean_variances(likely, value, doubt, rough / scale, parts, trend, mean)
-    return Background(quiet, mean, likely, peak)
+    rough = (np.mean(changes**2) / 2 if changes.size else 0.0) + (DIGITS * peak) ** 2
+    first = np.log(rough * np.array([1, 0.1, 0.1, 0.05, 0.05]) / scale)
+    likely, curvature = posterior.maximum(first)
+    return Background(quiet, mean, np.exp(posterior.draw(likely, curvature)), peak)
 
 
-def _mean_variances(  # noqa: PLR0913, PLR0917 - what the likelihood is made of
-    likely: NDArray[np.float64],
-    value: float,
-    doubt: NDArray[np.float64],
-    rough: NDArray[np.float64],
-    parts: NDArray[np.float64],
-    trend: NDArray[np.float64],
-    mean: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Return the mean variances over their posterior: a short quiet cannot tell slow parts.
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """Posterior of the logarithms of the variances.
 
-    Even priors of the logarithms over RANGES; the most likely variances have the volume of their
-    doubt, the others are drawn over the whole of the ranges.
+    The covariance of the cells is linear in the variances. The priors rise with them, up to
+    `large`: a part that is absent is found to be small, not zero.
     """
-    low, high = np.log(RANGES * rough[:, None]).T
-    draws = np.exp(low + (high - low) * qmc.Sobol(5, seed=0).random(N_DRAW))
-    logarithms = [_logarithm(theta, parts, trend, mean) for theta in draws]
-    weight = np.exp(np.minimum(np.array(logarithms) - value, 20.0))
-    width = np.minimum(np.sqrt(2 * np.pi * np.diagonal(doubt)) / (high - low), 1.0)
-    own = N_DRAW * float(width.prod())
-    result: NDArray[np.float64] = (own * likely + weight @ draws) / (own + weight.sum())
-    return result
+
+    parts: NDArray[np.float64]
+    fixed: NDArray[np.float64]
+    mean: NDArray[np.float64]
+    large: NDArray[np.float64]
+
+    def logarithm(self, phi: NDArray[np.float64]) -> float:
+        """Return the logarithm of the posterior."""
+        theta = np.exp(phi)
+        factor, failed = lapack.dpotrf(np.tensordot(theta, self.parts, 1) + self.fixed, lower=True)
+        if failed:
+            return -np.inf
+        white = solve_triangular(factor, self.mean, lower=True, check_finite=False)
+        value = -np.log(np.diagonal(factor)).sum() - 0.5 * white @ white
+        return float(value + SLOPE @ phi - np.log1p(theta / self.large).sum())
+
+    def _derivatives(
+        self, phi: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the gradient, and the average information with that of the priors."""
+        theta = np.exp(phi)
+        factor, _ = lapack.dpotrf(np.tensordot(theta, self.parts, 1) + self.fixed, lower=True)
+        inverse = lapack.dpotri(factor, lower=True)[0]
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        weighted = inverse @ self.mean
+        turned = (self.parts @ weighted) * theta[:, None]
+        trace = theta * np.einsum("kij,ij->k", self.parts, inverse)
+        score = 0.5 * (turned @ weighted - trace) + SLOPE - theta / (theta + self.large)
+        # At the maximum, where the score is zero, that of the likelihood is the prior's slope.
+        return score, 0.5 * turned @ inverse @ turned.T + np.diag(SLOPE)
+
+    def maximum(self, phi: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the most likely logarithms from a first guess, and the curvature there."""
+        value = self.logarithm(phi)
+        score, curvature = self._derivatives(phi)
+        for _ in range(MAX_ITERATIONS):
+            step = np.clip(np.linalg.solve(curvature, score), -3, 2)
+            trial = self.logarithm(phi + step)
+            while trial < value and np.abs(step).max() > TOLERANCE:
+                step /= 3
+                trial = self.logarithm(phi + step)
+            if trial < value:
+                break
+            gain, phi, value = trial - value, phi + step, trial
+            score, curvature = self._derivatives(phi)
+            if gain < TOLERANCE:
+                break
+        return phi, curvature
+
+    def draw(
+        self, likely: NDArray[np.float64], curvature: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Return draws from the posterior, [N_KEPT, 5], by importance resampling."""
+        steps, logarithm = _student(len(likely))
+        # Rows x with covariance inverse(curvature) = inverse(L)' inverse(L).
+        lower = np.linalg.cholesky(curvature)
+        phi = likely + solve_triangular(lower, steps.T, lower=True, trans="T").T
+        weight = np.array([self.logarithm(one) for one in phi]) - logarithm
+        weight = np.exp(weight - weight.max())
+        places = (np.arange(N_KEPT) + 0.5) / N_KEPT * weight.sum()
+        return np.asarray(phi[np.searchsorted(weight.cumsum(), places)])
 
 
-def _logarithm(
-    theta: NDArray[np.float64],
-    parts: NDArray[np.float64],
-    trend: NDArray[np.float64],
-    mean: NDArray[np.float64],
-) -> float:
-    """Return the logarithm of the likelihood of variances."""
-    factor, failed = lapack.dpotrf(np.tensordot(theta, parts, 1) + trend, lower=True)
-    if failed:
-        return -np.inf
-    white = solve_triangular(factor, mean, lower=True, check_finite=False)
-    return float(-np.log(np.diagonal(factor)).sum() - 0.5 * white @ white)
-
-
-def _likelihood(
-    theta: NDArray[np.float64],
-    parts: NDArray[np.float64],
-    trend: NDArray[np.float64],
-    mean: NDArray[np.float64],
-) -> tuple[float, NDArray[np.float64], NDArray[np.float64]]:
-    """Return the logarithm of the likelihood, its gradient and its average information."""
-    total = np.tensordot(theta, parts, 1) + trend
-    factor, failed = lapack.dpotrf(total, lower=True)
-    if failed:
-        return -np.inf, np.zeros(5), np.eye(5)
-    inverse = lapack.dpotri(factor, lower=True)[0]
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
-    weighted = inverse @ mean
-    turned = parts @ weighted
-    value = -np.log(np.diagonal(factor)).sum() - 0.5 * mean @ weighted
-    trace = np.einsum("kij,ij->k", parts, inverse)
-    score = 0.5 * (turned @ weighted - trace)
-    information = 0.5 * turned @ inverse @ turned.T
-    return float(value), score, information
+@cache
+def _student(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return draws of Student's distribution, [N_DRAW, count], and their logarithmic density."""
+    points = qmc.Sobol(count + 1, seed=0).random(N_DRAW)
+    normal = ndtri(points[:, :-1])
+    draws = normal / np.sqrt(chdtri(FREEDOM, points[:, -1:]) / FREEDOM)
+    logarithm = -(FREEDOM + count) / 2 * np.log1p((draws**2).sum(axis=1) / FREEDOM)
+    return draws, logarithm

@@ -93,10 +93,6 @@ class Quantity:
         """Expanded uncertainty: value ± this holds the true value with 95 %."""
         return self.coverage_factor * self.uncertainty
 
-    def with_contributions(self, *more: Contribution) -> Quantity:
-        """Return the quantity with further contributions."""
-        return Quantity(self.value, (*self.contributions, *more), self.upper_bound)
-
 
 @dataclass(frozen=True)
 class Decision:
@@ -282,13 +278,14 @@ def level_quantities(
     calibration
         Relative standard uncertainty of the force; None where it is not known.
     plate : ndarray, shape (n_band,), optional
-        Standard uncertainty from the correction of the force plate, dB.
+        Standard uncertainty from the correction of the force plate, dB; zero where that of its
+        resonance is not stated.
     """
     count = len(levels.names)
     shared: dict[str, NDArray[np.float64]] = {}
     if calibration is not None:
         shared["calibration"] = np.full(len(levels.level), AMPLITUDE_DECIBEL * calibration)
-    if plate is not None:
+    if plate is not None and plate.any():
         shared["plate"] = plate
     return tuple(
         Quantity(
