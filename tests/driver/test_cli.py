@@ -119,7 +119,7 @@ def test_figures_of_the_paper(tmp_path: Path) -> None:
         "compression",
         *("figure2_force_history", "figure3_levels", "figure4_free_modes", "figure5_motion"),
         *("finite_element_force", "finite_element_levels", "loss_factor"),
-        *("modal_families", "momentum_flux"),
+        *("modal_families", "momentum_flux", "tyre_levels"),
     )
     drawn = sorted(path.name for path in (tmp_path / "drawn").iterdir())
     assert drawn == [f"{name}.{ending}" for name in names for ending in ("png", "svg")]
