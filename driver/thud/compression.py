@@ -77,7 +77,8 @@ def compress(
     """Press a ball slowly between two rigid plates without friction.
 
     Viscosity has relaxed: the force is that of the long-term modulus, which for Kelvin and Voigt's
-    law is the modulus of the ball, for Prony series less than its storage modulus.
+    law is the modulus of the ball, for Maxwell branches less than its storage modulus. A fractional
+    law, the default of finite elements, has here its modulus at about 1 Hz.
 
     Parameters
     ----------

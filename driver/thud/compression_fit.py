@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
-from scipy.stats import norm
 
 from thud._schema import Ball, Compression
 from thud.checks import require_array, require_real
 from thud.compression import CompressionCurve, compress
 from thud.display import Displayed
-from thud.errors import FitWarning, InputError
+from thud.errors import FitWarning, InputError, NumericalError
 from thud.key import check_keywords
 from thud.studies.fitting.inference import coverage_factor
+from thud.studies.fitting.residual_tests import runs_doubt
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 _POINTS = 81
 # Data that two parameters leave something of.
 _MIN_DATA = 5
-# Probability of the runs of the residuals below which they are no noise.
-_UNLIKELY = 1e-3
 _PARAMETERS = 2
 
 
@@ -41,7 +39,7 @@ class CompressionFit(Displayed):
     ----------
     youngs_modulus : float
         Modulus of elasticity, Pa: the storage modulus of materials with Maxwell branches, whose
-        long-term modulus the press finds.
+        long-term modulus the press finds; of a fractional law that is its modulus at about 1 Hz.
     touch : float
         Deflection at which the plates touch the ball, m.
     covariance : ndarray, shape (2, 2)
@@ -130,7 +128,8 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     InputError
         Where the data or the model cannot be used.
     NumericalError
-        Where the ball of the search cannot be pressed so far.
+        Where the ball of the search cannot be pressed so far, or the curve does not depend on the
+        modulus.
     """
     start = Ball() if ball is None else ball
     measured, wanted = _data(deflection, force)
@@ -157,6 +156,9 @@ def fit_compression(  # noqa: PLR0913 - as of `compress`
     bounds = ([-np.inf, -0.04], [np.inf, 0.9])
     first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, wanted)), 0.0])
     best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
+    if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
+        message = "the force of this model does not tell youngs_modulus; allowed: one that has it"
+        raise NumericalError(message)
     modulus = float(np.exp(best.x[0])) * start.youngs_modulus
     touch = float(measured[0] + best.x[1] * span)
     deviation = float(np.sqrt(best.fun @ best.fun / (len(wanted) - _PARAMETERS)))
@@ -220,15 +222,6 @@ def _doubts(
         found.append(
             "the first touch lies at the limit of the search: give data from first touch on"
         )
-    # Wald and Wolfowitz: the number of runs of one sign, approximately normal.
-    above = residuals > 0
-    runs = 1 + int(np.count_nonzero(above[1:] != above[:-1]))
-    high, low = int(above.sum()), int((~above).sum())
-    product, count = 2 * high * low, high + low
-    mean, square = product / count + 1, product * (product - count) / (count**2 * (count - 1))
-    if square > 0 and norm.cdf((runs - mean) / np.sqrt(square)) < _UNLIKELY:
-        found.append(
-            f"the residuals change their sign {runs - 1} times in {count} points: the model does "
-            "not explain the curve, and the intervals are too narrow"
-        )
+    if runs := runs_doubt(residuals):
+        found.append(f"{runs}: the model does not explain the curve")
     return found

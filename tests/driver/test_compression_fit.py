@@ -54,7 +54,9 @@ def test_fit_shows_its_numbers(measured: tuple[np.ndarray, np.ndarray]) -> None:
 def test_model_that_does_not_explain_the_curve_is_doubted(
     measured: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    with pytest.warns(thud.FitWarning, match="the model does not explain the curve, and the inter"):
+    with pytest.warns(
+        thud.FitWarning, match="change their sign .*: the model does not explain the curve"
+    ):
         fit = thud.fit_compression(*measured, START, "hollow_sphere")
     assert len(fit.warnings) == 1
 
@@ -85,3 +87,11 @@ def test_what_is_no_curve_is_refused(deflection: object, force: object, sentence
     with pytest.raises(thud.InputError) as caught:
         thud.fit_compression(deflection, values, START, MODEL)  # type: ignore[arg-type]
     assert sentence in str(caught.value)
+
+
+def test_modulus_of_a_spring_that_has_none_is_refused(
+    measured: tuple[np.ndarray, np.ndarray],
+) -> None:
+    spring = thud.HuntCrossley(stiffness=2e5)
+    with pytest.raises(thud.NumericalError, match="the force of this model does not tell youngs_"):
+        thud.fit_compression(*measured, START, spring)

@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 import thud
-from thud.studies.fitting import objective
+from thud.studies.fitting import misfit
 from thud.studies.fitting.inference import infer
 from thud.studies.fitting.ranges import with_values
 
@@ -286,7 +286,7 @@ def test_table_says_what_the_standard_deviations_are() -> None:
 
 
 def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = objective.compute
+    solve = misfit.compute
 
     def with_a_gap(case: thud.Case) -> thud.Impact:
         if 0.95e6 < case.ball.youngs_modulus < 1.1e6:
@@ -294,7 +294,7 @@ def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "compute", with_a_gap)
+    monkeypatch.setattr(misfit, "compute", with_a_gap)
     # The first step, of the length of the start, leads into the gap.
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 0.5e6})
     assert fit.failures
@@ -308,7 +308,7 @@ def test_one_parameter_far_from_its_start() -> None:
 
 
 def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = objective.compute
+    solve = misfit.compute
 
     def only_here(case: thud.Case) -> thud.Impact:
         if case.ball.youngs_modulus != 2e6:
@@ -316,7 +316,7 @@ def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch)
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "compute", only_here)
+    monkeypatch.setattr(misfit, "compute", only_here)
     with pytest.raises(thud.NumericalError, match=r"youngs_modulus: .* around 2e\+06 \(out of"):
         thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
 
@@ -337,7 +337,7 @@ def test_best_of_several_starts_counts() -> None:
 def test_start_around_which_the_model_fails_leaves_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    solve = objective.compute
+    solve = misfit.compute
 
     def below_or_here(case: thud.Case) -> thud.Impact:
         if case.ball.youngs_modulus > 1.95e6 and case.ball.youngs_modulus != 2e6:
@@ -345,7 +345,7 @@ def test_start_around_which_the_model_fails_leaves_the_others(
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "compute", below_or_here)
+    monkeypatch.setattr(misfit, "compute", below_or_here)
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6}, starts=4)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
@@ -369,3 +369,20 @@ def test_units_of_parameters_are_those_of_studies() -> None:
     np.testing.assert_allclose(fit.limits, [[1e6, 5e6]])
     table = {"youngs_modulus": {"start": 1.5, "low": 1, "high": 5, "unit": "MPa"}}
     assert quiet_fit(thud.solve(TRUTH), table).values == fit.values
+
+
+def test_contact_times_that_jump_hide_no_parameter() -> None:
+    # The end of the contact moves from ring to ring: here between two close moduli, by 1.5e-5 s.
+    model = thud.ModalBall(damping_law="rising", loss_factor=0.1889)
+    case = thud.Case(ball=thud.Ball(youngs_modulus=1.71513e6), model=model)
+    impact = thud.solve_case(case)
+    target = thud.LevelTarget(
+        impact.levels(force="floor").tolist(), 0.3, contact_time=(impact.exact_contact_time, 1e-4)
+    )
+    found = quiet_fit(target, {"youngs_modulus": 1.71513e6}, case)
+    # Of levels alone the error is larger.
+    alone = quiet_fit(replace(target, contact_time=None), {"youngs_modulus": 1.71513e6}, case)
+    assert not found.warnings
+    assert found.standard_errors["youngs_modulus"] < alone.standard_errors["youngs_modulus"]
+    expected = 2 * 1e-4 / impact.exact_contact_time * 1.71513e6
+    assert found.standard_errors["youngs_modulus"] < 1.3 * expected

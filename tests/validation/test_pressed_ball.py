@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
@@ -44,7 +47,7 @@ def test_thin_spheres_tend_to_reissner() -> None:
         stiffness = 8 * ball.youngs_modulus * wall**2
         stiffness /= ball.outer_radius * np.sqrt(12 * (1 - 0.3**2))
         fine = thud.ModalBall(static_harmonics=400, rings=133)
-        elements = thud.FiniteElement(radial_elements=4, polar_elements=256)
+        elements = thud.FiniteElement(radial_elements=4, polar_elements=256, viscosity="none")
         both = [
             thud.compress(ball, model, max_deflection=0.2 * wall, points=2).force[1]
             for model in (fine, elements)
@@ -63,7 +66,7 @@ def test_thin_spheres_tend_to_reissner() -> None:
     [
         (thud.ModalBall(static_harmonics=400, rings=133), 0.012),
         # Three to nine elements in the contact; twice as many halve the error.
-        (thud.FiniteElement(radial_elements=24, polar_elements=192), 0.02),
+        (thud.FiniteElement(radial_elements=24, polar_elements=192, viscosity="none"), 0.02),
     ],
     ids=["modal_ball", "finite_element"],
 )
@@ -85,9 +88,10 @@ def test_small_compression_of_a_solid_sphere_is_hertz_s(
 def test_linear_modes_and_elements_agree_at_small_deflections() -> None:
     # Large strain takes 0.5 % off the force for each millimetre, in proportion: extrapolated.
     ball = thud.Ball(poisson_ratio=0.49)
+    elements = thud.FiniteElement(polar_elements=192, viscosity="none")
     linear, large = (
         thud.compress(ball, model, max_deflection=8e-3, points=9, gas="adiabatic")
-        for model in (thud.ModalBall(), thud.FiniteElement(polar_elements=192))
+        for model in (thud.ModalBall(), elements)
     )
     difference = large.force[2:] / linear.force[2:] - 1
     slope, limit = np.polyfit(1e3 * linear.deflection[2:], difference, 1)
@@ -100,7 +104,32 @@ def test_large_compression_is_that_of_calculix() -> None:
     # (tests/bench/competitor_compression.py). Its last tenfold penalty has raised the forces by
     # 1.8, 1.6, 1.3, 1.0, 0.7, 0.4, 0.2 and 0.05 %: at 5 mm it is still too soft.
     reference = np.array([61.88, 153.00, 256.13, 366.98, 483.67, 604.62, 729.53, 856.59])
-    curve = thud.compress(thud.Ball(poisson_ratio=0.49), "finite_element", points=9)
+    elastic = thud.FiniteElement(viscosity="none")
+    curve = thud.compress(thud.Ball(poisson_ratio=0.49), elastic, points=9)
     np.testing.assert_allclose(curve.deflection[1:], 0.04 * EIGHTHS, rtol=1e-12)
     np.testing.assert_allclose(curve.force[2:], reference[1:], rtol=0.004)
     assert curve.force[1] == pytest.approx(reference[0], rel=0.02)
+
+
+@pytest.mark.parametrize("order", [0.15, 0.3, 0.5])
+@pytest.mark.parametrize(
+    ("elastic", "law"),
+    [
+        (thud.FiniteElement(radial_elements=4, polar_elements=16, viscosity="none"), "viscosity"),
+        (thud.ModalBall(damping_law="constant"), "damping_law"),
+    ],
+    ids=["finite_element", "modal_ball"],
+)
+def test_fractional_law_is_pressed_at_its_modulus_of_1_hz(
+    elastic: thud.FiniteElement | thud.ModalBall, law: str, order: float
+) -> None:
+    # Its series ends at 5 Hz; docs/compression.md says 2 %.
+    options: dict[str, Any] = {law: "fractional", "fractional_order": order}
+    slow = replace(elastic, loss_factor=0.2, loss_frequency=74.0, **options)
+    ball = thud.Ball(poisson_ratio=0.49)
+    forces = [
+        thud.compress(ball, model, max_deflection=1e-3, points=2).force[1]
+        for model in (slow, elastic)
+    ]
+    storage = 1 + 0.2 / np.tan(np.pi / 2 * order) * ((1 / 74) ** order - 1)
+    assert forces[0] / forces[1] == pytest.approx(storage, rel=0.02)

@@ -4,6 +4,7 @@
 !> x_k' = (q - x_k)/tau_k, the modulus being that of a spring g, Maxwell branches g_k and a viscosity.
 module thud_mode_step
    use thud_kinds, only: wp
+   use thud_matrix_exponential, only: get_exponential
    implicit none (type, external)
    private
 
@@ -62,30 +63,6 @@ contains
          step%factor(i, :, :) = rates
       end do
    end subroutine set_factors
-
-   !> Exponential of a matrix, by its series for a small part of it, and squares.
-   pure function get_exponential(matrix) result(exponential)
-      real(wp), intent(in) :: matrix(:, :)
-      !> The same shape.
-      real(wp) :: exponential(size(matrix, 1), size(matrix, 1))
-      real(wp) :: part(size(matrix, 1), size(matrix, 1))
-      ! Of a part with the norm 1/4 the rest of the series is 1e-18.
-      integer, parameter :: n_term = 12
-      integer :: i, k, n_square
-
-      n_square = max(0, exponent(maxval(sum(abs(matrix), dim=2))) + 2)
-      part = matrix/2.0_wp**n_square
-      exponential = 0.0_wp
-      do k = n_term, 0, -1
-         if (k < n_term) exponential = matmul(part, exponential)/(k + 1)
-         do i = 1, size(matrix, 1)
-            exponential(i, i) = exponential(i, i) + 1
-         end do
-      end do
-      do i = 1, n_square
-         exponential = matmul(exponential, exponential)
-      end do
-   end function get_exponential
 
    !> Motion of the modes a step on.
    pure subroutine advance(step, before, after)

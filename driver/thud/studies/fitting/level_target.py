@@ -13,6 +13,10 @@ from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
+# Relative step of the derivatives of a contact time: its end moves from ring to ring of the modal
+# ball, or from node to node, by 1e-3.
+CONTACT_STEP = 1e-2
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -105,6 +109,8 @@ class LevelMisfit(Misfit):
         self.known_noise = target.uncertainty is not None
         self.size = len(values)
         self.own = {}
+        if "contact_time" in extra:
+            self.step = CONTACT_STEP
 
     def values(self, impact: Impact) -> NDArray[np.float64]:
         """Return levels, dB, and what else is compared, s and 1, of an impact, shape (size,)."""

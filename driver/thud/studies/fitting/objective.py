@@ -19,11 +19,6 @@ if TYPE_CHECKING:
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 
-# Relative step of the central differences. The forces are smooth to 1e-13, but have kinks where a
-# sample enters or leaves the contact: 1e-3 would step over these, 1e-5 rarely does, and derivatives
-# are accurate to 1e-7 (with a rising loss factor, where contact is intermittent, to 3e-3).
-STEP = 2e-5
-
 
 @dataclass(frozen=True, eq=False)
 class Part:
@@ -106,8 +101,9 @@ class Objective:
         pairs = zip(self.parts, impacts, strict=True)
         return np.concatenate([p.misfit.residual(i, self.own(p, place)) for p, i in pairs])
 
-    def jacobian(self, place: NDArray[np.float64], step: float = STEP) -> NDArray[np.float64]:
-        """Return the derivatives of the residuals, shape (n_residual, n)."""
+    def jacobian(self, place: NDArray[np.float64], share: float = 1.0) -> NDArray[np.float64]:
+        """Return the derivatives of the residuals by a share of the step, (n_residual, n)."""
+        step = share * max(part.misfit.step for part in self.parts)
         here = self.residual(place)
         jacobian = np.zeros((len(here), len(place)))
         first = 0

@@ -20,7 +20,9 @@ def residual_doubts(residual: NDArray[np.float64], time: NDArray[np.float64]) ->
     """Return what the residuals of equally spaced times, s, show beside independent noise."""
     if len(residual) < MIN_TESTED:
         return []
-    return [told for told in (_colour(residual), _largest(residual, time), _runs(residual)) if told]
+    return [
+        told for told in (_colour(residual), _largest(residual, time), runs_doubt(residual)) if told
+    ]
 
 
 def _colour(residual: NDArray[np.float64]) -> str:
@@ -51,8 +53,8 @@ def _largest(residual: NDArray[np.float64], time: NDArray[np.float64]) -> str:
     )
 
 
-def _runs(residual: NDArray[np.float64]) -> str:
-    """Test the number of runs of one sign (Wald and Wolfowitz)."""
+def runs_doubt(residual: NDArray[np.float64]) -> str:
+    """Return that residuals have too few or many runs of one sign (Wald and Wolfowitz), or ""."""
     positive = residual > 0
     n, m = int(positive.sum()), int((~positive).sum())
     if not min(n, m):

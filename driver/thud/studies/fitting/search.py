@@ -22,7 +22,7 @@ from thud.studies.fitting.inference import (
     weak_sentence,
     worst_directions,
 )
-from thud.studies.fitting.objective import STEP, Objective, new_parts
+from thud.studies.fitting.objective import Objective, new_parts
 from thud.studies.fitting.residual_tests import UNLIKELY
 from thud.studies.fitting.result import Fit, FittedTarget
 from thud.units import handy_unit
@@ -147,7 +147,7 @@ def _conclude(
     if not impacts:
         raise NumericalError(str(objective.error))
     jacobian = objective.jacobian(place)
-    finer = objective.jacobian(place, STEP / 2)
+    finer = objective.jacobian(place, 0.5)
     parts, count = objective.parts, objective.count
     misfits = [part.misfit for part in parts]
     target_size = float(np.linalg.norm(np.concatenate([m.target_vector() for m in misfits])))
