@@ -63,8 +63,6 @@ def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
             "the force on the floor, positive in compression (change its sign)",
         )
     if force.max() > LARGEST_FORCE:
-        refuse(
-            f"{name}: the force has a peak of {force.max():.4g} N", f"up to {LARGEST_FORCE:g} N"
-        )
+        refuse(f"{name}: the force has a peak of {force.max():.4g} N", f"up to {LARGEST_FORCE:g} N")
     even = np.asarray(begin + np.arange(rows) * step, dtype=np.float64)
     return Record(even, force.copy(), 1 / step)
