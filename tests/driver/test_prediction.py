@@ -47,6 +47,18 @@ def test_executable_and_python_predict_the_same(
     assert float(shown[2]) == pytest.approx(found.rating.a_weighted, abs=0.006)
 
 
+@pytest.mark.parametrize(("thickness", "told"), [(0.02, True), (0.2, False)])
+def test_executable_tells_of_a_floor_that_gives_way(
+    run: Callable[..., subprocess.CompletedProcess[str]],
+    case_file: Callable[[str], Path],
+    thickness: float,
+    told: bool,  # noqa: FBT001 - one of two cases
+) -> None:
+    done = run(case_file(ROOM_CASE.replace("0.2", f"{thickness}")), "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert ("gives way" in done.stdout) == told
+
+
 def test_energy_is_that_of_an_infinite_plate(impact: thud.Impact) -> None:
     found = thud.predict_level(impact, thud.Floor(), thud.Room())
     resistance = 8 / np.sqrt(12) * 2300 * 3500 * 0.18**2
