@@ -205,12 +205,20 @@ def _data(
 def _ratio(
     curve: CompressionCurve, measured: NDArray[np.float64], wanted: NDArray[np.float64]
 ) -> float:
-    """Return the factor that brings the work of a curve to the measured one."""
+    """Return the factor that brings the work of a curve to the measured one.
+
+    Raise InputError where the model has no force at such deflections.
+    """
     work = float(np.trapezoid(wanted, measured))
     shown = np.interp(measured - measured[0], curve.deflection, curve.force)
-    return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / float(
-        np.trapezoid(shown, measured)
-    )
+    model_work = float(np.trapezoid(shown, measured))
+    if not model_work > 0:
+        message = (
+            f"deflection spans {np.ptp(measured):g} m, where the model shows no force; "
+            "allowed: a ball that is pressed by millimetres"
+        )
+        raise InputError(message)
+    return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / model_work
 
 
 def _doubts(

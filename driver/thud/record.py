@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 # Minimum number of samples.
 MIN_ROWS = 8
+# No source of impacts comes near it, and its square is a number yet, N.
+LARGEST_FORCE = 1e12
 
 
 class Record(NamedTuple):
@@ -60,5 +62,7 @@ def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
             f"{name}: the force is mostly negative, {force.min():.4g} to {force.max():.4g} N",
             "the force on the floor, positive in compression (change its sign)",
         )
+    if force.max() > LARGEST_FORCE:
+        refuse(f"{name}: the force has a peak of {force.max():.4g} N", f"up to {LARGEST_FORCE:g} N")
     even = np.asarray(begin + np.arange(rows) * step, dtype=np.float64)
     return Record(even, force.copy(), 1 / step)

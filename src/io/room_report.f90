@@ -15,6 +15,10 @@ module thud_room_report
    !> Width of a column of the table.
    integer, parameter :: column = 13
 
+   !> Resistance of a floor times contact time over mass of the source above which the peak of the force loses less than
+   !> 0.1 dB by the floor: of a linear source it loses exp(-pi**2 mass/(4 resistance contact_time)).
+   real(wp), parameter :: firm = 214.0_wp
+
 contains
 
    !> Level and what it is made of, per third.
@@ -40,9 +44,11 @@ contains
    end subroutine get_room_csv
 
    !> The levels for the screen; thirds of few modes are marked.
-   subroutine get_room_table(case, prediction, text)
+   subroutine get_room_table(case, prediction, contact_time, text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
+      !> Contact time of the impact, s.
+      real(wp), intent(in) :: contact_time
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=1) :: mark
@@ -61,6 +67,8 @@ contains
       if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
          //fixed(few_modes, 0)//' modes, where single rooms and positions differ by several dB.'
       text = text//newline
+      if (contact_time*get_resistance(case%floor) < firm*case%ball%mass) text = text &
+         //'  The floor gives way under the source, and the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 
    !> A text of a column's width.

@@ -177,7 +177,7 @@ contains
          outcome%conforms = is_conforming(case, verdict)
          outcome%table = outcome%table//newline//get_table(case, history, verdict)
          if (case%has_room) then
-            call get_room_table(case, results%room, room_table)
+            call get_room_table(case, results%room, history%contact_time, room_table)
             outcome%table = outcome%table//newline//room_table
          end if
          outcome%table = outcome%table//get_defaults_line(case)

@@ -94,6 +94,7 @@ def test_columns_are_read_whatever_is_between(line: str, head: str, tmp_path: Pa
         ("".join(f"{-i},1\n" for i in range(9)), "times rise by -1 s"),
         ("".join("0,1\n" for _ in range(9)), "times rise by 0 s"),
         ("".join(f"{i},0\n" for i in range(9)), "nowhere positive"),
+        ("".join(f"{i},1e200\n" for i in range(9)), "peak of 1e\\+200 N"),
     ],
 )
 def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -42,6 +43,22 @@ def test_example_of_iso_717_2_is_rated() -> None:
     assert found.a_weighted == pytest.approx(55.3507, abs=1e-4)
     assert found.curve == 51
     assert found.korean_class == 0
+
+
+@pytest.mark.parametrize("level", [1e308, -1e308, 1e5])
+def test_levels_that_are_none_are_not_rated(level: float) -> None:
+    """1e308 dB went on for ever, 1e5 dB had the best class."""
+    with pytest.raises(thud.InputError, match=r"levels = .*; allowed: -1000 to 1000 dB"):
+        thud.rating([70.0, 70.0, 70.0, level])
+
+
+@pytest.mark.parametrize("title", ["frequency (kHz)", "T20 (ms)", "mean_Pa"])
+def test_columns_of_another_unit_are_refused(tmp_path: Path, title: str) -> None:
+    """50 ms were read as 50 s."""
+    titles = {"f": "frequency", "T": "T20", "m": "mean"} | {title[0]: title}
+    lines = [";".join(titles.values())] + [f"{f};0.5;70" for f in OCTAVES]
+    with pytest.raises(thud.InputError, match=f"'{re.escape(title)}' is not in "):
+        thud.read_room_levels(write(tmp_path, "\n".join(lines)))
 
 
 def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:

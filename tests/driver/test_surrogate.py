@@ -282,6 +282,14 @@ def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:
     for name in ("damaged.npz", "pickle.npz", "missing.npz"):
         with pytest.raises(thud.InputError, match=rf"{name} (cannot be read|is damaged)"):
             thud.read_surrogate(tmp_path / name)
+    for parts in (
+        {"weights": trained.weights[:3]}, {"mean": trained.mean + np.inf}, {"identity": {}},
+        {"region": trained.region[:, ::-1]}, {"bound": "wide"}, {"outputs": {}},
+        {"residuals": trained.residuals[:0]},
+    ):  # fmt: skip
+        replace(trained, **parts).save(tmp_path / "foreign.npz")
+        with pytest.raises(thud.InputError, match=r"foreign.npz (cannot be read|is damaged)"):
+            thud.read_surrogate(tmp_path / "foreign.npz")
     changed = replace(trained, mean=trained.mean + 0.1)
     assert changed.digest != trained.digest
 

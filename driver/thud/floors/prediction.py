@@ -200,12 +200,17 @@ def _force_change(mass: float, contact_time: float, resistance: float) -> float:
     """Return the change of the peak force on a resistance, dB, of a linear source.
 
     F'' + (k/Z) F' + (k/M) F = 0 with F(0) = 0 and F'(0) = k v0: against the rigid floor the peak is
-    exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2.
+    exp(-b arctan(w/b)/w), b = k/(2 Z), w**2 = k/M - b**2; of a floor so light that the force does
+    not swing, exp(-b artanh(w/b)/w) with w**2 = b**2 - k/M.
     """
     stiffness = mass * (math.pi / contact_time) ** 2
     decay = stiffness / (2 * resistance)
     square = stiffness / mass - decay**2
-    if not square > 0:
-        return -math.inf
-    rate = math.sqrt(square)
-    return -20 / math.log(10) * decay / rate * math.atan2(rate, decay)
+    rate = math.sqrt(abs(square))
+    # ln((b + w)/(b - w))/2 without cancellation: b**2 - w**2 = k/M.
+    angle = (
+        math.atan2(rate, decay)
+        if square > 0
+        else math.log((decay + rate) / math.sqrt(stiffness / mass))
+    )
+    return -20 / math.log(10) * (decay / rate * angle if rate > 0 else 1.0)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from thud._schema import BandSet
 
+# Levels beyond it, dB, are none of sound.
+LARGEST_LEVEL = 1000.0
 # Words of the Korean classes.
 CLASSES = ("none", "1", "2", "3", "4")
 
@@ -93,7 +95,7 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     Raises
     ------
     InputError
-        Where there are levels of other bands, or one is not finite.
+        Where there are levels of other bands, or one is not a level of sound.
 
     Examples
     --------
@@ -108,6 +110,9 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
             f"levels have the shape {values.shape}",
             f"{frequencies.shape}, the {bands}s {frequencies[0]:g} to {frequencies[-1]:g} Hz",
         )
+    wild = values[abs(values) > LARGEST_LEVEL]
+    if wild.size:
+        refuse_value("levels", float(wild[0]), f"{-LARGEST_LEVEL:g} to {LARGEST_LEVEL:g} dB")
     total, rounded, grade, curve = call_direct(level_api.rate, bands, values)
     has_classes = bands == BANDWIDTHS[0]
     return Rating(

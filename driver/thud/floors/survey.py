@@ -47,6 +47,9 @@ ALLOWED = (
     "more positions, and where they are known the columns background, dB, and "
     "reverberation_time, s"
 )
+# Units in which the columns are read, and what stands in a title where another is meant.
+UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
+OTHERS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
 # Levels and times beyond these are mistyped.
 LEVELS, TIMES = (-50.0, 200.0), (0.01, 100.0)
 
@@ -235,7 +238,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     titles, table = read_titled(path, ALLOWED)
     if len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", ALLOWED)
-    kinds = [TITLES.get(_plain(title), "level") for title in titles]
+    kinds = [_kind(title, path) for title in titles]
     columns: dict[str, NDArray[np.float64]] = {}
     for kind in ("frequency", "background", "time"):
         if kinds.count(kind) > 1:
@@ -299,6 +302,14 @@ def rating_table(found: RoomLevels) -> list[tuple[str, ...]]:
         # The classes are meant for levels in the room.
         rows[2:3] = [(*row[:2], "") for row in rows[2:3]]
     return rows
+
+
+def _kind(title: str, path: object) -> str:
+    """Return what a column holds; raise InputError where its title has another unit."""
+    kind = TITLES.get(_plain(title), "level")
+    if OTHERS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
+        refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
+    return kind
 
 
 def _plain(title: str) -> str:

@@ -262,6 +262,33 @@ class Surrogate(Displayed):
         return found | verdicts | {"status": status, "reason": reasons}
 
     @property
+    def is_whole(self) -> bool:
+        """Whether its parts fit together, and what is judged has numbers."""
+        drops, keys, numbers = len(self.points), len(self.keys), sum(self.outputs.values())
+        shapes = {
+            "region": (keys, 2), "points": (drops, keys), "length": (keys,),
+            "weights": (drops, numbers), "mean": (numbers,), "scale": (numbers,),
+            "residuals": (drops, numbers),
+        }  # fmt: skip
+        if any(getattr(self, name).shape != shape for name, shape in shapes.items()):
+            return False
+        low, high = self.region.T
+        known = (self.points, self.length, *(
+            getattr(self, name)[..., self.judged] for name in ("weights", "mean", "residuals")
+        ))  # fmt: skip
+        return bool(
+            drops > 0
+            and self.judged.any()
+            and (low <= high).all()
+            and (self.length > 0).all()
+            and all(np.isfinite(part).all() for part in known)
+            and self.bound > 0
+            and self.peaks == int(self.peaks)
+            and self.case.model
+            and "thud" in self.identity
+        )
+
+    @property
     def _header(self) -> str:
         return json.dumps(
             {
@@ -324,10 +351,13 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
         header["case"] = Case.from_text(header["case"])
         header["keys"] = tuple(header["keys"])
         found = Surrogate(**header, **arrays)
-        intact = found.digest == digest
+        intact = found.digest == digest and found.is_whole
     except Exception as error:  # noqa: BLE001 - zip, NumPy and JSON raise many kinds
         reason = getattr(error, "strerror", None) or "no surrogate"
         refuse(f"{path} cannot be read: {reason}", "a file that Surrogate.save wrote", error)
     if not intact:
-        refuse(f"{path} is damaged: wrong checksum", "a file that Surrogate.save wrote")
+        refuse(
+            f"{path} is damaged: wrong checksum, shapes or numbers",
+            "a file that Surrogate.save wrote",
+        )
     return found
