@@ -386,3 +386,10 @@ def test_contact_times_that_jump_hide_no_parameter() -> None:
     assert found.standard_errors["youngs_modulus"] < alone.standard_errors["youngs_modulus"]
     expected = 2 * 1e-4 / impact.exact_contact_time * 1.71513e6
     assert found.standard_errors["youngs_modulus"] < 1.3 * expected
+
+
+def test_record_of_too_many_values_is_refused_before_it_takes_the_memory() -> None:
+    time = np.arange(100_000) / 1e4
+    target = thud.ForceTarget((time, np.exp(-((time - 5) ** 2) / 1e-5)), window=(0.0, 10.0))
+    with pytest.raises(thud.InputError, match="are 25000 values; allowed: up to 8000: a shorter"):
+        thud.fit(target, ["youngs_modulus"])

@@ -42,6 +42,8 @@ SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
+# Values that are compared at most: their covariances take memory with the square of it, 2 GB.
+MAX_COMPARED = 8000
 # A comparison of contact and quiet needs this many independent values of each, and any test a
 # residual above this part of the peak force, which exceeds sampling errors.
 MIN_FREEDOM = 5
@@ -120,6 +122,11 @@ class ForceTarget:
             refuse(
                 f"target: below = {self.below} is not allowed",
                 f"{2 / len(time) * rate:g} <= below < {rate / 2:g} Hz",
+            )
+        if (count := 2 * self.below * len(time) / rate) > MAX_COMPARED:
+            refuse(
+                f"target: {len(time) / rate:g} s up to {self.below:g} Hz are {count:.0f} values",
+                f"up to {MAX_COMPARED}: a shorter window, or a lower frequency in below",
             )
         low = np.quantile(force, 0.1)
         last = (force[time > time[-1] - END].mean() - low) / (force.max() - low)
