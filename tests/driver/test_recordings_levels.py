@@ -73,7 +73,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         gate=gate,
         contact_time=release,
         restitution=Estimate.unknown(),
-        restitution_calibration=0.0,
+        restitution_shared={},
         restitution_by="",
         restitutions={},
         peak_force=Estimate(1500, 0),

@@ -31,7 +31,7 @@ GROWTH = 0.15
 CONTACT_CELL = 2e-4
 # The gate of the levels reaches this many samples beyond the contact, and more at low rates,
 # whose anti-aliasing filter comes close to the octave of 500 Hz: (GATE_RATE/rate)2 more.
-GATE_SAMPLES = 4
+GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
@@ -66,10 +66,10 @@ class Contact:
         Maximum sample less the offset, N: a scale.
     span : tuple of int
         First sample of the part with its background removed, and the one behind it.
-    force, under : ndarray, shape (span[1] - span[0],)
-        Force of the part, and the background that was removed from it, N.
-    offset : float
-        Mean background that was removed from the gate, N.
+    force : ndarray, shape (span[1] - span[0],)
+        Force of the part, N.
+    under : ndarray, shape (span[1] - span[0],)
+        Background that was removed, N.
     gate : tuple of int
         First sample of the contact with its margins, and the one behind it.
     covariance : ndarray, shape (n_cell, n_cell)
@@ -88,7 +88,6 @@ class Contact:
     span: tuple[int, int]
     force: NDArray[np.float64]
     under: NDArray[np.float64]
-    offset: float
     gate: tuple[int, int]
     covariance: NDArray[np.float64]
     quiet: tuple[float, float]
@@ -186,7 +185,6 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
         span,
         force[slice(*span)] - under,
         under,
-        float(under[gate[0] - span[0] : gate[1] - span[0]].mean()),
         gate,
         covariance,
         (left / rate, (len(force) - right) / rate),

@@ -49,6 +49,8 @@ class Drop:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
+    time : ndarray, shape (n,)
+        Time since first touch, s.
     force : ndarray, shape (n,)
         Force without offset, drift, hum and slow noise, N.
     sample_rate : float
@@ -77,6 +79,7 @@ class Drop:
     """
 
     name: str
+    time: NDArray[np.float64]
     force: NDArray[np.float64]
     sample_rate: float
     onset: float
@@ -94,11 +97,6 @@ class Drop:
     steps: tuple[str, ...]
     remarks: tuple[str, ...]
     contact: Contact
-
-    @property
-    def time(self) -> NDArray[np.float64]:
-        """Time since first touch, s, shape (n,)."""
-        return np.arange(*self.contact.span) / self.sample_rate - self.contact.touch.value
 
     def band_noise(self, lower: float, upper: float) -> tuple[float, float]:
         """Return the expected energy of the noise of the gate in a band, and a deviation, N2 s.
@@ -199,9 +197,11 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     )
     ways, told = fall.restitutions(impulse, contact_time, flights)
     restitution, shared = fall.mean(ways, impulse)
+    time = (np.arange(*contact.span)) / rate - touch.value
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
         name=window.name,
+        time=time,
         force=contact.force,
         sample_rate=rate,
         onset=window.start / rate + touch.value,
@@ -278,7 +278,9 @@ def _noise(contact: Contact) -> Noise:
 
 def _told_background(contact: Contact) -> tuple[str, ...]:
     """Return what was removed, a sentence each."""
-    steps = [f"an offset of {contact.offset:.3g} N was removed"]
+    first, stop = (place - contact.span[0] for place in contact.gate)
+    offset = float(contact.under[first:stop].mean())
+    steps = [f"an offset of {offset:.3g} N was removed"]
     drift, deviation = contact.background.drift
     if abs(drift) > NOTABLE * deviation:
         steps.append(f"a drift of {drift:.3g} N/s was removed")
