@@ -2,8 +2,9 @@
 
 .venv/bin/python inputs/studies/make_heights.py
 
-writes fit_height_*.csv: the force of the ball of inputs/rubber_ball_fe.nml from three heights, with
-40 ms of quiet on each side, pink noise and an offset; the calibration of one of them is off.
+writes fit_height_*.csv: the force of the ball of inputs/rubber_ball_fe_viscous.nml from three
+heights, with 40 ms of quiet on each side, pink noise and an offset; the calibration of one of them
+is off.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ QUIET = 0.04  # s
 NOISE = 5.0  # N, pink from 1 Hz on
 # Height, m; offset, N; gain.
 DROPS = ((0.1, 3.0, 1.0), (1.0, -7.0, 1.006), (1.6, 12.0, 1.0))
-TRUTH = Path(__file__).parents[1] / "rubber_ball_fe.nml"
+TRUTH = Path(__file__).parents[1] / "rubber_ball_fe_viscous.nml"
 
 
 def pink(count: int, rate: float, random: np.random.Generator) -> np.ndarray:
