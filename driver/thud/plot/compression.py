@@ -50,7 +50,6 @@ def _draw_models() -> Figure:
     ball = Ball(poisson_ratio=0.49)
     models = {"shell": "hollow_sphere", "modal ball": "modal_ball"}
     curves = {name: compress(ball, model) for name, model in models.items()}  # type: ignore[arg-type]
-    elements = FiniteElement(viscosity="kelvin_voigt")
     for gas in ("vented", "adiabatic"):
         elements = FiniteElement(viscosity="none")
         curves[f"finite elements, {gas}"] = compress(ball, elements, gas=gas)

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from thud._schema import BandSet, LevelsForce
     from thud.impact import Impact
 
-# Part of the peak at which the force that falls is read off for derivatives of the contact time.
-FALLEN = 2e-3
-
 
 @dataclass(frozen=True, eq=False)
 class LevelTarget:
@@ -125,21 +122,6 @@ class LevelMisfit(Misfit):
         """Return model minus target over standard deviation, shape (size,)."""
         return (self.values(impact) - self.target) / self.deviation
 
-    def smooth_residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the residual with the time of a low force for that of release, shape (size,).
-
-        Models whose contact ends on a step of their samples release in stairs. The last force
-        falls through a level between samples: that time moves with the parameters as the release
-        does, and evenly.
-        """
-        residual = self.residual(impact, own)
-        self.steps = self.steps or impact.exact_contact_time != impact.contact_time
-        if self.steps and "contact_time" in self.extra:
-            place = len(self.places) + self.extra.index("contact_time")
-            time = _fallen(impact)
-            residual[place] = (time - self.target[place]) / self.deviation[place]
-        return residual
-
     def target_vector(self) -> NDArray[np.float64]:
         """Return the target over standard deviation, shape (size,)."""
         return self.target / self.deviation
@@ -160,14 +142,3 @@ class LevelMisfit(Misfit):
             "model": model.tolist(),
             "residual": (model - self.target).tolist(),
         }
-
-
-def _fallen(impact: Impact) -> float:
-    """Return the time from first touch to the end of all but `FALLEN` of the peak force, s."""
-    release = (impact.touch_time + impact.contact_time) * impact.sample_rate
-    force = impact.floor_force[: int(release) + 3]
-    level = FALLEN * force.max()
-    last = int(np.flatnonzero(force > level)[-1])
-    after = force[last + 1] if last + 1 < len(force) else 0.0
-    part = (force[last] - level) / (force[last] - after)
-    return float((last + part) / impact.sample_rate - impact.touch_time)

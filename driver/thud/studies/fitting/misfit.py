@@ -76,10 +76,6 @@ class Misfit(ABC):
     def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return model minus target over standard deviation, shape (size,)."""
 
-    def smooth_residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return what has the derivatives of the residual without its stairs, shape (size,)."""
-        return self.residual(impact, own)
-
     @abstractmethod
     def target_vector(self) -> NDArray[np.float64]:
         """Return the target over standard deviation, shape (size,)."""

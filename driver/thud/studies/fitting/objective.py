@@ -95,15 +95,11 @@ class Objective:
 
     def residual(self, place: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the residuals of a place; infinite where there is no impact."""
-        return self._compared(place, "residual")
-
-    def _compared(self, place: NDArray[np.float64], method: str) -> NDArray[np.float64]:
-        """Return what a method of the misfits tells of a place; infinite without impact."""
         impacts = self.impacts(place)
         if not impacts:
             return np.full(sum(part.misfit.size for part in self.parts), np.inf)
         pairs = zip(self.parts, impacts, strict=True)
-        return np.concatenate([getattr(p.misfit, method)(i, self.own(p, place)) for p, i in pairs])
+        return np.concatenate([p.misfit.residual(i, self.own(p, place)) for p, i in pairs])
 
     def jacobian(self, place: NDArray[np.float64], share: float = 1.0) -> NDArray[np.float64]:
         """Return the derivatives of the residuals by a share of the step, (n_residual, n)."""
@@ -129,7 +125,7 @@ class Objective:
         for beside in (min(place[i] + step, self.high[i]), max(place[i] - step, self.low[i])):
             other = place.copy()
             other[i] = beside
-            value = self._compared(other, "smooth_residual")
+            value = self.residual(other)
             possible = np.isfinite(value).all()
             ends.append((beside, value) if possible else (place[i], here))
         (above, high), (below, low) = ends
