@@ -145,7 +145,7 @@ BAD_CASES = {
     "no group": ("! nothing\n", "there is no namelist group"),
     "unterminated group": ("&ball /\n&drop\n&model /", "&drop in line 2 is not terminated"),
     "unterminated last group": ("&ball /\n&drop /\n&model", "&model in line 3 is not terminated"),
-    "unknown group": (f"{MINIMAL}&floor /", "&floor in line 4 is not a known group"),
+    "unknown group": (f"{MINIMAL}&walls /", "&walls in line 4 is not a known group"),
     "unknown key": (f"{MINIMAL}&sampling rate = 1 /", "&sampling: rate in line 4 is not a known"),
     "wrong type": ("&ball mass = 'heavy' / &drop / &model /", "&ball: mass = 'heavy' is not a num"),
     "two values": ("&ball mass = 1 2 / &drop / &model /", "&ball: mass = 1 2 is not a number"),

@@ -64,7 +64,8 @@ def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
     assert figure.get_figwidth() == pytest.approx(3.5)
     assert_clean(figure)
     words = " ".join(texts(figure))
-    for label in (axes.get_ylabel() for axes in figure.axes):
+    # Plates press with one force.
+    for label in (axes.get_ylabel() for axes in figure.axes if name != "compression"):
         if "orce" in label or "evel" in label:
             assert "force on the floor" in words.lower() or "elastic force" in words.lower()
 
