@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 import thud
-from thud.studies.fitting import objective
+from thud.studies.fitting import misfit
 from thud.studies.fitting.inference import infer
 from thud.studies.fitting.ranges import with_values
 
@@ -286,7 +286,7 @@ def test_table_says_what_the_standard_deviations_are() -> None:
 
 
 def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = objective.compute
+    solve = misfit.compute
 
     def with_a_gap(case: thud.Case) -> thud.Impact:
         if 0.95e6 < case.ball.youngs_modulus < 1.1e6:
@@ -294,7 +294,7 @@ def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "compute", with_a_gap)
+    monkeypatch.setattr(misfit, "compute", with_a_gap)
     # The first step, of the length of the start, leads into the gap.
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 0.5e6})
     assert fit.failures
@@ -308,7 +308,7 @@ def test_one_parameter_far_from_its_start() -> None:
 
 
 def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    solve = objective.compute
+    solve = misfit.compute
 
     def only_here(case: thud.Case) -> thud.Impact:
         if case.ball.youngs_modulus != 2e6:
@@ -316,7 +316,7 @@ def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch)
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "compute", only_here)
+    monkeypatch.setattr(misfit, "compute", only_here)
     with pytest.raises(thud.NumericalError, match=r"youngs_modulus: .* around 2e\+06 \(out of"):
         thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
 
@@ -337,7 +337,7 @@ def test_best_of_several_starts_counts() -> None:
 def test_start_around_which_the_model_fails_leaves_the_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    solve = objective.compute
+    solve = misfit.compute
 
     def below_or_here(case: thud.Case) -> thud.Impact:
         if case.ball.youngs_modulus > 1.95e6 and case.ball.youngs_modulus != 2e6:
@@ -345,7 +345,7 @@ def test_start_around_which_the_model_fails_leaves_the_others(
             raise thud.NumericalError(message)
         return solve(case)
 
-    monkeypatch.setattr(objective, "compute", below_or_here)
+    monkeypatch.setattr(misfit, "compute", below_or_here)
     fit = thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6}, starts=4)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
