@@ -376,7 +376,7 @@ class ForceMisfit(Misfit):
             pair = np.array([place, place + len(self.tones)])
             found[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
         if self.background is not None and self.target.hum is None:
-            mains, size, error = self.quiet.mains(self.background)
+            mains, size, error = self.quiet.mains(self.background, self.tones)
             if size > NOTABLE * error:
                 found[f"hum of {mains:g} Hz"] = size, error
         return found

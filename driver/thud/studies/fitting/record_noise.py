@@ -201,18 +201,22 @@ class Quiet:
             best, found = likelihood, (*found, tone)
         return found
 
-    def mains(self, background: Background) -> tuple[float, float, float]:
+    def mains(
+        self, background: Background, tones: Sequence[float] = ()
+    ) -> tuple[float, float, float]:
         """Return the mains frequency, Hz, and the amplitude and standard error of its hum, N.
 
-        By generalised least squares with the other noise of the quiet.
+        By generalised least squares with the other noise of the quiet, tones, Hz, beside it.
         """
         cells, mean = self._means
         tone = MAINS[int(np.argmax(background.variances[3:]))]
         others = np.append(background.variances[:3], np.zeros(len(MAINS)))
         whiten = _whitening(replace(background, draws=others[np.newaxis]))
-        basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone])[:, 1:])
+        basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone, *tones])[:, 1:])
         inverse = np.linalg.inv(triangle)
-        return (tone, *wave_size(inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T))
+        value, covariance = inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T
+        pair = np.array([0, 1 + len(tones)])
+        return (tone, *wave_size(value[pair], covariance[np.ix_(pair, pair)]))
 
 
 def wave_size(value: NDArray[np.float64], covariance: NDArray[np.float64]) -> tuple[float, float]:
