@@ -240,7 +240,7 @@ def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) 
         assert level == pytest.approx(impact.levels(force="floor")[2], abs=1e-9)
 
 
-def test_reasons_of_long_lists_end_with_what_is_allowed(run: Run, case: Path, tmp_path: Path) -> None:
+def test_reasons_of_long_lists_tell_what_is_allowed(run: Run, case: Path, tmp_path: Path) -> None:
     ratio = ", ".join(f"{0.1 + 1e-15 * i:.17f}" for i in range(64))
     modes = f"&measured_modes allow_mass_mismatch = .true., damping_ratio = {ratio}, "
     modes += f"effective_mass = {ratio}, frequency = {', '.join(map(str, range(20, 84)))} /"

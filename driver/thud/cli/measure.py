@@ -108,5 +108,5 @@ MEASURE = Command(
         QUIET,
     ),
     measure,
-    "drops that were measured are taken up by the same command",
+    "drops of an interrupted measurement are taken up by the same command",
 )

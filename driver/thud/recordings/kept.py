@@ -33,9 +33,9 @@ NUMPY = {"_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype"}
 class KeptDrops:
     """Drops of signals, kept in a directory while others are measured; a context manager.
 
-    Each file holds drops of one signal and one configuration, named by their digest. At the end all
-    are removed, and so is the directory if it is empty; they stay where the process is interrupted
-    or killed.
+    Each file holds drops of one signal and one configuration, named by their digest. At the end
+    those that were opened are removed, and so is the directory if it is empty; they stay where the
+    process is interrupted or killed.
 
     Parameters
     ----------
@@ -47,6 +47,7 @@ class KeptDrops:
         self.folder = None if folder is None else Path(folder)
         self._new: dict[int, Drop] = {}
         self._digest = ""
+        self._digests: set[str] = set()
         self._written = time.monotonic()
 
     def __enter__(self) -> Self:
@@ -65,7 +66,8 @@ class KeptDrops:
         if kind is not None and not issubclass(kind, Exception):
             self._write()
             return
-        files = list(self.folder.glob(f"{PREFIX}*{SUFFIX}"))
+        # Those of other signals belong to another measurement.
+        files = [p for one in self._digests for p in self._files(one)]
         for path in files:
             path.unlink(missing_ok=True)
         if files:
@@ -79,10 +81,15 @@ class KeptDrops:
         self._write()
         told = "\n".join(map(str, (version(), signal.checksum, signal.name, config)))
         self._digest = hashlib.sha256(told.encode("utf-8", "surrogateescape")).hexdigest()[:32]
+        self._digests.add(self._digest)
         found: dict[int, Drop] = {}
-        for path in sorted(self.folder.glob(f"{PREFIX}{self._digest}-*{SUFFIX}")):
+        for path in self._files(self._digest):
             found |= _read(path)
         return found
+
+    def _files(self, digest: str) -> list[Path]:
+        """Return the files of a signal and a configuration."""
+        return sorted(self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}")) if self.folder else []
 
     def add(self, start: int, drop: Drop) -> None:
         """Keep a drop by its first sample; it is on disk after some seconds.

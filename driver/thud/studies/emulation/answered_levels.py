@@ -106,8 +106,10 @@ def confirmed(found: Fit) -> Fit:
     for target in found.targets:
         misfit = cast("AnsweredLevels", target.misfit)
         impact = compute(target.case)
-        off = (misfit.values(impact) - misfit.values(target.impact)) / misfit.model_error
-        missed = max(missed, float(np.abs(off).max()))
+        off = np.abs(misfit.values(impact) - misfit.values(target.impact))
+        # What all training drops share has no error.
+        known = misfit.model_error > 0
+        missed = max(missed, float((off[known] / misfit.model_error[known]).max(initial=0.0)))
         if misfit.known_noise:
             share = max(share, float((misfit.model_error / misfit.deviation).max() ** 2))
         targets.append(replace(target, impact=impact))
