@@ -52,7 +52,7 @@ def pulse(shape: str) -> tuple[np.ndarray, float]:
     if shape == "half sine":
         time = np.arange(int(0.02 * FINE) + 1) / FINE
         return 1500 * np.sin(np.pi * time / 0.02), 0.02
-    file = {"shell": "100cm", "modal": "modal", "finite elements": "fe"}[shape]
+    file = {"shell": "100cm", "modal": "modal", "finite elements": "fe_viscous"}[shape]
     case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"rubber_ball_{file}.nml")
     impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.05)))
     last = int(np.ceil(impact.exact_contact_time * FINE)) + 1

@@ -118,14 +118,6 @@ def read_temperature(
             refuse_value(f"[temperature] {word}", given[word], f"0 < {word}")
     if "c1" in numbers:
         _require_shift(case, parameters)
-        least = numbers["reference"] - numbers["c2"]
-        for parameter in parameters:
-            if parameter.key != TEMPERATURE:
-                continue
-            ends = [*(parameter.values or ()), parameter.low, parameter.high]
-            if any(isinstance(end, int | float) and end <= least for end in ends):
-                what = f"[temperature] c2 = {numbers['c2']:g} K has no shift below {least:g} degC"
-                refuse(what, f"temperatures above {least:g} degC")
     return Temperature(**numbers)
 
 
