@@ -350,7 +350,7 @@ def test_coloured_noise_has_its_deviation() -> None:
 
 def test_releases_of_hertz_were_late() -> None:
     """A force that fades as t**1.5 was continued by a line: 0.3 to 0.5 ms too late at 50 dB."""
-    case = thud.read_case("inputs/tyre.nml")
+    case = thud.read_case("inputs/tyre_one_mass.nml")
     impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.03)))
     truth = impact.exact_contact_time
     for seed in range(3):
