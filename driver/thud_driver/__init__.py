@@ -68,6 +68,7 @@ class _Interrupt:
     def __init__(self) -> None:
         self.first = 0.0
         self.number = 0
+        self.heard = False
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         if not self.first:
@@ -79,6 +80,7 @@ class _Interrupt:
 
     def attempt(self, number: int, frame: FrameType | None) -> None:
         """Raise it, but not during an import: modules lose or print what they do not expect."""
+        self.heard = True
         while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
             frame = frame.f_back
         if not frame:
@@ -91,9 +93,16 @@ class _Interrupt:
     def again(self, number: int) -> None:
         """Try again a little later."""
         signal.signal(number, self.attempt)
-        timer = Timer(_PAUSE, signal.raise_signal, (number,))
+        self.heard = False
+        timer = Timer(_PAUSE, self._send, (number,))
         timer.daemon = True
         timer.start()
+
+    def _send(self, number: int) -> None:
+        # A call of the library that begins just then leaves the first unheard, and hears the next.
+        while not self.heard:
+            signal.raise_signal(number)
+            time.sleep(_PAUSE)
 
     def retry(self, lost: sys.UnraisableHookArgs) -> None:
         """Take up what a callback, such as one of a weak reference, could not raise."""
