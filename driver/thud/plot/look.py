@@ -166,10 +166,15 @@ def level_label(impacts: Mapping[str, Curve], force: LevelsForce | None, what: s
 
 def octave_axis(axes: Axes, bands: BandSet = "octave") -> None:
     """Label the axis with the bands."""
-    names = [f"{frequency:g}" for frequency in get_bands(bands).nominal]
-    axes.set_xticks(np.arange(len(names)), names)
+    nominal = get_bands(bands).nominal
+    band_axis(axes, nominal, bands)
+    axes.set_xlim(-0.6, len(nominal) - 0.4)
+
+
+def band_axis(axes: Axes, nominal: NDArray[np.float64], bands: BandSet) -> None:
+    """Label the axis with some of the bands of a set, by their rounded mid frequencies, Hz."""
+    axes.set_xticks(np.arange(len(nominal)), [f"{frequency:g}" for frequency in nominal])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlim(-0.6, len(names) - 0.4)
     axes.set_xlabel(f"{BAND_WORDS[bands]}, Hz", fontsize=SIZE)
     if bands == "third":
         axes.tick_params(axis="x", labelrotation=90)

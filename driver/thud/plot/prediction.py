@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.ticker import NullLocator
 
 from thud.floors.prediction import RoomPrediction, predict_level
-from thud.plot.look import BAND_WORDS, COLOURS, SIZE, WIDTH, dress, legend_above, new_figure
+from thud.plot.look import COLOURS, SIZE, WIDTH, band_axis, dress, legend_above, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -57,10 +56,7 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
         label = f"measured: {measured.rating.rounded} dB"
         below.plot(place, level, color="black", marker="x", linewidth=1, linestyle=":", label=label)
     below.set_ylabel("Maximum Fast level,\ndB re 20 µPa", fontsize=SIZE)
-    below.set_xticks(place, [f"{frequency:g}" for frequency in found.frequency])
-    below.xaxis.set_minor_locator(NullLocator())
-    below.tick_params(axis="x", labelrotation=90)
-    below.set_xlabel(f"{BAND_WORDS['third']}, Hz", fontsize=SIZE)
+    band_axis(below, found.frequency, "third")
     figure.align_ylabels()
     # One legend for all.
     for line in middle.get_lines():

@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.ticker import NullLocator
 
-from thud.plot.look import BAND_WORDS, COLOURS, SIZE, empty_axes, legend_above
+from thud.plot.look import COLOURS, SIZE, band_axis, empty_axes, legend_above
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,11 +38,7 @@ def room_levels(found: RoomLevels) -> Figure:
             place, found.background, color=COLOURS[6], linewidth=0.9, linestyle=":",
             label="background",
         )  # fmt: skip
-    axes.set_xticks(place, [f"{frequency:g}" for frequency in found.frequency])
-    axes.xaxis.set_minor_locator(NullLocator())
-    if found.bands == "third":
-        axes.tick_params(axis="x", labelrotation=90)
-    axes.set_xlabel(f"{BAND_WORDS[found.bands]}, Hz", fontsize=SIZE)
+    band_axis(axes, found.frequency, found.bands)
     axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa", fontsize=SIZE)
     legend_above(axes)
     return figure
