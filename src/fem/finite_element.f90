@@ -22,6 +22,7 @@ module thud_finite_element
    use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -135,7 +136,7 @@ contains
    end subroutine compress
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       !> Mesh, material, contact.
@@ -146,6 +147,8 @@ contains
       type(force_history_type), intent(out) :: history
       !> The ball cannot be computed, or the balances do not close.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
       type(material_type) :: material
       type(contacts_type) :: contacts

@@ -1,4 +1,4 @@
-!> The answer of every source model: the force on a rigid floor, sampled from first touch on.
+!> The answer of every source model: the force on a floor, sampled from first touch on.
 !> Levels, verdicts and files know this type only, never the model behind it.
 module thud_force_history
    use thud_kinds, only: wp
@@ -38,6 +38,10 @@ module thud_force_history
       real(wp), allocatable :: elastic_force(:)
       !> Whole force on the floor, N: [n_sample].
       real(wp), allocatable :: floor_force(:)
+      !> Displacement and velocity of a floor that moves, under the source and downwards, m and m/s: [n_sample].
+      real(wp), allocatable :: floor_displacement(:), floor_velocity(:)
+      !> Energy that the source gives to the floor, J.
+      real(wp) :: floor_work = 0.0_wp
       !> Names, with units, of further quantities against time: [n_channel].
       character(len=part_name_length), allocatable :: channel_name(:)
       !> Its values: [n_sample, n_channel].

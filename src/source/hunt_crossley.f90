@@ -10,6 +10,7 @@ module thud_hunt_crossley
    use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
    use thud_new_field, only: real_field
    use thud_rk4, only: locate_zero, rk4_step
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
@@ -240,7 +241,7 @@ contains
    end subroutine compress
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error, receiver)
       !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -251,6 +252,8 @@ contains
       type(force_history_type), intent(out) :: history
       !> The contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(spring_type) :: spring
       real(wp) :: v0
 

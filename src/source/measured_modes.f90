@@ -11,6 +11,7 @@ module thud_measured_modes
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: fixed, to_text
@@ -35,6 +36,7 @@ module thud_measured_modes
       procedure, pass(options) :: get_fields
       procedure, pass(options) :: check
       procedure, pass(options) :: solve
+      procedure, pass(options) :: couples
    end type measured_modes_type
 
    !> Motion and force of one mode in closed form.
@@ -96,7 +98,7 @@ contains
    end subroutine check
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error, receiver)
       !> The ball, whose mass the effective masses add up to.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -107,6 +109,8 @@ contains
       type(force_history_type), intent(out) :: history
       !> The contact outlasts the record.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(mode_type) :: modes(options%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
       integer :: i, j, n_sample, substeps
@@ -156,6 +160,14 @@ contains
          call check_contact_samples(sampling, history%contact_time, error)
       end if
    end subroutine solve
+
+   !> Modes of a ball on a rigid floor say nothing of another floor.
+   function couples(options) result(yes)
+      class(measured_modes_type), intent(in) :: options
+      logical :: yes
+
+      yes = .false.
+   end function couples
 
    !> One mode from its measured numbers.
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)

@@ -9,6 +9,7 @@ module thud_source_model
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    implicit none (type, external)
    private
@@ -26,6 +27,7 @@ module thud_source_model
       procedure, pass(options) :: get_paper_modulus
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
+      procedure, pass(options) :: couples
    end type source_model_type
 
    abstract interface
@@ -40,8 +42,8 @@ module thud_source_model
       end function get_fields
 
       !> Force history of one drop.
-      subroutine solve(ball, drop, options, sampling, history, error)
-         import :: ball_type, drop_type, error_type, force_history_type, sampling_type, source_model_type
+      subroutine solve(ball, drop, options, sampling, history, error, receiver)
+         import :: ball_type, drop_type, error_type, force_history_type, receiver_type, sampling_type, source_model_type
          implicit none (type, external)
          type(ball_type), intent(in) :: ball
          type(drop_type), intent(in) :: drop
@@ -52,6 +54,8 @@ module thud_source_model
          type(force_history_type), intent(out) :: history
          !> The drop leads out of the model, the contact outlasts the record, or the steps are too coarse.
          type(error_type), allocatable, intent(out) :: error
+         !> What the ball drops on (default: a rigid floor); given to models only that `couples`.
+         type(receiver_type), intent(in), optional :: receiver
       end subroutine solve
    end interface
 
@@ -110,6 +114,14 @@ contains
       loss_factor = 0.0_wp
       error = input_error('&model: name: this model has no material with a loss factor; allowed: one that has')
    end subroutine get_loss_factors
+
+   !> Whether the model can drop on a floor that moves; by default it can. The force of others is the blocked one.
+   function couples(options) result(yes)
+      class(source_model_type), intent(in) :: options
+      logical :: yes
+
+      yes = .true.
+   end function couples
 
    !> Force on each of two plates that press the ball slowly, of models that have one; others refuse.
    subroutine compress(ball, options, deflection, force, error)

@@ -13,6 +13,7 @@ module thud_two_mass
    use thud_lumped, only: coarse_error
    use thud_new_field, only: real_field
    use thud_rk4, only: locate_zero, ode_type, rk4_step
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
@@ -122,7 +123,7 @@ contains
    end subroutine check
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error, receiver)
       !> The source, of which only the mass counts.
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
@@ -133,6 +134,8 @@ contains
       type(force_history_type), intent(out) :: history
       !> The contact outlasts the record, or the steps are too coarse or too many.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(tyre_type) :: tyre
       real(wp) :: state(n_state)
       real(wp) :: step

@@ -10,6 +10,7 @@ module thud_hollow_sphere
    use thud_kinds, only: wp
    use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_error, lumped_type, solve_lumped
    use thud_new_field, only: choice_field
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: fixed, join_quoted, quoted, to_text
@@ -270,7 +271,7 @@ contains
    end function get_failure
 
    !> Force history of one drop.
-   subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error)
+   subroutine solve_hollow_sphere(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       !> The choice of momentum flux.
@@ -281,6 +282,8 @@ contains
       type(force_history_type), intent(out) :: history
       !> The shell closes, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(shell_type) :: shell
       integer :: choice
 

@@ -20,6 +20,7 @@ module thud_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: advance, get_energies, mode_step_type, place_q, place_v, set_factors
    use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
+   use thud_receiver, only: receiver_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
@@ -104,7 +105,7 @@ contains
    end subroutine compress
 
    !> Force history of one drop.
-   subroutine solve(ball, drop, options, sampling, history, error)
+   subroutine solve(ball, drop, options, sampling, history, error, receiver)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       !> Modes, rings and damping.
@@ -115,6 +116,8 @@ contains
       type(force_history_type), intent(out) :: history
       !> The modes cannot be computed, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(mode_step_type) :: step
       type(ring_contact_type) :: contact
       type(surface_rings_type) :: rings

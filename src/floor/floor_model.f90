@@ -1,0 +1,89 @@
+!> The abstract floor: options from a namelist group, what a source feels of it, and the plate that radiates into the
+!> room below.
+!>
+!> A floor is a module `thud_<name>` with a type `<name>_type` that extends this one; the list `floor_models` in
+!> src/CMakeLists.txt makes it known. Its options belong to the group of its name.
+module thud_floor_model
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type
+   use thud_kinds, only: wp
+   use thud_plate, only: plate_type
+   use thud_receiver, only: receiver_type
+   implicit none (type, external)
+   private
+
+   public :: floor_model_type
+
+   !> A floor with its options as components.
+   type, abstract :: floor_model_type
+   contains
+      procedure(get_fields), deferred, pass(options) :: get_fields
+      procedure(get_receiver), deferred, pass(options) :: get_receiver
+      procedure, pass(options) :: check
+      procedure, pass(options) :: get_transfer
+      procedure, pass(options) :: get_radiator
+   end type floor_model_type
+
+   abstract interface
+      !> Keys of the options.
+      function get_fields(options) result(fields)
+         import :: field_type, floor_model_type
+         implicit none (type, external)
+         !> The options that the fields read and set.
+         class(floor_model_type), intent(in), target :: options
+         !> The keys: [n_field].
+         type(field_type), allocatable :: fields(:)
+      end function get_fields
+
+      !> What a source feels of the floor.
+      subroutine get_receiver(options, receiver, error)
+         import :: error_type, floor_model_type, receiver_type
+         implicit none (type, external)
+         !> The options, checked.
+         class(floor_model_type), intent(in) :: options
+         type(receiver_type), intent(out) :: receiver
+         !> The receiver cannot be made.
+         type(error_type), allocatable, intent(out) :: error
+      end subroutine get_receiver
+   end interface
+
+contains
+
+   !> Refuses options that do not fit each other; by default all fit.
+   subroutine check(options, error)
+      !> The options, each inside its own range.
+      class(floor_model_type), intent(in) :: options
+      !> Names group, key, value and what is allowed.
+      type(error_type), allocatable, intent(out) :: error
+
+   end subroutine check
+
+   !> Velocity of another point over the force of the source, as a receiver; floors without extent refuse.
+   subroutine get_transfer(options, x, y, transfer, error)
+      class(floor_model_type), intent(in) :: options
+      !> Place of the point on the floor, m.
+      real(wp), intent(in) :: x, y
+      type(receiver_type), intent(out) :: transfer
+      !> The floor has no such point.
+      type(error_type), allocatable, intent(out) :: error
+
+      error = input_error('&floor: name: this floor has no points but that under the source; allowed: one with sides')
+   end subroutine get_transfer
+
+   !> The plate that radiates into the room below, and the power that a force of unit mean square on the floor gives to
+   !> it, the mean over positions; floors that have none refuse.
+   subroutine get_radiator(options, frequency, plate, conductance, error)
+      class(floor_model_type), intent(in) :: options
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      type(plate_type), intent(out) :: plate
+      !> The power over the mean square of the force, m/(N s): [n].
+      real(wp), intent(out) :: conductance(:)
+      !> The floor has no such plate.
+      type(error_type), allocatable, intent(out) :: error
+
+      conductance = 0.0_wp
+      error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
+   end subroutine get_radiator
+
+end module thud_floor_model

@@ -1,0 +1,163 @@
+!> What a source drops on: a linear passive structure, by the mobility Y of the point under the source.
+!>
+!> Y(s) = d + sum of r_k/(s - p_k), a direct part and poles with residues. Of a pair of conjugate poles one is kept, with
+!> twice its residue: the velocity is d F + Re sum r_k x_k with x_k' = p_k x_k + F. Time steps are exact for forces that
+!> are constant in a step and for impulses at its beginning.
+module thud_receiver
+   use thud_constants, only: pi
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: advance_receiver, get_conductance, get_mobility, get_receiver_velocity, is_rigid, new_receiver_motion
+   public :: new_receiver_step, receiver_motion_type, receiver_step_type, receiver_type, strike_receiver
+
+   !> Products of pole and step below which series replace the closed forms.
+   real(wp), parameter :: small = 0.05_wp
+
+   !> A receiver. The default is rigid.
+   type :: receiver_type
+      !> Direct part of the mobility, m/(N s).
+      real(wp) :: direct = 0.0_wp
+      !> Poles, 1/s, imaginary parts not negative, real parts not positive: [n_pole].
+      complex(wp), allocatable :: pole(:)
+      !> Residues, m/(N s2), those of conjugate pairs doubled: [n_pole].
+      complex(wp), allocatable :: residue(:)
+   end type receiver_type
+
+   !> Factors of one time step.
+   type :: receiver_step_type
+      !> Length of the step, s.
+      real(wp) :: interval = 0.0_wp
+      !> exp(p h), its integral over the step (s), and the integral of that (s2): [n_pole].
+      complex(wp), allocatable :: decay(:), gain(:), travel(:)
+   end type receiver_step_type
+
+   !> Motion of a receiver.
+   type :: receiver_motion_type
+      !> The x_k, N s: [n_pole].
+      complex(wp), allocatable :: amplitude(:)
+      !> Displacement under the source, downwards, m.
+      real(wp) :: displacement = 0.0_wp
+   end type receiver_motion_type
+
+contains
+
+   !> Whether a receiver does not move.
+   pure function is_rigid(receiver) result(rigid)
+      type(receiver_type), intent(in) :: receiver
+      logical :: rigid
+
+      rigid = .not. receiver%direct > 0.0_wp
+      if (allocated(receiver%residue)) rigid = rigid .and. .not. any(abs(receiver%residue) > 0.0_wp)
+   end function is_rigid
+
+   !> Mobility of the point under the source, velocity over force.
+   pure function get_mobility(receiver, frequency) result(mobility)
+      type(receiver_type), intent(in) :: receiver
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      !> The mobility, m/(N s): [n].
+      complex(wp) :: mobility(size(frequency))
+      complex(wp) :: s(size(frequency))
+      integer :: k
+
+      s = cmplx(0.0_wp, 2*pi*frequency, wp)
+      mobility = receiver%direct
+      if (.not. allocated(receiver%pole)) return
+      do k = 1, size(receiver%pole)
+         ! Half of a doubled residue belongs to the conjugate pole; of a real pole both halves are alike.
+         associate (pole => receiver%pole(k), residue => receiver%residue(k))
+            mobility = mobility + (residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
+         end associate
+      end do
+   end function get_mobility
+
+   !> Real part of the mobility: the power that a force of unit mean square gives to the receiver.
+   pure function get_conductance(receiver, frequency) result(conductance)
+      type(receiver_type), intent(in) :: receiver
+      !> Frequencies, Hz: [n].
+      real(wp), intent(in) :: frequency(:)
+      !> The conductance, m/(N s): [n].
+      real(wp) :: conductance(size(frequency))
+
+      conductance = real(get_mobility(receiver, frequency), wp)
+   end function get_conductance
+
+   !> A receiver at rest.
+   pure function new_receiver_motion(receiver) result(motion)
+      type(receiver_type), intent(in) :: receiver
+      type(receiver_motion_type) :: motion
+      integer :: n
+
+      n = 0
+      if (allocated(receiver%pole)) n = size(receiver%pole)
+      allocate (motion%amplitude(n), source=(0.0_wp, 0.0_wp))
+   end function new_receiver_motion
+
+   !> Factors of steps of one length.
+   pure function new_receiver_step(receiver, interval) result(step)
+      type(receiver_type), intent(in) :: receiver
+      !> Length of the steps, s.
+      real(wp), intent(in) :: interval
+      type(receiver_step_type) :: step
+      complex(wp) :: z
+      integer :: k, n
+
+      n = 0
+      if (allocated(receiver%pole)) n = size(receiver%pole)
+      step%interval = interval
+      allocate (step%decay(n), step%gain(n), step%travel(n))
+      do k = 1, n
+         z = receiver%pole(k)*interval
+         step%decay(k) = exp(z)
+         if (abs(z) < small) then
+            step%gain(k) = interval*(1 + z/2*(1 + z/3*(1 + z/4*(1 + z/5*(1 + z/6*(1 + z/7*(1 + z/8)))))))
+            step%travel(k) = interval**2/2*(1 + z/3*(1 + z/4*(1 + z/5*(1 + z/6*(1 + z/7*(1 + z/8*(1 + z/9)))))))
+         else
+            step%gain(k) = interval*(step%decay(k) - 1)/z
+            step%travel(k) = interval**2*(step%decay(k) - 1 - z)/z**2
+         end if
+      end do
+   end function new_receiver_step
+
+   !> Motion a step on, under a force that is constant in it.
+   pure subroutine advance_receiver(receiver, step, force, motion)
+      type(receiver_type), intent(in) :: receiver
+      type(receiver_step_type), intent(in) :: step
+      !> The force downwards, N.
+      real(wp), intent(in) :: force
+      type(receiver_motion_type), intent(inout) :: motion
+
+      motion%displacement = motion%displacement + step%interval*receiver%direct*force
+      if (size(step%decay) == 0) return
+      motion%displacement = motion%displacement &
+         + sum(real(receiver%residue*(step%gain*motion%amplitude + step%travel*force), wp))
+      motion%amplitude = step%decay*motion%amplitude + step%gain*force
+   end subroutine advance_receiver
+
+   !> Motion after an impulse.
+   pure subroutine strike_receiver(receiver, impulse, motion)
+      type(receiver_type), intent(in) :: receiver
+      !> The impulse downwards, N s.
+      real(wp), intent(in) :: impulse
+      type(receiver_motion_type), intent(inout) :: motion
+
+      motion%displacement = motion%displacement + receiver%direct*impulse
+      motion%amplitude = motion%amplitude + impulse
+   end subroutine strike_receiver
+
+   !> Velocity under the source.
+   pure function get_receiver_velocity(receiver, force, motion) result(velocity)
+      type(receiver_type), intent(in) :: receiver
+      !> The force downwards, N.
+      real(wp), intent(in) :: force
+      type(receiver_motion_type), intent(in) :: motion
+      !> Velocity downwards, m/s.
+      real(wp) :: velocity
+
+      velocity = receiver%direct*force
+      if (size(motion%amplitude) > 0) velocity = velocity + sum(real(receiver%residue*motion%amplitude, wp))
+   end function get_receiver_velocity
+
+end module thud_receiver
