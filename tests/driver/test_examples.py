@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import pytest
 from conftest import REPOSITORY
 
 import thud
@@ -12,6 +11,8 @@ from thud import cli
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    import pytest
 
 
 def test_examples_are_those_of_the_repository(tmp_path: Path) -> None:
