@@ -37,10 +37,14 @@ def fortran_uses(root: Path) -> dict[str, set[str]]:
     texts = {path: path.read_text(encoding="utf-8") for path in sorted(root.rglob("*.f90"))}
     registry = root / "case/registry.f90.in"
     if registry.exists():
-        models = re.search(r"set\(source_models\n([^)]*)\)", (root / "CMakeLists.txt").read_text())
-        assert models
-        uses = "".join(f"   use thud_{model}, only: {model}_type\n" for model in models[1].split())
-        texts[registry] = registry.read_text(encoding="utf-8").replace("@thud_model_uses@", uses)
+        texts[registry] = registry.read_text(encoding="utf-8")
+        for kind, suffix in (("source", ""), ("floor", "_floor")):
+            lists = (root / "CMakeLists.txt").read_text(encoding="utf-8")
+            found = re.search(rf"set\({kind}_models\n([^)]*)\)", lists)
+            assert found
+            names = [name.removesuffix(suffix) + suffix for name in found[1].split()]
+            uses = "".join(f"   use thud_{name}, only: {name}_type\n" for name in names)
+            texts[registry] = texts[registry].replace(f"@thud_{kind}_uses@", uses)
     places = {
         name: path.relative_to(root).as_posix()
         for path, text in texts.items()
