@@ -7,6 +7,7 @@
 #include <limits.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -53,7 +54,7 @@ void thud_prepare_process(void)
    sigaction(SIGPIPE, &action, NULL);
    sigaction(SIGXFSZ, &action, NULL);
    action.sa_handler = interrupt;
-   action.sa_flags = SA_RESTART;
+   // Without SA_RESTART, so that a kept one ends the wait for a lock.
    for (int i = 0; i < 2; i++)
       if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
          sigaction(ending_signals[i], &action, NULL);
@@ -165,6 +166,31 @@ int thud_create(const char *path)
    int descriptor = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 
    return descriptor < 0 ? -errno : descriptor;
+}
+
+// The same to write at the end of a file, which is made where it is missing.
+int thud_open_end(const char *path)
+{
+   int descriptor = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+
+   return descriptor < 0 ? -errno : descriptor;
+}
+
+// CRC-32 of bytes that follow those with the checksum `before`, as in zlib.
+uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t length)
+{
+   // Remainders of four bits each.
+   static const uint32_t remainder[16] = {
+      0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+      0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
+   uint32_t rest = ~before;
+
+   for (size_t i = 0; i < length; i++) {
+      rest ^= bytes[i];
+      rest = remainder[rest & 15] ^ (rest >> 4);
+      rest = remainder[rest & 15] ^ (rest >> 4);
+   }
+   return ~rest;
 }
 
 // Writes all of a text; -1 after an interrupt that was kept.
