@@ -138,7 +138,7 @@ contains
       if (directory%is_new .and. allocated(error)) call remove_file(directory%place)
       call close_descriptor(directory%lock)
       call close_descriptor(directory%workspace_lock)
-      call pass_interrupts()
+      call pass_interrupts(merge(0, 1, allocated(error)))
    end subroutine close_results
 
    !> Begins a file.

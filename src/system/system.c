@@ -21,7 +21,7 @@
 extern volatile sig_atomic_t thud_latest_signal;
 
 static volatile sig_atomic_t deferred = 0;
-static const char interruption[] = "\nthud: interrupted; nothing was written\n";
+static const char *volatile interruption = "\nthud: interrupted; nothing was written\n";
 static const int ending_signals[] = {SIGINT, SIGTERM};
 
 static void interrupt(int number)
@@ -132,9 +132,10 @@ void thud_keep_interrupts(void)
    deferred = 1;
 }
 
-// From now on an interrupt ends the process.
-void thud_pass_interrupts(void)
+// From now on an interrupt ends the process; what it says then depends on whether there are results.
+void thud_pass_interrupts(int written)
 {
+   if (written) interruption = "\nthud: interrupted; the results are written\n";
    deferred = 0;
 }
 

@@ -66,8 +66,11 @@ module thud_system
       end subroutine keep_interrupts
 
       !> Lets an interrupt end the process from now on.
-      subroutine pass_interrupts() bind(c, name='thud_pass_interrupts')
+      subroutine pass_interrupts(written) bind(c, name='thud_pass_interrupts')
+         import :: c_int
          implicit none (type, external)
+         !> 1 where there are results by now, else 0.
+         integer(c_int), value :: written
       end subroutine pass_interrupts
 
       !> Lets signals that the process handles set `latest_signal`, too. Every call of the library begins with it.
