@@ -329,6 +329,15 @@ size_t thud_next_name(DIR *directory, char *name, size_t length)
    return strlen(name);
 }
 
+// Bytes of a file, 0 where it is not a regular one; negative where there is none.
+int64_t thud_get_file_size(const char *path)
+{
+   struct stat found;
+
+   if (stat(path, &found) != 0) return -1;
+   return S_ISREG(found.st_mode) ? (int64_t)found.st_size : 0;
+}
+
 // Bytes that this user may write to the disk of a directory, or of the next one above that is there; negative where
 // unknown.
 double thud_get_free_bytes(const char *path)

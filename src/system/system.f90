@@ -1,17 +1,17 @@
 !> The calls of the operating system that Fortran lacks; `system.c` holds them.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_intptr_t, c_null_char, c_ptr, &
-      c_size_t
-   use, intrinsic :: iso_fortran_env, only: int32
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_int64_t, c_intptr_t, c_null_char, &
+      c_ptr, c_size_t
+   use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
    public :: standard_error, standard_output
-   public :: add_to_checksum, can_exchange, close_descriptor, create_file, directory_exists, exchange_directories, flush_directory
-   public :: get_free_bytes, get_system_message, is_terminal, keep_interrupts, link_file, list_directory, lock_directory
-   public :: begin_call, end_call, end_calls, open_descriptor, open_end, pass_interrupts, prepare_process, read_bytes, remove_file
-   public :: rename_file, resolve_path, write_text
+   public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
+   public :: end_calls, exchange_directories, flush_directory, get_file_size, get_free_bytes, get_system_message
+   public :: is_terminal, keep_interrupts, link_file, list_directory, lock_directory, open_descriptor, open_end
+   public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
    !> Descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
@@ -162,6 +162,13 @@ module thud_system
          type(c_ptr), value :: directory
          integer(c_int) :: status
       end function c_closedir
+
+      function c_get_file_size(path) bind(c, name='thud_get_file_size') result(bytes)
+         import :: c_char, c_int64_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int64_t) :: bytes
+      end function c_get_file_size
 
       function c_get_free_bytes(path) bind(c, name='thud_get_free_bytes') result(bytes)
          import :: c_char, c_double
@@ -395,6 +402,15 @@ contains
       status = c_remove(path//c_null_char)
       if (present(done)) done = status == 0
    end subroutine remove_file
+
+   !> Size of a file.
+   subroutine get_file_size(path, bytes)
+      character(len=*), intent(in) :: path
+      !> Its bytes, 0 where it is not a regular file; negative where there is none.
+      integer(int64), intent(out) :: bytes
+
+      bytes = int(c_get_file_size(path//c_null_char), int64)
+   end subroutine get_file_size
 
    !> Free space on the disk of a directory, or of the next one above that is there.
    function get_free_bytes(path) result(bytes)
