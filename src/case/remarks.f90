@@ -2,6 +2,7 @@
 module thud_remarks
    use thud_ball, only: get_density
    use thud_case, only: case_type, get_floor_number
+   use thud_floor_model, only: reason_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_registry, only: floor_names, model_names
@@ -71,7 +72,7 @@ contains
       type(case_type), intent(in) :: case
       !> Sentences: [n].
       character(len=remark_length), allocatable, intent(inout) :: remarks(:)
-      character(len=remark_length) :: reason
+      character(len=reason_length) :: reason
       real(wp) :: lowest, highest
 
       associate (floor => case%floors(get_floor_number(case))%model)

@@ -62,7 +62,8 @@ contains
       gain = 4/(floor%upper%length*floor%upper%width)*share*spread(shape, 2, 2)
       rest = sum(gain/omega**2, mask=.not. single)
       if (all(abs(source - point) < epsilon(1.0_wp))) rest = rest + get_far_compliance(floor%upper)
-      call new_modal_receiver(pack(gain, single), pack(omega, single), pack(loss_factor, single), rest, rest_corner, receiver)
+      call new_modal_receiver(pack(gain, single), pack(omega, single), pack(loss_factor, single), rest, rest_corner, &
+         receiver)
    end subroutine new_double_receiver
 
    !> Half waves of the modes up to far above the limit, of the plate that has more of them.
@@ -152,8 +153,8 @@ contains
       real(wp), intent(in) :: frequency
       !> The power, m/(N s).
       real(wp) :: conductance
-      complex(wp) :: b1, b2, s, k1, k2, half, root(4), term
-      complex(wp) :: total
+      complex(wp) :: root(4)
+      complex(wp) :: b1, b2, s, k1, k2, half, term, total
       real(wp) :: omega
       integer :: i, j
 

@@ -3,7 +3,7 @@ module thud_floating_floor
    use thud_double_plate, only: double_plate_type, get_lower_conductance, new_double_receiver
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, reason_length
    use thud_kinds, only: wp
    use thud_new_field, only: real_field
    use thud_plate, only: get_plate_fields, get_thin_limit, plate_type
@@ -128,7 +128,7 @@ contains
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
       !> What ends it.
-      character(len=*), intent(out) :: reason
+      character(len=reason_length), intent(out) :: reason
       type(double_plate_type) :: floor
 
       floor = get_double_plate(options)

@@ -13,7 +13,10 @@ module thud_floor_model
    implicit none (type, external)
    private
 
-   public :: floor_model_type
+   public :: floor_model_type, reason_length
+
+   !> Length of a reason.
+   integer, parameter :: reason_length = 112
 
    !> A floor with its options as components.
    type, abstract :: floor_model_type
@@ -94,7 +97,7 @@ contains
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
       !> What ends it, as the end of a sentence.
-      character(len=*), intent(out) :: reason
+      character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp
       highest = huge(highest)

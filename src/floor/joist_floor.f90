@@ -4,7 +4,7 @@ module thud_joist_floor
    use thud_constants, only: pi
    use thud_error, only: error_type
    use thud_field, only: field_type, name_length
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, reason_length
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_new_field, only: choice_field, real_field
@@ -76,8 +76,8 @@ contains
          real_field('loss_factor', options%loss_factor, '', 'total loss factor of the floor', '(0, 1]'), &
          real_field('source_x', options%source_x, '', 'place of the source along the joists, over the length', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'place of the source across the joists, over the width', '(0, 1)'), &
-         choice_field('source_on', options%source_on, 'what the source drops on there: sheathing between joists, or a joist', &
-         [character(len=9) :: 'sheathing', 'joist'])]
+         choice_field('source_on', options%source_on, &
+         'what the source drops on there: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist'])]
    end function get_fields
 
    !> Refuses floors with too many modes.
@@ -142,7 +142,7 @@ contains
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
       !> What ends it.
-      character(len=*), intent(out) :: reason
+      character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp
       highest = get_smeared_limit(options)

@@ -3,7 +3,7 @@ module thud_measured_mobility_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, reason_length
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, real_field
    use thud_passivity, only: find_violations
@@ -114,7 +114,7 @@ contains
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
       !> What ends it.
-      character(len=*), intent(out) :: reason
+      character(len=reason_length), intent(out) :: reason
 
       lowest = options%lowest_frequency
       highest = options%highest_frequency

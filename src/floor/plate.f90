@@ -8,8 +8,8 @@ module thud_plate
    implicit none (type, external)
    private
 
-   public :: air_type, get_bending_stiffness, get_critical_frequency, get_mode_density, get_plate_fields, get_radiation_factor
-   public :: get_resistance, get_surface_mass, get_thin_limit, get_total_loss, plate_type
+   public :: air_type, get_bending_stiffness, get_critical_frequency, get_mode_density, get_plate_fields
+   public :: get_radiation_factor, get_resistance, get_surface_mass, get_thin_limit, get_total_loss, plate_type
 
    !> Air of the rooms.
    type :: air_type

@@ -2,7 +2,7 @@
 module thud_plate_floor
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, reason_length
    use thud_kinds, only: wp
    use thud_new_field, only: real_field
    use thud_plate, only: get_plate_fields, get_resistance, get_thin_limit, plate_type
@@ -98,7 +98,7 @@ contains
       !> Ends of the band, Hz.
       real(wp), intent(out) :: lowest, highest
       !> What ends it.
-      character(len=*), intent(out) :: reason
+      character(len=reason_length), intent(out) :: reason
 
       lowest = 0.0_wp
       highest = get_thin_limit(options%plate)

@@ -4,8 +4,8 @@ module thud_plate_modes
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
-   use thud_plate, only: air_type, get_bending_stiffness, get_mode_density, get_resistance, get_surface_mass, get_total_loss, &
-      plate_type
+   use thud_plate, only: air_type, get_bending_stiffness, get_mode_density, get_resistance, get_surface_mass, &
+      get_total_loss, plate_type
    use thud_receiver, only: receiver_type
    use thud_text, only: fixed, to_text
    implicit none (type, external)
@@ -21,8 +21,8 @@ module thud_plate_modes
    !> Modes up to this many times the limit make the static compliance; that of the others is their mean.
    real(wp), parameter, public :: far = 16.0_wp
 
-   !> Corner of the rest of modes, rad/s: in the mean over positions a rest of n(omega) modes with 1/(m'' S omega**2) each has
-   !> the compliance 2/(pi Z 2 pi limit); with this corner its conductance is 1/Z.
+   !> Corner of the rest of modes, rad/s: in the mean over positions a rest of n(omega) modes with 1/(m'' S omega**2) each
+   !> has the compliance 2/(pi Z 2 pi limit); with this corner its conductance is 1/Z.
    real(wp), parameter, public :: rest_corner = pi/(2*sqrt(2.0_wp))*2*pi*mode_limit
 
    !> Maximum number of modes below the limit: a drop takes time in proportion.
@@ -55,8 +55,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       if (.not. (x >= 0.0_wp .and. x <= length .and. y >= 0.0_wp .and. y <= width)) error = input_error('&'//group &
-         //': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; allowed: 0 to '//to_text(length)//' m and 0 to ' &
-         //to_text(width)//' m')
+         //': the point ('//to_text(x)//', '//to_text(y)//') m lies outside; allowed: 0 to '//to_text(length) &
+         //' m and 0 to '//to_text(width)//' m')
    end subroutine check_inside
 
    !> Refuses loss factors of modes that would not swing.
@@ -71,8 +71,8 @@ contains
 
       i = maxloc(loss_factor, dim=1)
       if (i == 0) return
-      if (.not. loss_factor(i) < 2.0_wp) error = input_error('&'//group//': the total loss factor is '//to_text(loss_factor(i)) &
-         //' at '//fixed(omega(i)/(2*pi), 1)//' Hz; allowed: below 2')
+      if (.not. loss_factor(i) < 2.0_wp) error = input_error('&'//group//': the total loss factor is ' &
+         //to_text(loss_factor(i))//' at '//fixed(omega(i)/(2*pi), 1)//' Hz; allowed: below 2')
    end subroutine check_losses
 
    !> Half waves along length and width of the modes below a frequency.

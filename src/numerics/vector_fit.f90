@@ -189,7 +189,8 @@ contains
       do j = 1, size(length)
          matrix(:, j) = matrix(:, j)/length(j)
       end do
-      call dgels('N', size(matrix, 1), size(matrix, 2), 1, matrix, size(matrix, 1), right, size(right), work, size(work), info)
+      call dgels('N', size(matrix, 1), size(matrix, 2), 1, matrix, size(matrix, 1), right, size(right), work, size(work), &
+         info)
       right(:size(length)) = right(:size(length))/length
       failed = info /= 0
    end subroutine solve_least_squares
