@@ -1,8 +1,9 @@
 !> The abstract floor: options from a namelist group, what a source feels of it, and the plate that radiates into the
 !> room below.
 !>
-!> A floor is a module `thud_<name>` with a type `<name>_type` that extends this one; the list `floor_models` in
-!> src/CMakeLists.txt makes it known. Its options belong to the group of its name.
+!> A floor `<name>` is a module `thud_<name>_floor` with a type `<name>_floor_type` that extends this one (a name that
+!> ends with `_floor` gets no second one); the list `floor_models` in src/CMakeLists.txt makes it known. Its options belong
+!> to the group of its name.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
@@ -12,7 +13,10 @@ module thud_floor_model
    implicit none (type, external)
    private
 
-   public :: floor_model_type
+   public :: floor_model_type, reason_length
+
+   !> Length of a reason.
+   integer, parameter :: reason_length = 112
 
    !> A floor with its options as components.
    type, abstract :: floor_model_type
@@ -22,6 +26,7 @@ module thud_floor_model
       procedure, pass(options) :: check
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
+      procedure, pass(options) :: get_validity
    end type floor_model_type
 
    abstract interface
@@ -85,5 +90,18 @@ contains
       conductance = 0.0_wp
       error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
    end subroutine get_radiator
+
+   !> Band in which the floor is what it claims to be; by default at all frequencies.
+   subroutine get_validity(options, lowest, highest, reason)
+      class(floor_model_type), intent(in) :: options
+      !> Ends of the band, Hz.
+      real(wp), intent(out) :: lowest, highest
+      !> What ends it, as the end of a sentence.
+      character(len=reason_length), intent(out) :: reason
+
+      lowest = 0.0_wp
+      highest = huge(highest)
+      reason = ''
+   end subroutine get_validity
 
 end module thud_floor_model

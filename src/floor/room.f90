@@ -7,8 +7,8 @@ module thud_room
    use thud_field, only: field_type, list_type
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, real_field
-   use thud_plate, only: air_type, get_critical_frequency, get_mode_density, get_radiation_factor, get_resistance, &
-      get_surface_mass, get_total_loss, plate_type
+   use thud_plate, only: air_type, get_critical_frequency, get_mode_density, get_radiation_factor, get_surface_mass, &
+      get_total_loss, plate_type
    use thud_rating, only: find_rated_bands, get_a_weighted_level
    use thud_text, only: to_text
    use thud_transient_energy, only: get_fast_maximum
@@ -45,6 +45,8 @@ module thud_room
    type :: room_level_type
       !> The thirds: [n_band].
       type(band_type), allocatable :: bands(:)
+      !> Power that a force of unit mean square gives to the floor, m/(N s): [n_band].
+      real(wp), allocatable :: conductance(:)
       !> Energy that the impact gives to the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -102,12 +104,15 @@ contains
 
    !> Predicts the level in the room.
    !>
-   !> An infinite plate takes E = integral F**2 dt/Z per band, the mean over positions of a finite one. The energy is
-   !> given at once: a contact of 20 ms is short against the detector. The energies obey (physics of subsystems)
+   !> The floor takes E = integral F**2 dt times the conductance per band. The energy is given at once: a contact of
+   !> 20 ms is short against the detector. The energies obey (physics of subsystems)
    !> E1' = -a1 E1 + a21 E2, E2' = a12 E1 - (a2 + a21) E2 with a1 = omega eta, a12 = rho0 c0 sigma/m'',
    !> a21 = a12 n1/n2 by reciprocity, a2 = 6 ln 10/T.
-   pure subroutine get_room_level(plate, room, bands, force_level, prediction)
+   pure subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
+      !> The plate that radiates.
       type(plate_type), intent(in) :: plate
+      !> Power that a force of unit mean square on the floor gives to it, m/(N s): [n_band].
+      real(wp), intent(in) :: conductance(:)
       type(room_type), intent(in) :: room
       !> Thirds from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
@@ -122,7 +127,8 @@ contains
       critical = get_critical_frequency(plate, room%air)
       width = bands%upper - bands%lower
       prediction%bands = bands
-      prediction%energy = 10**(force_level/10)/get_resistance(plate)
+      prediction%conductance = conductance
+      prediction%energy = 10**(force_level/10)*conductance
       prediction%radiation_factor = get_radiation_factor(bands%centre, critical, plate%length, plate%width, &
          room%air%sound_speed)
       prediction%loss_factor = get_total_loss(plate, room%air, bands%centre)
