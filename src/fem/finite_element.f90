@@ -211,7 +211,7 @@ contains
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
                if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
-                  get_contact_stress(run, interval), run%state%gas_pressure)
+                  get_contact_stress(run, interval), run%state%gas_pressure, run%floor%displacement)
                run%node_impulse = 0.0_wp
             end if
             call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
