@@ -14,13 +14,24 @@ from thud._schema import SCALARS
 from thud.case import Case
 from thud.checks import refuse
 from thud.errors import InputError
-from thud.impact import Impact
+from thud.impact import FloorImpact, Impact
 from thud.motion import Motion
 
 if TYPE_CHECKING:
     import os
 
     from numpy.typing import NDArray
+
+
+# Columns of every history, by the names of an impact; parts of the force follow the first three.
+_OWN = {
+    "time": "time_s",
+    "deflection": "deflection_m",
+    "velocity": "velocity_m_per_s",
+    "elastic_force": "elastic_force_N",
+    "floor_force": "floor_force_N",
+}
+_MOTION = ("time", "deflection", "velocity")
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -45,31 +56,52 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         folder = Path(directory)
         case = Case.from_namelist(f90nml.read(folder / "effective.nml"))
         numbers = f90nml.read(folder / "summary.nml")
-        force = _table(folder / "force.csv")
-        channels = folder / "channels.csv"
-        found = _table(channels) if channels.exists() else {}
-        motion = _read_motion(folder) if (folder / "motion.pvd").exists() else None
+        history = _read_history(folder, "", numbers["summary"], numbers.get("facts", {}))
+        moving = None
+        if "floor_summary" in numbers:
+            groups = numbers["floor_summary"], numbers.get("floor_facts", {})
+            moving = _read_history(folder, "floor_", *groups)
     except FileNotFoundError as error:
         refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
     except (OSError, ValueError, KeyError, TypeError) as error:
         message = f"{directory}: cannot be read ({error}); allowed: the results of an impact"
         raise InputError(message) from error
-    time = force.pop("time_s")
-    named = {name.rsplit("_", 1)[0]: values for name, values in force.items()}
-    return Impact(
-        case,
-        time,
-        named.pop("deflection"),
-        force["velocity_m_per_s"],
-        named.pop("elastic_force"),
-        named.pop("floor_force"),
-        {name: values for name, values in named.items() if name != "velocity_m_per"},
-        {name: values for name, values in found.items() if name != "time_s"},
-        dict(numbers.get("facts", {})),
-        _texts(numbers.get("remarks", {}).get("remark", [])),
-        motion,
-        **{name: numbers["summary"][name] for name in SCALARS},
-    )
+    remarks = _texts(numbers.get("remarks", {}).get("remark", []))
+    on_floor = None
+    if moving:
+        columns = moving.pop("further")
+        on_floor = FloorImpact(
+            case=case, remarks=(), floor_work=numbers["floor_summary"]["floor_work"],
+            blocked_force=columns.pop("blocked_force_N"),
+            floor_displacement=columns.pop("floor_displacement_m"),
+            floor_velocity=columns.pop("floor_velocity_m_per_s"),
+            point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
+            **moving,
+        )  # fmt: skip
+    del history["further"]
+    return Impact(case=case, remarks=remarks, on_floor=on_floor, **history)
+
+
+def _read_history(
+    folder: Path, prefix: str, scalars: dict[str, Any], facts: dict[str, float]
+) -> dict[str, Any]:
+    """Return what the files of a history hold; ``further`` are the columns of a floor."""
+    force = _table(folder / f"{prefix}force.csv")
+    channels = folder / f"{prefix}channels.csv"
+    found = _table(channels) if channels.exists() else {}
+    has_motion = (folder / f"{prefix}motion.pvd").exists()
+    # Parts of the force stand before it, columns of a floor behind.
+    columns = list(force)
+    last = columns.index("floor_force_N")
+    return {
+        **{name: force[column] for name, column in _OWN.items()},
+        "parts": {name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]},
+        "further": {name: force[name] for name in columns[last + 1 :]},
+        "channels": {name: values for name, values in found.items() if name != "time_s"},
+        "facts": dict(facts),
+        "motion": _read_motion(folder, prefix) if has_motion else None,
+        **{name: scalars[name] for name in SCALARS},
+    }
 
 
 def _texts(value: str | list[str]) -> tuple[str, ...]:
@@ -84,9 +116,10 @@ def _table(path: Path) -> dict[str, NDArray[np.float64]]:
         return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
 
 
-def _read_motion(folder: Path) -> Motion:
+def _read_motion(folder: Path, prefix: str) -> Motion:
     """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
-    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', (folder / "motion.pvd").read_text())
+    listed = (folder / f"{prefix}motion.pvd").read_text()
+    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', listed)
     shots = [_read_vtu(folder / name) for _, name in entries]
     # The first element has its first two nodes on neighbouring rings.
     line = int(shots[0]["connectivity"][1])

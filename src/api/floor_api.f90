@@ -83,7 +83,11 @@ contains
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call find_bands(set, bands, error)
-      if (.not. allocated(error)) call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
+      if (.not. allocated(error)) then
+         associate (floor => case%floors(get_floor_number(case))%model)
+            call floor%get_receiver(receiver, error)
+         end associate
+      end if
       if (.not. allocated(error)) then
          allocate (by_motion(size(bands)), by_mobility(size(bands)))
          call get_injected_energies(receiver, force, velocity, sample_rate, bands, by_motion, by_mobility)
@@ -117,8 +121,11 @@ contains
 
       allocate (bundle)
       call read_case(text, 'python', case, error)
-      if (.not. allocated(error)) call get_point_velocity(case%floors(get_floor_number(case))%model, force, sample_rate, x, &
-         y, velocity, error)
+      if (.not. allocated(error)) then
+         associate (floor => case%floors(get_floor_number(case))%model)
+            call get_point_velocity(floor, force, sample_rate, x, y, velocity, error)
+         end associate
+      end if
       if (.not. allocated(error)) call bundle%add_array('velocity', [n], velocity)
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine point_velocity

@@ -20,9 +20,9 @@ module thud_injected_energy
    !> around, so that 8 nodes err by 1e-12.
    integer, parameter :: n_node = 8
 
-   !> Least rate of decay that matters, 1/s: the spectrum of a contact is flat over so narrow a peak, and its width does
-   !> not change the energy.
-   real(wp), parameter :: min_decay = 0.05_wp
+   !> Least rate of decay, 1/s. Narrower peaks are widened to it: the spectrum of a contact changes by less than 1e-5 over
+   !> so narrow a one.
+   real(wp), parameter :: min_decay = 1.0e-3_wp
 
    !> Samples of a record at one frequency: transforms of force and velocity.
    type :: pair_type
