@@ -61,6 +61,7 @@ tables = (
     many.to_xarray().sizes,
 )
 floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
+floors += [thud.FloatingFloor(), thud.JoistFloor(), thud.MeasuredMobility()]
 light: thud.Impact = thud.solve(ball, floor=floors[1])
 moved: thud.FloorImpact | None = light.on_floor
 assert moved is not None
