@@ -342,7 +342,7 @@ contains
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call get_room_bands(bands, error)
       if (.not. allocated(error)) then
-         call get_room_level(case%floor, case%room, bands, level, prediction)
+         call get_room_level(case%floor, spread(1/get_resistance(case%floor), 1, n_band), case%room, bands, level, prediction)
          n = n_band
          call bundle%add_number('resistance', get_resistance(case%floor))
          call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
@@ -354,6 +354,12 @@ contains
          call bundle%add_array('bands.room_modes', n, prediction%room_modes)
          call bundle%add_array('bands.level', n, prediction%level)
          call bundle%add_array('bands.time', n, prediction%time)
+         call bundle%add_array('bands.spread', n, prediction%spread)
+         call bundle%add_array('octaves.frequency', shape(prediction%octave_level), prediction%octaves%nominal)
+         call bundle%add_array('octaves.level', shape(prediction%octave_level), prediction%octave_level)
+         call bundle%add_array('octaves.time', shape(prediction%octave_level), prediction%octave_time)
+         call bundle%add_array('history.time', shape(prediction%history_time), prediction%history_time)
+         call bundle%add_array('history.level', shape(prediction%history), prediction%history)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine predict_room

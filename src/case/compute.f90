@@ -8,6 +8,7 @@ module thud_compute
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
+   use thud_plate, only: get_resistance
    use thud_remarks, only: get_remarks, remark_length
    use thud_room, only: get_room_bands, get_room_level, room_level_type
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
@@ -147,7 +148,8 @@ contains
       if (allocated(error)) return
       allocate (level(size(bands)))
       call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
-      if (.not. allocated(error)) call get_room_level(case%floor, case%room, bands, level, prediction)
+      if (.not. allocated(error)) call get_room_level(case%floor, spread(1/get_resistance(case%floor), 1, size(bands)), &
+         case%room, bands, level, prediction)
    end subroutine predict_room
 
    !> Number of the force that the verdict is on.
