@@ -16,9 +16,11 @@ __all__ = [
     "Compression",
     "Drop",
     "FiniteElement",
-    "Floor",
+    "FloorName",
+    "FloorOptions",
     "HollowSphere",
     "HuntCrossley",
+    "InfinitePlate",
     "Levels",
     "Limits",
     "MeasuredModes",
@@ -26,6 +28,9 @@ __all__ = [
     "ModelName",
     "ModelOptions",
     "Modes",
+    "Oscillator",
+    "Plate",
+    "Rigid",
     "Room",
     "Sampling",
     "TwoMass",
@@ -50,7 +55,8 @@ LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
 LevelsForce = Literal["floor", "elastic"]
 LimitsSource = Literal["rubber_ball", "tyre"]
-FloorEdges = Literal["laboratory", "absorption"]
+FloorName = Literal["rigid", "infinite_plate", "oscillator", "plate"]
+PlateEdges = Literal["laboratory", "absorption"]
 BandSet = Literal["octave", "third"]
 
 
@@ -203,41 +209,6 @@ class Compression(Group):
     max_deflection: float = 0.04
     points: int = 41
     gas: CompressionGas = "vented"
-
-
-@dataclass(frozen=True)
-class Floor(Group):
-    """Floor over the room below: a homogeneous plate.
-
-    Attributes
-    ----------
-    length : float
-        Length of the floor, m; 0.5 <= length <= 100.
-    width : float
-        Width of the floor, m; 0.5 <= width <= 100.
-    thickness : float
-        Thickness of the floor, m; 0.001 <= thickness <= 2.
-    density : float
-        Density of the floor, kg/m3; 10 <= density <= 20000.
-    wave_speed : float
-        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
-    loss_factor : float
-        Internal loss factor of the floor; 0 <= loss_factor <= 1.
-    edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
-    edge_absorption : float
-        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
-        edge_absorption <= 1000.
-    """
-
-    length: float = 5.0
-    width: float = 4.0
-    thickness: float = 0.18
-    density: float = 2300.0
-    wave_speed: float = 3500.0
-    loss_factor: float = 0.005
-    edges: FloorEdges = "laboratory"
-    edge_absorption: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -488,7 +459,85 @@ class TwoMass(Group):
     belt_damping: float = 0.2
 
 
+@dataclass(frozen=True)
+class Rigid(Group):
+    """Floor ``rigid``."""
+
+    name: ClassVar[FloorName] = "rigid"
+
+
+@dataclass(frozen=True)
+class InfinitePlate(Group):
+    """Floor ``infinite_plate``.
+
+    Attributes
+    ----------
+    resistance : float
+        Force over velocity, N s/m; 1 <= resistance <= 1e+15.
+    """
+
+    name: ClassVar[FloorName] = "infinite_plate"
+    resistance: float = 1600.0
+
+
+@dataclass(frozen=True)
+class Oscillator(Group):
+    """Floor ``oscillator``.
+
+    Attributes
+    ----------
+    mass : float
+        Mass that moves under the source, kg; 0.001 <= mass <= 1e+12.
+    stiffness : float
+        Stiffness of its support, N/m; 0 <= stiffness <= 1e+15.
+    damping : float
+        Damping of its support, N s/m; 0 <= damping <= 1e+12.
+    """
+
+    name: ClassVar[FloorName] = "oscillator"
+    mass: float = 100.0
+    stiffness: float = 2467000.0
+    damping: float = 785.0
+
+
+@dataclass(frozen=True)
+class Plate(Group):
+    """Floor ``plate``.
+
+    Attributes
+    ----------
+    length : float
+        Length of the floor, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor, m; 0.5 <= width <= 100.
+    thickness : float
+        Thickness of the floor, m; 0.001 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    loss_factor : float
+        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+    edges : str
+        Losses at the edges of the floor; "laboratory", "absorption".
+    edge_absorption : float
+        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
+        edge_absorption <= 1000.
+    """
+
+    name: ClassVar[FloorName] = "plate"
+    length: float = 5.0
+    width: float = 4.0
+    thickness: float = 0.18
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    loss_factor: float = 0.005
+    edges: PlateEdges = "laboratory"
+    edge_absorption: float = 0.0
+
+
 ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley | TwoMass
+FloorOptions = Rigid | InfinitePlate | Oscillator | Plate
 
 # Source models by name, the default first.
 MODELS: dict[str, type[ModelOptions]] = {
@@ -498,6 +547,14 @@ MODELS: dict[str, type[ModelOptions]] = {
     MeasuredModes.name: MeasuredModes,
     HuntCrossley.name: HuntCrossley,
     TwoMass.name: TwoMass,
+}
+
+# Floors by name, the default first.
+FLOORS: dict[str, type[FloorOptions]] = {
+    Rigid.name: Rigid,
+    InfinitePlate.name: InfinitePlate,
+    Oscillator.name: Oscillator,
+    Plate.name: Plate,
 }
 
 # Groups that every model uses.
@@ -603,14 +660,19 @@ KEYS = (
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
     Key("", "levels", "force", "choice", "", "force whose levels, peak and verdict count", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
-    Key("floor", "floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
-    Key("floor", "floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
-    Key("floor", "floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
-    Key("floor", "floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
-    Key("floor", "floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
-    Key("floor", "floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("floor", "floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
-    Key("floor", "floor", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate')),
+    Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "force over velocity", (), 1.0, 1000000000000000.0),
+    Key("oscillator", "oscillator", "mass", "real", "kg", "mass that moves under the source", (), 0.001, 1000000000000.0),
+    Key("oscillator", "oscillator", "stiffness", "real", "N/m", "stiffness of its support", (), 0.0, 1000000000000000.0),
+    Key("oscillator", "oscillator", "damping", "real", "N s/m", "damping of its support", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
+    Key("plate", "plate", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("plate", "plate", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
+    Key("plate", "plate", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("plate", "plate", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
+    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
     Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
     Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
     Key("room", "room", "reverberation_times", "list", "s", "the same for each third from 50 to 630 Hz", (), 0.05, 20.0),

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from thud._api import Bundle
     from thud._schema import (
         BandSet,
+        FloorOptions,
         LevelsForce,
         LevelsMethod,
         LimitsSource,
@@ -244,9 +245,10 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     sample_rate: float = Sampling.sample_rate,
     duration: float = Sampling.duration,
     substeps: int = Sampling.substeps,
+    floor: FloorOptions | None = None,
     **options: object,
 ) -> Impact:
-    """Drop a ball on a rigid floor.
+    """Drop a ball on a floor.
 
     Parameters
     ----------
@@ -262,6 +264,9 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Length of the record, s; longer than the contact.
     substeps
         Integration steps per sampling interval.
+    floor
+        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`
+        or `Plate`; the standards judge the force on a rigid one.
     **options
         Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
         `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
@@ -288,6 +293,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         drop=Drop() if drop is None else drop,
         model=new_model(model, options),
         sampling=Sampling(sample_rate, duration, substeps),
+        floor=floor,
     )
     return _warned(compute(case))
 

@@ -10,15 +10,14 @@ module thud_api
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
    use thud_compression, only: compression_type
-   use thud_compute, only: compress_case, compute_case, results_type
+   use thud_compute, only: compress_case, compute_case, predict_room_level, results_type
    use thud_constants, only: compiler, version
    use thud_error, only: error_type
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: int64, int8, wp
-   use thud_plate, only: get_resistance
    use thud_progress_line, only: begin_progress, end_progress
-   use thud_room, only: get_room_bands, get_room_level, room_level_type
+   use thud_room, only: get_room_bands, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
    use thud_system, only: begin_call, end_call, end_all_calls => end_calls
    use thud_text, only: to_text
@@ -341,10 +340,10 @@ contains
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call get_room_bands(bands, error)
+      if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
       if (.not. allocated(error)) then
-         call get_room_level(case%floor, spread(1/get_resistance(case%floor), 1, n_band), case%room, bands, level, prediction)
          n = n_band
-         call bundle%add_number('resistance', get_resistance(case%floor))
+         call bundle%add_array('bands.conductance', n, prediction%conductance)
          call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
          call bundle%add_array('bands.energy', n, prediction%energy)
          call bundle%add_array('bands.radiation_factor', n, prediction%radiation_factor)

@@ -4,7 +4,7 @@ module thud_remarks
    use thud_case, only: case_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_registry, only: model_names
+   use thud_registry, only: floor_names, model_names
    use thud_text, only: fixed, quoted, to_text
    implicit none (type, external)
    private
@@ -36,11 +36,13 @@ module thud_remarks
 contains
 
    !> Remarks on a case and its force.
-   subroutine get_remarks(case, history, remarks)
+   subroutine get_remarks(case, history, moved, remarks)
       !> The case, checked.
       type(case_type), intent(in) :: case
       !> Its force, of no samples without an impact.
       type(force_history_type), intent(in) :: history
+      !> The floor has moved under the source.
+      logical, intent(in) :: moved
       !> Sentences: [n].
       character(len=remark_length), allocatable, intent(out) :: remarks(:)
       real(wp) :: level
@@ -52,6 +54,8 @@ contains
          call add_ball_remarks(case, modes_model, remarks)
       end if
       if (.not. case%has_impact) return
+      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. moved) call add(remarks, '&floor: name = ' &
+         //quoted(case%floor)//' does not move under the model '//quoted(case%model)//': its force is that on a rigid floor')
       level = 10*log10(max(sum(history%floor_force**2)/history%sample_rate, tiny(1.0_wp)))
       if (level < source_level(1) - max_distance .or. level > source_level(2) + max_distance) call add(remarks, &
          'the force exposure level over all frequencies is '//fixed(level, 1)//' dB, sources that conform have ' &

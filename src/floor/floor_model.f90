@@ -1,8 +1,9 @@
 !> The abstract floor: options from a namelist group, what a source feels of it, and the plate that radiates into the
 !> room below.
 !>
-!> A floor is a module `thud_<name>` with a type `<name>_type` that extends this one; the list `floor_models` in
-!> src/CMakeLists.txt makes it known. Its options belong to the group of its name.
+!> A floor `<name>` is a module `thud_<name>_floor` with a type `<name>_floor_type` that extends this one (a name that
+!> ends with `_floor` gets no second one); the list `floor_models` in src/CMakeLists.txt makes it known. Its options belong
+!> to the group of its name.
 module thud_floor_model
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type

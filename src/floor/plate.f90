@@ -38,7 +38,7 @@ module thud_plate
 
 contains
 
-   !> Keys and allowed ranges of the group `&floor`.
+   !> Keys and allowed ranges of the group `&plate`.
    function get_plate_fields(plate) result(fields)
       !> The plate that the fields read and set.
       type(plate_type), intent(in), target :: plate

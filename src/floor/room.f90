@@ -59,6 +59,8 @@ module thud_room
    type :: room_level_type
       !> The thirds: [n_band].
       type(band_type), allocatable :: bands(:)
+      !> Power that a force of unit mean square gives to the floor, m/(N s): [n_band].
+      real(wp), allocatable :: conductance(:)
       !> Energy that the impact gives to the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -151,6 +153,7 @@ contains
 
       width = bands%upper - bands%lower
       prediction%bands = bands
+      prediction%conductance = conductance
       prediction%energy = 10**(force_level/10)*conductance
       prediction%radiation_factor = get_radiation_factor(bands%centre, get_critical_frequency(plate, room%air), &
          plate%length, plate%width, room%air%sound_speed)
@@ -229,8 +232,8 @@ contains
    !> Energies of a third: floor, walls, room and the air above a ceiling, with what flows between them.
    !>
    !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T besides what goes back into them. Below a floor with a ceiling the air above this takes the sound, which the ceiling lets through by
-   !> its mass (Craik and Smith 2000), and the stiffness of that air drives the ceiling.
+   !> loses 6 ln 10/T besides what goes back into them. Below a floor with a ceiling the air above this takes the sound,
+   !> which the ceiling lets through by its mass (Craik and Smith 2000), and the stiffness of that air drives the ceiling.
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room

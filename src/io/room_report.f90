@@ -4,7 +4,6 @@ module thud_room_report
    use thud_case, only: case_type
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_plate, only: get_resistance
    use thud_rating, only: get_rounded
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: fixed, newline, to_text
@@ -70,14 +69,17 @@ contains
    end subroutine get_table_csv
 
    !> The levels for the screen; thirds of few modes are marked.
-   subroutine get_room_table(case, prediction, contact_time, text)
+   subroutine get_room_table(case, prediction, contact_time, coupled, text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
-      !> Contact time of the impact, s.
+      !> Contact time of the impact on a rigid floor, s.
       real(wp), intent(in) :: contact_time
+      !> The prediction is made of the force on the floor that moves, not of the blocked one.
+      logical, intent(in) :: coupled
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=1) :: mark
+      real(wp) :: resistance
       integer :: i
 
       text = '  '//padded('room below')//padded('L_i,Fmax')//padded('spread')//padded('floor modes') &
@@ -93,13 +95,14 @@ contains
          text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(prediction%octave_level(i), 1)//' dB'
       end do
       text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
-         //fixed(prediction%a_weighted, 2)//') of thirds, ISO 717-2 annex D: blocked force, statistical mean over positions.' &
-         //newline
-      text = text//'  Resistance of the floor '//fixed(get_resistance(case%floor)/1.0e3_wp, 1)//' kN s/m.'
+         //fixed(prediction%a_weighted, 2)//') of thirds, ISO 717-2 annex D: ' &
+         //trim(merge('contact force', 'blocked force', coupled))//', statistical mean over positions.'//newline
+      resistance = 1/maxval(prediction%conductance)
+      text = text//'  Resistance of the floor '//fixed(resistance/1.0e3_wp, 1)//' kN s/m.'
       if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
          //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'
       text = text//newline//'  Spread: expected standard deviation of one position of source and microphone.'//newline
-      if (contact_time*get_resistance(case%floor) < firm*case%ball%mass) text = text &
+      if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor gives way under the source, and the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 

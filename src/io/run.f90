@@ -118,8 +118,13 @@ contains
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
-      if (case%has_room .and. .not. allocated(error)) call predict_room(case, results%history%floor_force, &
-         results%history%sample_rate, results%room, error)
+      if (case%has_room .and. .not. allocated(error)) then
+         if (allocated(results%on_floor)) then
+            call predict_room(case, results%on_floor%floor_force, results%on_floor%sample_rate, results%room, error)
+         else
+            call predict_room(case, results%history%floor_force, results%history%sample_rate, results%room, error)
+         end if
+      end if
       if (allocated(error)) return
       call describe(case, results, files, outcome)
       call write_results(outcome%directory, input, files, differs, error)
@@ -175,7 +180,7 @@ contains
          outcome%conforms = is_conforming(case, verdict)
          outcome%table = outcome%table//newline//get_table(case, history, verdict)
          if (case%has_room) then
-            call get_room_table(case, results%room, history%contact_time, room_table)
+            call get_room_table(case, results%room, history%contact_time, allocated(results%on_floor), room_table)
             outcome%table = outcome%table//newline//room_table
          end if
          outcome%table = outcome%table//get_defaults_line(case)

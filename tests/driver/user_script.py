@@ -60,7 +60,10 @@ tables = (
     flagship.to_xarray().sizes,
     many.to_xarray().sizes,
 )
-floor, room = thud.Floor(thickness=0.2), thud.Room(volume=40.0)
+floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
+light: thud.Impact = thud.solve(ball, floor=floors[1])
+chosen: thud.FloorName = floors[1].name
+floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
 below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
 site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)

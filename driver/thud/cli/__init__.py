@@ -13,6 +13,7 @@ from thud._api import version
 from thud.checks import suggestion
 from thud.cli.calibrate import CALIBRATE
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.examples import EXAMPLES
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.history import run_history
@@ -96,6 +97,7 @@ COMMANDS = {
     ),
     "rate": RATE,
     **study_commands(),
+    "examples": EXAMPLES,
     "figures": Command(
         "draw the figures of the paper and of the documentation",
         (output("the figures (default: outputs/figures)", default="outputs/figures"), QUIET),

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud._schema import Floor, Room
+    from thud._schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
 # Modes of a third below which a statistical answer is doubtful.
@@ -37,7 +37,7 @@ class RoomPrediction(Displayed):
 
     Attributes
     ----------
-    floor, room : Floor and Room
+    floor, room : Plate and Room
         What it was predicted for.
     frequency : ndarray, shape (12,)
         Rounded mid frequencies of the thirds 50 to 630 Hz.
@@ -53,15 +53,15 @@ class RoomPrediction(Displayed):
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
         Expected number of modes in each third.
-    resistance : float
-        Resistance of the infinite plate, N s/m.
+    conductance : ndarray, shape (12,)
+        Power that a force of unit mean square gives to the floor, m/(N s).
     force_change : float
         What the peak of the force would change by if the floor gave way, dB: of a linear source
         with the mass and the contact time of the impact. The prediction uses the force on a rigid
         floor.
     """
 
-    floor: Floor
+    floor: FloorOptions
     room: Room
     frequency: NDArray[np.float64]
     level: NDArray[np.float64]
@@ -72,7 +72,7 @@ class RoomPrediction(Displayed):
     reverberation_time: NDArray[np.float64]
     floor_modes: NDArray[np.float64]
     room_modes: NDArray[np.float64]
-    resistance: float
+    conductance: NDArray[np.float64]
     force_change: float
 
     @property
@@ -149,7 +149,7 @@ class RoomPrediction(Displayed):
 
 
 def predict_level(
-    source: Impact | Recording, floor: Floor | None = None, room: Room | None = None
+    source: Impact | Recording, floor: FloorOptions | None = None, room: Room | None = None
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
@@ -174,7 +174,7 @@ def predict_level(
     floor, room = floor or case.floor, room or case.room
     if floor is None or room is None:
         refuse(
-            f"{'floor' if floor is None else 'room'} is not given", "an object of Floor and of Room"
+            f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
         )
     levels = (
         source.levels(THIRDS, force="floor")
@@ -189,8 +189,7 @@ def predict_level(
     return RoomPrediction(
         floor=floor,
         room=room,
-        resistance=found["resistance"],
-        force_change=_force_change(mass, source.contact_time, found["resistance"]),
+        force_change=_force_change(mass, source.contact_time, 1 / bands["conductance"].max()),
         time_of_maximum=bands.pop("time"),
         **bands,
     )
