@@ -154,7 +154,7 @@ contains
       type(contacts_type) :: contacts
       real(wp) :: speed, gap
 
-      history = new_impact_record(sampling, get_impact_velocity(drop))
+      history = new_impact_record(sampling, get_impact_velocity(drop), receiver)
       history%touch_time = options%flight_before
       speed = history%impact_velocity - drop%gravity*options%flight_before
       gap = speed*options%flight_before + drop%gravity*options%flight_before**2/2
@@ -165,7 +165,7 @@ contains
       end if
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
-      run = new_impact_run(ball, options, material, drop%gravity, gap, speed)
+      run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)
       contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
       history%motion = new_motion(run%position, get_frame_count(options, sampling))
       call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, error)
@@ -221,12 +221,14 @@ contains
          if (contacts%n_over < options%bounces) cycle samples
          if (time > contacts%latest + max(contacts%quiet, options%flight_after)) exit samples
       end do samples
-      if (contacts%n_over < options%bounces) then
+      if (run%floor%moves .and. run%impulse > 0.0_wp) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends while the ball is on the floor' &
+            //', which gives way; allowed: longer than the contact, which has no end on a floor too light for the ball')
+      else if (contacts%n_over < options%bounces) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
             //to_text(contacts%quiet)//' s after contact '//to_text(options%bounces)//'; allowed: longer than that')
-         return
       end if
-      call continue_flight(run, latest, start, history)
+      if (.not. allocated(error)) call continue_flight(run, latest, start, history)
    end subroutine march
 
    !> Chooses the number of steps in the next sampling intervals. Refuses a run that takes too long.
@@ -283,7 +285,7 @@ contains
 
       associate (last => ubound(run%position, 2))
          touches = minval(run%position(:, last, 2) + step*(run%velocity(:, last, 2) - step*run%gravity) &
-            - run%contact%edge_height) < 0.0_wp
+            - run%contact%edge_height) + run%floor%stop + step*run%floor%velocity < 0.0_wp
       end associate
    end function will_touch
 

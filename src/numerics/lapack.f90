@@ -4,7 +4,8 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgbsv, dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
+   public :: dgbsv, dgels, dgemm, dgemv, dgesv, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr, dsygv, dsyrk
+   public :: dtrsm, dtrsv
 
    interface
       !> Generalised symmetric eigenproblem.
@@ -115,6 +116,16 @@ module thud_lapack
          integer, intent(out) :: info
          real(wp), intent(inout) :: ab(ldab, *), b(ldb, *)
       end subroutine dgbsv
+
+      !> Solution with a matrix.
+      pure subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: n, nrhs, lda, ldb
+         integer, intent(out) :: ipiv(*)
+         real(wp), intent(inout) :: a(lda, *), b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dgesv
 
       !> Cholesky factor of a small matrix.
       pure subroutine dpotf2(uplo, n, a, lda, info)

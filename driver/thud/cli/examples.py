@@ -22,7 +22,8 @@ def copy_examples(options: argparse.Namespace) -> int:
     with resources.as_file(resources.files("thud") / "inputs") as source:
         if not source.is_dir():
             refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
-        shutil.copytree(source, target)
+        # Installers compile the scripts.
+        shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
     if not options.quiet:
         print(f"Inputs: {target}")
     return 0
