@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from thud.comparison import read_all as read_all
     from thud.compression_fit import CompressionFit as CompressionFit
     from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.floor_comparison import FloorComparison as FloorComparison
+    from thud.floors.floor_comparison import compare_floors as compare_floors
     from thud.floors.modal_room import ModalRoom as ModalRoom
     from thud.floors.modal_room import modal_room as modal_room
     from thud.floors.prediction import RoomPrediction as RoomPrediction
@@ -85,9 +87,11 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "compare_floors": "floors.floor_comparison",
     "CompressionFit": "compression_fit",
     "fit_compression": "compression_fit",
     "read_all": "comparison",
+    "FloorComparison": "floors.floor_comparison",
     "ModalRoom": "floors.modal_room",
     "Rating": "floors.rating",
     "Recording": "recordings.recording",
@@ -171,6 +175,9 @@ MAKERS.update(
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    floors=_maker("plot.floors", "draw_floors"),
+    floors_html=_maker("plot.floors", "floors_html"),
+    save_all=_maker("plot.look", "save_all"),
     modal_room=_maker("plot.modal_room", "draw_modal_room"),
     prediction=_maker("plot.prediction", "draw_prediction"),
     room=_maker("plot.room", "room_levels"),

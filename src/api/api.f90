@@ -344,6 +344,7 @@ contains
       if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
       if (.not. allocated(error)) then
          n = n_band
+         call bundle%add_number('surface_mass', prediction%surface_mass)
          call bundle%add_array('bands.conductance', n, prediction%conductance)
          call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
          call bundle%add_array('bands.energy', n, prediction%energy)

@@ -45,12 +45,13 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
-         list_field('wall_lengths', walls%lengths, 'm', 'lengths of the flanking walls along the floor (default: no walls)', &
-         '[0.1, 100]'), &
+         list_field('wall_lengths', walls%lengths, 'm', &
+         'lengths of the flanking walls along the floor (default: no walls)', '[0.1, 100]'), &
          real_field('wall_height', walls%height, 'm', 'height of the walls', '[0.5, 20]'), &
          real_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls', '[0.005, 2]'), &
          real_field('wall_density', walls%density, 'kg/m3', 'density of the walls', '[10, 20000]'), &
-         real_field('wall_wave_speed', walls%wave_speed, 'm/s', 'speed of longitudinal waves in the walls', '[100, 10000]'), &
+         real_field('wall_wave_speed', walls%wave_speed, 'm/s', 'speed of longitudinal waves in the walls', &
+         '[100, 10000]'), &
          real_field('wall_loss_factor', walls%loss_factor, '', 'internal loss factor of the walls', '[0, 1]'), &
          choice_field('wall_junction', walls%junction, &
          'junction of floor and walls: rigid cross or t, or one of a given index', junctions), &

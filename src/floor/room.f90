@@ -61,6 +61,8 @@ module thud_room
       type(band_type), allocatable :: bands(:)
       !> Power that a force of unit mean square gives to the floor, m/(N s): [n_band].
       real(wp), allocatable :: conductance(:)
+      !> Mass of the radiating plate over its area, kg/m2.
+      real(wp) :: surface_mass = 0.0_wp
       !> Energy that the impact gives to the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -154,6 +156,7 @@ contains
       width = bands%upper - bands%lower
       prediction%bands = bands
       prediction%conductance = conductance
+      prediction%surface_mass = get_surface_mass(plate)
       prediction%energy = 10**(force_level/10)*conductance
       prediction%radiation_factor = get_radiation_factor(bands%centre, get_critical_frequency(plate, room%air), &
          plate%length, plate%width, room%air%sound_speed)

@@ -18,17 +18,25 @@ from scipy.signal import lfilter, sosfilt
 from thud._api import api, call
 from thud._schema import Plate, Room
 from thud.case import Case, case_text
-from thud.checks import refuse, refuse_value, require_array, require_kind, require_real, require_whole
+from thud.checks import (
+    refuse,
+    refuse_value,
+    require_array,
+    require_kind,
+    require_real,
+    require_whole,
+)
 from thud.display import MAKERS, Displayed
 from thud.floors.prediction import RoomPrediction, predict_level
-from thud.impact import Impact
 from thud.levels import get_bands
 from thud.recordings.bank import band_filters
-from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
+
+    from thud.impact import Impact
+    from thud.recordings.recording import Recording
 
     Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
@@ -94,7 +102,8 @@ class ModalRoom(Displayed):
     @property
     def spread(self) -> Array:
         """Standard deviation of the levels of all positions, dB, shape (9,)."""
-        return self.level.std(axis=(0, 1))
+        spread: Array = self.level.std(axis=(0, 1))
+        return spread
 
     @property
     def statistical(self) -> Array:
@@ -248,7 +257,9 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
     # f = c (k1**2 + k2**2): half-waves along one side at the highest frequency.
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
-    numbers = _grid([1 + int(side * math.sqrt(HIGHEST / unit)) for side in (floor.length, floor.width)])
+    numbers = _grid(
+        [1 + int(side * math.sqrt(HIGHEST / unit)) for side in (floor.length, floor.width)]
+    )
     numbers += 1
     frequency = plate_frequencies(floor, numbers)
     keep = frequency <= HIGHEST
@@ -273,7 +284,8 @@ def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, 
 
 def _grid(most: list[int]) -> Array:
     """Return all combinations of whole numbers from 0 to below the given ones."""
-    return np.stack(np.meshgrid(*map(np.arange, most), indexing="ij"), -1).reshape(-1, len(most)) + 0.0
+    grid = np.meshgrid(*(np.arange(float(one)) for one in most), indexing="ij")
+    return np.stack(grid, -1).reshape(-1, len(most))
 
 
 def _require_modes(what: str, count: int) -> None:
@@ -308,16 +320,16 @@ def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
 def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
     """Return 1/(w0**2 - w**2 + i w a), a the rate of decay of the energy; 0 at w = 0."""
     natural = 2 * np.pi * frequency[:, None]
-    divisor = natural**2 - omega**2 + 1j * omega * decay[:, None]
+    divisor: ComplexArray = natural**2 - omega**2 + 1j * omega * decay[:, None]
     divisor[:, omega == 0] = 1.0
-    found: ComplexArray = (omega > 0) / divisor
-    return found
+    return (omega > 0) / divisor
 
 
 def _spectrum(source: Impact | Recording, duration: float) -> tuple[Array, ComplexArray]:
     """Return angular frequencies, rad/s, and the Fourier transform of the force, N s."""
     force = source.force("floor")
-    n_sample = int(SAMPLE_RATE * max(duration, len(force) / source.sample_rate))
+    # An even number, which the inverse transform takes its length for.
+    n_sample = 2 * math.ceil(SAMPLE_RATE / 2 * max(duration, len(force) / source.sample_rate))
     omega = 2 * np.pi * np.arange(n_sample // 2 + 1) * SAMPLE_RATE / n_sample
     # The same period in samples of the force; rounding moves a frequency by less than 1e-5.
     count = max(round(n_sample * source.sample_rate / SAMPLE_RATE), len(force))
@@ -327,7 +339,8 @@ def _spectrum(source: Impact | Recording, duration: float) -> tuple[Array, Compl
 def _fast_maxima(spectrum: ComplexArray) -> Array:
     """Return maximum Fast levels of the thirds, dB, shape (n_microphone, 9)."""
     pressure = np.fft.irfft(spectrum, axis=1) * SAMPLE_RATE
-    return fast_levels(pressure).max(axis=2).T
+    found: Array = fast_levels(pressure).max(axis=2).T
+    return found
 
 
 def fast_levels(pressure: Array) -> Array:
@@ -357,12 +370,12 @@ def _positions(
 ) -> Array:
     """Return positions, m, shape (n, len(size)), drawn or checked."""
     sides = np.array(size)
-    if np.ndim(given) == 0:  # type: ignore[arg-type]
+    if isinstance(given, int | np.integer | float | str):
         require_whole(name, given, 1, MAX_POSITIONS)
         border = np.minimum(BORDER, sides / 4)
-        random: Array = border + draw.random((int(given), len(size))) * (sides - 2 * border)  # type: ignore[call-overload]
+        random: Array = border + draw.random((int(given), len(size))) * (sides - 2 * border)
         return random
-    places = require_real(name, require_array(name, given, dimensions=(2,)))  # type: ignore[arg-type]
+    places = require_real(name, require_array(name, given, dimensions=(2,)))
     if places.shape[1] != len(size) or not 1 <= len(places) <= MAX_POSITIONS:
         refuse(
             f"{name} have the shape {places.shape}",

@@ -53,6 +53,8 @@ class RoomPrediction(Displayed):
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
         Expected number of modes in each third.
+    surface_mass : float
+        Mass of the radiating plate over its area, kg/m2.
     spread : ndarray, shape (12,)
         Expected standard deviation of the level for one position of the source and one of the
         microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
@@ -83,6 +85,7 @@ class RoomPrediction(Displayed):
     floor_modes: NDArray[np.float64]
     room_modes: NDArray[np.float64]
     conductance: NDArray[np.float64]
+    surface_mass: float
     spread: NDArray[np.float64]
     octave_level: NDArray[np.float64]
     octave_time: NDArray[np.float64]
@@ -94,6 +97,13 @@ class RoomPrediction(Displayed):
     def rating(self) -> Rating:
         """Single numbers of the levels in the room."""
         return rating(self.level, THIRDS)
+
+    @property
+    def radiated_share(self) -> NDArray[np.float64]:
+        """Share of the floor's losses that it radiates into the room, shape (12,)."""
+        air = self.room.air_density * self.room.sound_speed
+        omega = 2 * np.pi * self.frequency
+        return air * self.radiation_factor / (self.surface_mass * omega * self.loss_factor)
 
     @property
     def octave_rating(self) -> Rating:
@@ -149,7 +159,8 @@ class RoomPrediction(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
         head = (
-            "third, Hz", "L_i,Fmax, dB", "standardised, dB", "spread, dB", "energy, mJ", "floor modes",
+            "third, Hz", "L_i,Fmax, dB", "standardised, dB", "spread, dB", "energy, mJ",
+            "floor modes",
         )  # fmt: skip
         columns = (self.level, self.standardised, self.spread, 1e3 * self.energy, self.floor_modes)
         forms = (".1f", ".1f", ".1f", ".3g", ".1f")
@@ -215,6 +226,7 @@ def predict_level(
         room=room,
         force_change=_force_change(mass, source.contact_time, 1 / bands["conductance"].max()),
         time_of_maximum=bands.pop("time"),
+        surface_mass=found["surface_mass"],
         octave_level=found["octaves"]["level"],
         octave_time=found["octaves"]["time"],
         history_time=found["history"]["time"],

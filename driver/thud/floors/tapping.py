@@ -16,7 +16,6 @@ from thud.display import Displayed
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud._schema import FloorOptions
 
 # Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
 THIRDS = np.array(
@@ -74,7 +73,7 @@ class TappingLevel(Displayed):
         return f"<TappingLevel: L_n,w {self.weighted} dB, C_I {self.adaptation} dB>"
 
 
-def tapping_level(floor: FloorOptions, room: Room | None = None) -> TappingLevel:
+def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     """Return the level of the tapping machine below a homogeneous concrete floor.
 
     L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz), T_s = 2.2/(f eta), with the
@@ -104,8 +103,8 @@ def tapping_level(floor: FloorOptions, room: Room | None = None) -> TappingLevel
     ratio = floor.wave_speed / floor.density
     if not 1 / WITHIN <= ratio / CONCRETE <= WITHIN:
         refuse(
-            f"floor: wave_speed/density = {ratio:.3g} is not that of concrete, which the formula of "
-            "ISO 12354-2 holds",
+            f"floor: wave_speed/density = {ratio:.3g} is not that of concrete, which the formula "
+            "of ISO 12354-2 holds",
             f"{CONCRETE / WITHIN:.2f} to {CONCRETE * WITHIN:.2f} m4/(kg s)",
         )
     case = Case(floor=floor, room=require_room(room))
