@@ -61,6 +61,7 @@ tables = (
     many.to_xarray().sizes,
 )
 floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
+floors += [thud.FloatingFloor(), thud.JoistFloor(), thud.MeasuredMobility()]
 light: thud.Impact = thud.solve(ball, floor=floors[1])
 chosen: thud.FloorName = floors[1].name
 floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
