@@ -112,6 +112,27 @@ def test_models_of_the_blocked_force_say_so() -> None:
         )
 
 
+def test_points_of_a_plate_move(
+    run: Callable[..., subprocess.CompletedProcess[str]], case_file: Callable[[str], Path]
+) -> None:
+    """The point under the source moves as the source feels it; a farther one as its transfer."""
+    text = "&model /\n&floor name = 'plate' /\n&plate point_x = 2.5, 1.0 point_y = 2.0, 0.5 /\n"
+    done = run(case_file(text), "-o", "out")
+    assert done.returncode == 0, done.stderr
+    found = thud.read_results(case_file(text).parent / "out").on_floor
+    assert found is not None
+    under, far = found.point_velocity
+    scale = abs(found.floor_velocity).max()
+    # The force is taken for constant in a sample: (w dt)**2 of the highest modes.
+    assert under == pytest.approx(found.floor_velocity, abs=0.02 * scale)
+    assert far == pytest.approx(found.velocity_at(1.0, 0.5), abs=1e-12)
+    assert 0 < abs(far).max() < scale
+    with pytest.raises(thud.InputError, match="&plate: .*allowed"):
+        thud.solve(floor=thud.Plate(point_x=[9.0], point_y=[1.0]))
+    with pytest.raises(thud.InputError, match="point_x has 2 values and point_y 1; allowed: as"):
+        thud.solve(floor=thud.Plate(point_x=[1.0, 2.0], point_y=[1.0]))
+
+
 def test_points_are_of_floors_with_sides(moved: thud.FloorImpact) -> None:
     with pytest.raises(thud.InputError, match="no points but that under the source"):
         moved.velocity_at(1.0, 1.0)
