@@ -65,7 +65,7 @@ floors += [thud.FloatingFloor(), thud.JoistFloor(), thud.MeasuredMobility()]
 light: thud.Impact = thud.solve(ball, floor=floors[1])
 moved: thud.FloorImpact | None = light.on_floor
 assert moved is not None
-shares: thud.FloorEnergy = moved.injected_energy("third")
+portions: thud.FloorEnergy = moved.injected_energy("third")
 print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]), moved.difference())
 name: thud.FloorName = chosen
 floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
