@@ -70,6 +70,7 @@ FloorName = Literal[
 PlateEdges = Literal["laboratory", "absorption"]
 FloatingFloorEdges = Literal["laboratory", "absorption"]
 JoistFloorSourceOn = Literal["sheathing", "joist"]
+RoomWallJunction = Literal["cross", "t", "index"]
 BandSet = Literal["octave", "third"]
 
 
@@ -240,6 +241,31 @@ class Room(Group):
         Density of the air, kg/m3; 0.5 <= air_density <= 2.
     sound_speed : float
         Speed of sound in the air, m/s; 200 <= sound_speed <= 500.
+    wall_lengths : sequence of float
+        Lengths of the flanking walls along the floor (default: no walls), m; 0.1 <= wall_lengths
+        <= 100.
+    wall_height : float
+        Height of the walls, m; 0.5 <= wall_height <= 20.
+    wall_thickness : float
+        Thickness of the walls, m; 0.005 <= wall_thickness <= 2.
+    wall_density : float
+        Density of the walls, kg/m3; 10 <= wall_density <= 20000.
+    wall_wave_speed : float
+        Speed of longitudinal waves in the walls, m/s; 100 <= wall_wave_speed <= 10000.
+    wall_loss_factor : float
+        Internal loss factor of the walls; 0 <= wall_loss_factor <= 1.
+    wall_junction : str
+        Junction of floor and walls: rigid cross or t, or one of a given index; "cross", "t",
+        "index".
+    junction_index : float
+        Vibration reduction index from floor to wall, of the junction index, dB; -10 <=
+        junction_index <= 80.
+    ceiling_mass : float
+        Mass of a suspended ceiling over its area; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
+    ceiling_depth : float
+        Depth of the air above the ceiling, m; 0.01 <= ceiling_depth <= 2.
+    ceiling_loss_factor : float
+        Loss factor of that air; 0.001 <= ceiling_loss_factor <= 1.
     """
 
     volume: float = 50.0
@@ -247,6 +273,17 @@ class Room(Group):
     reverberation_times: Sequence[float] = ()
     air_density: float = 1.2
     sound_speed: float = 343.0
+    wall_lengths: Sequence[float] = ()
+    wall_height: float = 2.5
+    wall_thickness: float = 0.2
+    wall_density: float = 2300.0
+    wall_wave_speed: float = 3500.0
+    wall_loss_factor: float = 0.005
+    wall_junction: RoomWallJunction = "cross"
+    junction_index: float = 10.0
+    ceiling_mass: float = 0.0
+    ceiling_depth: float = 0.1
+    ceiling_loss_factor: float = 0.1
 
 
 @dataclass(frozen=True)
@@ -546,6 +583,10 @@ class Plate(Group):
         Place of the source along the length, over the length; 0 < source_x < 1.
     source_y : float
         Place of the source along the width, over the width; 0 < source_y < 1.
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -561,6 +602,8 @@ class Plate(Group):
     edge_absorption: float = 0.0
     source_x: float = 0.5
     source_y: float = 0.5
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -609,6 +652,10 @@ class FloatingFloor(Group):
         Place of the source along the length, over the length; 0 < source_x < 1.
     source_y : float
         Place of the source along the width, over the width; 0 < source_y < 1.
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "floating_floor"
@@ -630,6 +677,8 @@ class FloatingFloor(Group):
     layer_loss_factor: float = 0.1
     source_x: float = 0.5
     source_y: float = 0.5
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -669,6 +718,10 @@ class JoistFloor(Group):
         Place of the source across the joists, over the width; 0 < source_y < 1.
     source_on : str
         What the source drops on there: sheathing between joists, or a joist; "sheathing", "joist".
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "joist_floor"
@@ -687,6 +740,8 @@ class JoistFloor(Group):
     source_x: float = 0.5
     source_y: float = 0.5
     source_on: JoistFloorSourceOn = "sheathing"
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -874,6 +929,8 @@ KEYS = (
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("plate", "plate", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
@@ -892,6 +949,8 @@ KEYS = (
     Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "width", "real", "m", "width of the floor across the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
@@ -907,6 +966,8 @@ KEYS = (
     Key("joist_floor", "joist_floor", "source_x", "real", "", "place of the source along the joists, over the length", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "place of the source across the joists, over the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "what the source drops on there: sheathing between joists, or a joist", ('sheathing', 'joist')),
+    Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles over 2 pi", (), 1e-06, 10000000.0),
     Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 0.0, 1.0),
@@ -919,4 +980,15 @@ KEYS = (
     Key("room", "room", "reverberation_times", "list", "s", "the same for each third from 50 to 630 Hz", (), 0.05, 20.0),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
+    Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),
+    Key("room", "room", "wall_height", "real", "m", "height of the walls", (), 0.5, 20.0),
+    Key("room", "room", "wall_thickness", "real", "m", "thickness of the walls", (), 0.005, 2.0),
+    Key("room", "room", "wall_density", "real", "kg/m3", "density of the walls", (), 10.0, 20000.0),
+    Key("room", "room", "wall_wave_speed", "real", "m/s", "speed of longitudinal waves in the walls", (), 100.0, 10000.0),
+    Key("room", "room", "wall_loss_factor", "real", "", "internal loss factor of the walls", (), 0.0, 1.0),
+    Key("room", "room", "wall_junction", "choice", "", "junction of floor and walls: rigid cross or t, or one of a given index", ('cross', 't', 'index')),
+    Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, of the junction index", (), -10.0, 80.0),
+    Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass of a suspended ceiling over its area; 0: none", (), 0.0, 200.0),
+    Key("room", "room", "ceiling_depth", "real", "m", "depth of the air above the ceiling", (), 0.01, 2.0),
+    Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of that air", (), 0.001, 1.0),
 )
