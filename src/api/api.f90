@@ -16,6 +16,7 @@ module thud_api
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: int64, int8, wp
+   use thud_progress, only: latest_progress
    use thud_progress_line, only: begin_progress, end_progress
    use thud_room, only: get_room_bands, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
@@ -25,7 +26,7 @@ module thud_api
    private
 
    public :: check_text, collect, compress, describe_library, effective_case, end_calls, free_modes, loss_factors
-   public :: predict_room, run, solve
+   public :: get_progress, predict_room, run, solve
 
 contains
 
@@ -53,6 +54,14 @@ contains
 
       call end_all_calls()
    end subroutine end_calls
+
+   !> How far the latest long work of this process is.
+   subroutine get_progress(done)
+      !> Part that is done, 0 to 1.
+      real(wp), intent(out) :: done
+
+      done = latest_progress
+   end subroutine get_progress
 
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
