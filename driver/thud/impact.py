@@ -265,8 +265,9 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     substeps
         Integration steps per sampling interval.
     floor
-        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`
-        or `Plate`; the standards judge the force on a rigid one.
+        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
+        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards judge the force
+        on a rigid one.
     **options
         Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
         `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.

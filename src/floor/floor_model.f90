@@ -13,7 +13,10 @@ module thud_floor_model
    implicit none (type, external)
    private
 
-   public :: floor_model_type
+   public :: floor_model_type, reason_length
+
+   !> Length of a reason.
+   integer, parameter :: reason_length = 112
 
    !> A floor with its options as components.
    type, abstract :: floor_model_type
@@ -23,6 +26,7 @@ module thud_floor_model
       procedure, pass(options) :: check
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
+      procedure, pass(options) :: get_validity
    end type floor_model_type
 
    abstract interface
@@ -86,5 +90,18 @@ contains
       conductance = 0.0_wp
       error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
    end subroutine get_radiator
+
+   !> Band in which the floor is what it claims to be; by default at all frequencies.
+   subroutine get_validity(options, lowest, highest, reason)
+      class(floor_model_type), intent(in) :: options
+      !> Ends of the band, Hz.
+      real(wp), intent(out) :: lowest, highest
+      !> What ends it, as the end of a sentence.
+      character(len=reason_length), intent(out) :: reason
+
+      lowest = 0.0_wp
+      highest = huge(highest)
+      reason = ''
+   end subroutine get_validity
 
 end module thud_floor_model

@@ -11,7 +11,7 @@ module thud_run
       motion_names
    use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
-   use thud_room_report, only: get_room_csv, get_room_table
+   use thud_room_report, only: get_room_files, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
    use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
@@ -26,8 +26,6 @@ module thud_run
    !> File of models with channels.
    character(len=*), parameter :: channel_file = 'channels.csv'
 
-   !> File of cases with a room below.
-   character(len=*), parameter :: room_file = 'room_levels.csv'
    !> File of a slow compression.
    character(len=*), parameter :: compression_file = 'compression.csv'
 
@@ -198,9 +196,8 @@ contains
          end if
       end associate
       if (case%has_room) then
-         at = at + 1
-         files(at)%name = room_file
-         call get_room_csv(results%room, files(at)%content)
+         call get_room_files(results%room, files(at + 1:at + size(room_file_names)))
+         at = at + size(room_file_names)
       end if
       if (case%has_compression) then
          at = at + 1
@@ -222,7 +219,7 @@ contains
       if (.not. case%has_impact) return
       n_file = n_file + size(file_names)
       if (allocated(results%history%channel)) n_file = n_file + 1
-      if (case%has_room) n_file = n_file + 1
+      if (case%has_room) n_file = n_file + size(room_file_names)
       if (case%has_compression) n_file = n_file + 1
       if (results%history%motion%n_frame > 0) n_file = n_file + results%history%motion%n_frame + size(motion_names)
    end function count_files

@@ -17,6 +17,7 @@ from thud.cli.examples import EXAMPLES
 from thud.cli.explore import EXPLORE
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
+from thud.cli.floor import FLOOR
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
 from thud.cli.rate import RATE
@@ -98,6 +99,7 @@ COMMANDS = {
         run_history,
     ),
     "rate": RATE,
+    "floor": FLOOR,
     **study_commands(),
     "examples": EXAMPLES,
     "figures": Command(

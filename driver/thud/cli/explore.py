@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+import socket
 import sys
 import webbrowser
 from pathlib import Path
@@ -30,10 +31,10 @@ def explore(options: argparse.Namespace) -> int:
     hosts = LOOPBACK if options.host in LOOPBACK else ("*",)
     application = new_application(start, token=token, hosts=hosts)
     try:
-        socket = uvicorn.Config(application, options.host, options.port).bind_socket()
-    except (OSError, SystemExit) as error:
+        listener = socket.create_server((options.host, options.port))
+    except (OSError, OverflowError) as error:
         refuse(f"{options.host}:{options.port} cannot be listened on", "a free port", error)
-    address = f"http://{options.host}:{socket.getsockname()[1]}/#token={token}"
+    address = f"http://{options.host}:{listener.getsockname()[1]}/#token={token}"
     if not options.quiet:
         print(f"Page: {address}")
         print("Ctrl-C ends it.")
@@ -47,7 +48,7 @@ def explore(options: argparse.Namespace) -> int:
     if not options.no_browser:
         webbrowser.open(address)
     config = uvicorn.Config(application, log_level="warning", timeout_graceful_shutdown=1)
-    uvicorn.Server(config).run(sockets=[socket])
+    uvicorn.Server(config).run(sockets=[listener])
     return 0
 
 

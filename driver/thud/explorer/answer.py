@@ -70,7 +70,7 @@ def answer_recording(name: str, content: bytes, height: float | None, mass: floa
         path.write_bytes(content)
         try:
             recording = read_recording(path, height=height, mass=mass)
-            found = _answer(recording, *recording.waveform(0), recording.peak())
+            found = _answer(recording, *recording.to_force_history(), recording.peak())
         except ThudError as error:
             # The path is that of a copy.
             raise type(error)(str(error).replace(str(path), name)) from error

@@ -80,6 +80,7 @@ def _work(far: Connection, work: str, arguments: tuple[Any, ...]) -> None:
 
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
+    last: dict[str, Any]
     try:
         last = {"answer": WORKS[work](*arguments)}
     except (ThudError, OSError, MemoryError) as error:

@@ -7,9 +7,9 @@ import secrets
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
-import plotly
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
@@ -29,11 +29,17 @@ if TYPE_CHECKING:
 
     from starlette.requests import Request
 
+    Endpoint = Callable[[Request], Awaitable[Response]]
+
 # Largest bodies of a case and of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
+# Files of the page, by name: their package and folder.
+FILES = dict.fromkeys(("index.html", "explorer.js", "explorer.css"), (__package__, "page")) | {
+    "plotly.min.js": ("plotly", "package_data")
+}
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
 # The page loads nothing from elsewhere; Plotly styles its elements.
 POLICY = (
@@ -46,21 +52,6 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
 }
-
-
-class Refused(Exception):
-    """A request that is not answered.
-
-    Attributes
-    ----------
-    status : int
-        Status of HTTP.
-    """
-
-    def __init__(self, status: int, message: str) -> None:
-        """Take status and sentence."""
-        super().__init__(message)
-        self.status = status
 
 
 def new_application(
@@ -79,85 +70,86 @@ def new_application(
     width
         Slow works at a time.
     """
-    jobs = Jobs(width)
-    about = {"form": form(), "slow": SLOW, "version": version(), "start": start}
-
-    async def page(request: Request) -> Response:
-        name = request.path_params.get("name", "index.html")
-        if name == "plotly.min.js":
-            content = (resources.files(plotly) / "package_data" / name).read_bytes()
-        elif name in {"index.html", "explorer.js", "explorer.css"}:
-            content = (resources.files(__package__) / "page" / name).read_bytes()
-        else:
-            raise Refused(404, "there is no such file")
-        headers = HEADERS | ({} if name == "index.html" else {"Cache-Control": "max-age=3600"})
-        return Response(content, media_type=TYPES[name.rpartition(".")[2]], headers=headers)
-
-    async def describe(request: Request) -> Response:  # noqa: ARG001 - what a route is given
-        return JSONResponse(about, headers=HEADERS)
-
-    async def solve(request: Request) -> Response:
-        case = new_case(await _values(request))
-        return JSONResponse(await run_in_threadpool(answer_case, case), headers=HEADERS)
-
-    async def solve_slowly(request: Request) -> Response:
-        return _stream(jobs.run("case", await _values(request)))
-
-    async def measure(request: Request) -> Response:
-        content = await _body(request, MAX_RECORDING)
-        asked = request.query_params
-        numbers = [float(text) if (text := asked.get(key)) else None for key in ("height", "mass")]
-        return _stream(jobs.run("recording", asked.get("name", "recording.wav"), content, *numbers))
-
-    async def download(request: Request) -> Response:
-        if (what := request.path_params["what"]) not in DOWNLOADS:
-            raise Refused(404, "there is no such file")
-        make, media = DOWNLOADS[what]
-        content = await run_in_threadpool(make, await _values(request))
-        return Response(content, media_type=media, headers=HEADERS)
-
-    def guarded(
-        endpoint: Callable[[Request], Awaitable[Response]],
-    ) -> Callable[[Request], Awaitable[Response]]:
-        async def answer(request: Request) -> Response:
-            try:
-                origin = request.headers.get("origin")
-                own = f"{request.url.scheme}://{request.headers.get('host')}"
-                if origin not in {None, own}:
-                    raise Refused(403, "the request comes from another page")
-                given = request.headers.get(TOKEN, "")
-                if not secrets.compare_digest(given.encode(), token.encode()):
-                    raise Refused(403, "the token is missing: open the address that was printed")
-                return await endpoint(request)
-            except Refused as refusal:
-                return _sentence(str(refusal), refusal.status)
-            except (ThudError, TypeError, KeyError, ValueError) as error:
-                return _sentence(str(error), 400)
-
-        return answer
-
-    async def plain(request: Request) -> Response:
-        try:
-            return await page(request)
-        except Refused as refusal:
-            return _sentence(str(refusal), refusal.status)
-
-    return Starlette(
+    application = Starlette(
         routes=[
-            Route("/", plain),
-            Route("/page/{name}", plain),
-            Route("/about", guarded(describe)),
-            Route("/solve", guarded(solve), methods=["POST"]),
-            Route("/solve_slowly", guarded(solve_slowly), methods=["POST"]),
-            Route("/measure", guarded(measure), methods=["POST"]),
-            Route("/download/{what}", guarded(download), methods=["POST"]),
+            Route("/", _page),
+            Route("/page/{name}", _page),
+            *(
+                Route(path, _guarded(endpoint), methods=methods)
+                for path, endpoint, methods in (
+                    ("/about", _about, ["GET"]),
+                    ("/solve", _solve, ["POST"]),
+                    ("/solve_slowly", _solve_slowly, ["POST"]),
+                    ("/measure", _measure, ["POST"]),
+                    ("/download/{what}", _download, ["POST"]),
+                )
+            ),
         ],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
+        # Values of wrong types stop where they are first used.
+        exception_handlers=dict.fromkeys((ThudError, TypeError, ValueError, KeyError), _refuse),
     )
+    application.state.about = {"form": form(), "slow": SLOW, "version": version(), "start": start}
+    application.state.token = token
+    application.state.jobs = Jobs(width)
+    return application
 
 
-def _sentence(message: str, status: int) -> Response:
-    return PlainTextResponse(message, status, headers=HEADERS)
+async def _page(request: Request) -> Response:
+    name = request.path_params.get("name", "index.html")
+    if name not in FILES:
+        raise HTTPException(404, "there is no such file")
+    package, folder = FILES[name]
+    content = (resources.files(package) / folder / name).read_bytes()
+    return Response(content, media_type=TYPES[name.rpartition(".")[2]], headers=HEADERS)
+
+
+async def _about(request: Request) -> Response:
+    return JSONResponse(request.app.state.about, headers=HEADERS)
+
+
+async def _solve(request: Request) -> Response:
+    case = new_case(await _values(request))
+    return JSONResponse(await run_in_threadpool(answer_case, case), headers=HEADERS)
+
+
+async def _solve_slowly(request: Request) -> Response:
+    return _stream(request.app.state.jobs.run("case", await _values(request)))
+
+
+async def _measure(request: Request) -> Response:
+    content = await _body(request, MAX_RECORDING)
+    asked = request.query_params
+    numbers = [float(text) if (text := asked.get(key)) else None for key in ("height", "mass")]
+    name = asked.get("name", "recording.wav")
+    return _stream(request.app.state.jobs.run("recording", name, content, *numbers))
+
+
+async def _download(request: Request) -> Response:
+    if (what := request.path_params["what"]) not in DOWNLOADS:
+        raise HTTPException(404, "there is no such file")
+    make, media = DOWNLOADS[what]
+    content = await run_in_threadpool(make, await _values(request))
+    return Response(content, media_type=media, headers=HEADERS)
+
+
+def _guarded(endpoint: Endpoint) -> Endpoint:
+    """Refuse requests of other pages, and those without the token."""
+
+    async def answer(request: Request) -> Response:
+        own = f"{request.url.scheme}://{request.headers.get('host')}"
+        if request.headers.get("origin") not in {None, own}:
+            raise HTTPException(403, "the request comes from another page")
+        given = request.headers.get(TOKEN, "").encode()
+        if not secrets.compare_digest(given, request.app.state.token.encode()):
+            raise HTTPException(403, "the token is missing: open the address that was printed")
+        return await endpoint(request)
+
+    return answer
+
+
+async def _refuse(request: Request, error: Exception) -> Response:  # noqa: ARG001 - what is given
+    return PlainTextResponse(str(error), 400, headers=HEADERS)
 
 
 def _stream(reports: AsyncIterator[dict[str, Any]]) -> Response:
@@ -174,7 +166,9 @@ async def _body(request: Request, largest: int) -> bytes:
     async for part in request.stream():
         found += part
         if len(found) > largest:
-            raise Refused(413, f"the data are longer than {largest / 1e6:g} MB; allowed: shorter")
+            raise HTTPException(
+                413, f"the data are longer than {largest / 1e6:g} MB; allowed: shorter"
+            )
     return bytes(found)
 
 
@@ -185,7 +179,7 @@ async def _values(request: Request) -> dict[str, dict[str, Any]]:
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
     if not isinstance(values, dict) or not all(isinstance(one, dict) for one in values.values()):
-        raise Refused(400, "the request holds no groups of keys")
+        raise HTTPException(400, "the request holds no groups of keys")
     return values
 
 
