@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 
 TOKEN = "secret"  # noqa: S105 - of the test
 HEAD = {server.TOKEN: TOKEN}
+CALIBRATION = "2000 N/FS"
 SHELL: dict[str, Any] = {"model": {"name": "hollow_sphere"}}
 
 
@@ -88,9 +90,10 @@ def test_slow_model_reports_and_answers(client: TestClient) -> None:
 
 def test_recording_is_judged(client: TestClient) -> None:
     path = REPOSITORY / "inputs/recordings/drop_1.wav"
-    query = "name=drop_1.wav&height=1&mass=2.5"
-    answer = last_report(client, f"/measure?{query}", content=path.read_bytes())["answer"]
-    recording = thud.read_recording(path, height=1.0, mass=2.5)
+    query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
+    report = last_report(client, "/measure", params=query, content=path.read_bytes())
+    answer = report["answer"]
+    recording = thud.read_recording(path, height=1.0, mass=2.5, calibration=CALIBRATION)
     assert answer["levels"]["octave"]["level"] == pytest.approx(recording.levels(), abs=1e-9)
     assert answer["verdict"] == recording.conformity().verdict
     assert answer["drops"] == 1
@@ -186,4 +189,8 @@ def test_page_starts_with_a_case_or_results(tmp_path: Path) -> None:
 
 def test_unusable_port_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["explore", "--port", "99999", "--no-browser"]) == 1
+    assert "--port = 99999 is no port; allowed: 0" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert cli.main(["explore", "--port", str(port), "--no-browser"]) == 1
     assert "cannot be listened on; allowed: a free port" in capsys.readouterr().err

@@ -117,6 +117,7 @@ def test_recording_on_the_page_is_judged(
     page.locator("summary", has_text="Recording").click()
     page.locator("#recording_height").fill("1")
     page.locator("#recording_mass").fill("2.5")
+    page.locator("#recording_calibration").fill("2000 N/FS")
     page.locator("#file").set_input_files(REPOSITORY / "inputs/recordings/drop_1.wav")
     head = page.locator("#criteria thead th", has_text="drop_1.wav (1 drop)")
     sync_api.expect(head).to_be_visible(timeout=60_000)

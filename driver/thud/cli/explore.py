@@ -30,9 +30,11 @@ def explore(options: argparse.Namespace) -> int:
     token = secrets.token_urlsafe(16)
     hosts = LOOPBACK if options.host in LOOPBACK else ("*",)
     application = new_application(start, token=token, hosts=hosts)
+    if not 0 <= options.port < 2**16:
+        refuse(f"--port = {options.port} is no port", f"0 (any that is free) to {2**16 - 1}")
     try:
         listener = socket.create_server((options.host, options.port))
-    except (OSError, OverflowError) as error:
+    except OSError as error:
         refuse(f"{options.host}:{options.port} cannot be listened on", "a free port", error)
     address = f"http://{options.host}:{listener.getsockname()[1]}/#token={token}"
     if not options.quiet:

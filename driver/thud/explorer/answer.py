@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud._schema import FLOORS, MODELS
 from thud.case import Case
+from thud.checks import require_choice, shown
 from thud.errors import ThudError
 from thud.floors.prediction import predict_level
 from thud.impact import Impact, compute
@@ -35,7 +37,13 @@ MARGIN = 1.15
 
 
 def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
-    """Return the case of groups of values, as the page has them; raise InputError or TypeError."""
+    """Return the case of groups of values, as the page has them.
+
+    Raise InputError, or TypeError and ValueError where values are of other types.
+    """
+    for part, known in (("model", MODELS), ("floor", FLOORS)):
+        if part in values:
+            require_choice(f"&{part}: name", values[part].get("name"), list(known))
     return Case.from_namelist(
         {
             group: {key: _listed(value) for key, value in keys.items()}
@@ -62,18 +70,30 @@ def answer_case(case: Case) -> Answer:
     return found
 
 
-def answer_recording(name: str, content: bytes, height: float | None, mass: float | None) -> Answer:
-    """Return the same of a recording: a name, whose ending says the format, and the bytes."""
+def answer_recording(name: str, content: bytes, settings: Mapping[str, Any]) -> Answer:
+    """Return the same of a recording.
+
+    Parameters
+    ----------
+    name
+        Name of the file, whose ending says the format.
+    content
+        Its bytes.
+    settings
+        Arguments of `read_recording`.
+    """
     start = time.perf_counter()
     with TemporaryDirectory() as folder:
-        path = Path(folder, "recording" + Path(name).suffix)
+        ending = "".join(c for c in Path(name).suffix if c.isalnum())[:8]
+        path = Path(folder, f"recording.{ending}")
         path.write_bytes(content)
         try:
-            recording = read_recording(path, height=height, mass=mass)
+            recording = read_recording(path, **settings)
             found = _answer(recording, *recording.to_force_history(), recording.peak())
         except ThudError as error:
-            # The path is that of a copy.
-            raise type(error)(str(error).replace(str(path), name)) from error
+            # The user knows neither the copy nor its place.
+            sentence = str(error).replace(f"{folder}/", "").replace(path.name, shown(name))
+            raise type(error)(sentence) from error
     found["seconds"] = time.perf_counter() - start
     found["drops"] = len(recording.drops)
     return found

@@ -17,6 +17,7 @@ from starlette.routing import Route
 
 from thud._api import version
 from thud.case import read_case
+from thud.cli.command import channel_of
 from thud.errors import ThudError
 from thud.explorer.answer import answer_case, new_case
 from thud.explorer.downloads import DOWNLOADS
@@ -119,10 +120,15 @@ async def _solve_slowly(request: Request) -> Response:
 
 async def _measure(request: Request) -> Response:
     content = await _body(request, MAX_RECORDING)
-    asked = request.query_params
-    numbers = [float(text) if (text := asked.get(key)) else None for key in ("height", "mass")]
+    asked = dict(request.query_params)
+    settings: dict[str, Any] = {
+        key: float(asked[key]) for key in ("height", "mass") if key in asked
+    }
+    settings |= {key: asked[key] for key in ("calibration", "unit") if key in asked}
+    if "channel" in asked:
+        settings["channel"] = channel_of(asked["channel"])
     name = asked.get("name", "recording.wav")
-    return _stream(request.app.state.jobs.run("recording", name, content, *numbers))
+    return _stream(request.app.state.jobs.run("recording", name, content, settings))
 
 
 async def _download(request: Request) -> Response:

@@ -257,7 +257,7 @@ async function follow(path, body, name, done) {
 
 function measure(file) {
   const query = new URLSearchParams({ name: file.name });
-  for (const key of ["height", "mass"]) {
+  for (const key of ["height", "mass", "calibration", "unit", "channel"]) {
     const given = byId(`recording_${key}`).value;
     if (given) query.set(key, given);
   }
