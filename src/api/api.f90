@@ -220,6 +220,7 @@ contains
          call bundle%add_array(prefix//'motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
          call bundle%add_array(prefix//'motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
          call bundle%add_array(prefix//'motion.cavity_pressure', [n_frame], motion%cavity_pressure)
+         call bundle%add_array(prefix//'motion.floor_displacement', [n_frame], motion%floor_displacement)
       end associate
    end subroutine add_history
 
