@@ -13,7 +13,7 @@ module thud_compute
    use thud_plate, only: plate_type
    use thud_receiver, only: is_rigid, receiver_type
    use thud_remarks, only: get_remarks, remark_length
-   use thud_room, only: get_room_bands, get_room_level, room_level_type
+   use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
@@ -204,6 +204,7 @@ contains
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_radiator(bands%centre, plate, conductance, error)
       end associate
+      if (.not. allocated(error)) call check_below(plate, case%room, error)
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
    end subroutine predict_room_level
 
