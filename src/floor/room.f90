@@ -293,7 +293,7 @@ contains
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
-         energies%loss = get_loss(flow)
+         allocate (energies%loss, source=get_loss(flow))
          allocate (energies%start(size(flow%own)), energies%weight(size(flow%own)), source=0.0_wp)
          energies%start(1) = prediction%energy(band)
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume
