@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import re
+import warnings
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +16,8 @@ import numpy as np
 from thud._schema import SCALARS
 from thud.case import Case
 from thud.checks import refuse
-from thud.errors import InputError
+from thud.errors import PlausibilityWarning, ThudError
+from thud.files import MANIFEST, locked, read_manifest
 from thud.impact import Impact
 from thud.motion import Motion
 
@@ -39,21 +43,63 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Raises
     ------
     InputError
-        Where the directory does not hold the results of an impact.
+        Where the directory does not hold the results of an impact, or one of the files is not as
+        the run has written it.
+
+    Warns
+    -----
+    PlausibilityWarning
+        Where the file that says so, ``.thud``, is missing; also in `Impact.remarks`.
     """
     try:
         folder = Path(directory)
-        case = Case.from_namelist(f90nml.read(folder / "effective.nml"))
-        numbers = f90nml.read(folder / "summary.nml")
-        force = _table(folder / "force.csv")
-        channels = folder / "channels.csv"
-        found = _table(channels) if channels.exists() else {}
-        motion = _read_motion(folder) if (folder / "motion.pvd").exists() else None
+        with locked(folder, fcntl.LOCK_SH):
+            return _new_impact(_Files(folder))
+    except ThudError:
+        raise
     except FileNotFoundError as error:
         refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        message = f"{directory}: cannot be read ({error}); allowed: the results of an impact"
-        raise InputError(message) from error
+    except Exception as error:  # noqa: BLE001 - parsers of damaged files raise anything
+        said = f"{type(error).__name__}: {error}".partition("\n")[0]
+        refuse(f"{directory}: cannot be read ({said})", "the results of an impact", error)
+
+
+class _Files:
+    """Files of a result directory, each compared with its checksum as it is read."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.checksums = read_manifest(folder)
+
+    def __contains__(self, name: str) -> bool:
+        """Return whether a file is part of the results."""
+        return bool(self.checksums.get(name)) if self.checksums else (self.folder / name).exists()
+
+    def read(self, name: str) -> str:
+        """Return the text of a file; raise InputError where the run has not written it."""
+        if Path(name).name != name:
+            refuse(f"{self.folder}: {name!r} is named as a file of it", "names without directories")
+        content = (self.folder / name).read_bytes()
+        if self.checksums and f"{zlib.crc32(content):08X}" != self.checksums.get(name):
+            refuse(
+                f"{self.folder / name} is not as the run has written it",
+                "results of one run; run the case again",
+            )
+        return content.decode()
+
+
+def _new_impact(files: _Files) -> Impact:
+    """Return the impact of a result directory."""
+    case = Case.from_namelist(f90nml.reads(files.read("effective.nml")))
+    numbers = f90nml.reads(files.read("summary.nml"))
+    force = _table(files.read("force.csv"))
+    found = _table(files.read("channels.csv")) if "channels.csv" in files else {}
+    motion = _read_motion(files) if "motion.pvd" in files else None
+    remarks = _texts(numbers.get("remarks", {}).get("remark", []))
+    if not files.checksums:
+        remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
+        warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
+        remarks += (remark,)
     time = force.pop("time_s")
     named = {name.rsplit("_", 1)[0]: values for name, values in force.items()}
     return Impact(
@@ -66,7 +112,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
         {name: values for name, values in named.items() if name != "velocity_m_per"},
         {name: values for name, values in found.items() if name != "time_s"},
         dict(numbers.get("facts", {})),
-        _texts(numbers.get("remarks", {}).get("remark", [])),
+        remarks,
         motion,
         **{name: numbers["summary"][name] for name in SCALARS},
     )
@@ -77,17 +123,20 @@ def _texts(value: str | list[str]) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value)
 
 
-def _table(path: Path) -> dict[str, NDArray[np.float64]]:
+def _table(text: str) -> dict[str, NDArray[np.float64]]:
     """Return the columns of a CSV file by name."""
-    with path.open(encoding="utf-8") as file:
-        names = file.readline().strip().split(",")
-        return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
+    names, *lines = text.splitlines()
+    columns = np.loadtxt(lines, delimiter=",", ndmin=2).T
+    if not np.isfinite(columns).all():
+        message = "a value is not finite"
+        raise ValueError(message)
+    return dict(zip(names.split(","), columns, strict=True))
 
 
-def _read_motion(folder: Path) -> Motion:
+def _read_motion(files: _Files) -> Motion:
     """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
-    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', (folder / "motion.pvd").read_text())
-    shots = [_read_vtu(folder / name) for _, name in entries]
+    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', files.read("motion.pvd"))
+    shots = [_read_vtu(files.read(name)) for _, name in entries]
     # The first element has its first two nodes on neighbouring rings.
     line = int(shots[0]["connectivity"][1])
     size = (len(shots[0]["cavity_pressure"]) // line, line)
@@ -110,11 +159,10 @@ def _read_motion(folder: Path) -> Motion:
     )
 
 
-def _read_vtu(path: Path) -> dict[str, NDArray[Any]]:
+def _read_vtu(text: str) -> dict[str, NDArray[Any]]:
     """Return the arrays of a VTU file as thud writes it."""
     arrays = re.findall(
-        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>',
-        path.read_text(encoding="ascii"),
+        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>', text
     )
     # The first eight bytes are the length of the data.
     return {

@@ -15,7 +15,7 @@ module thud_case
    use thud_room, only: check_room, get_room_bands, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
-   use thud_text, only: quoted, to_text
+   use thud_text, only: is_utf8, quoted, to_text
    implicit none (type, external)
    private
 
@@ -207,13 +207,13 @@ contains
       integer :: i
 
       usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/\') == 0 &
-         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
+         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name)
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
             //' characters, without it the name of the file')
       else if (.not. usable) then
          error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory, ' &
-            //"without '/' and '\', of up to "//to_text(name_length)//' characters')
+            //"UTF-8 without '/' and '\', of up to "//to_text(name_length)//' characters')
       end if
    end subroutine check_name
 

@@ -275,3 +275,26 @@ def test_characters_that_no_screen_shows_are_replaced(run: Run, case_file: CaseF
     assert "&model: name = 'a?b?' is not allowed; allowed: 'hollow_sphere'" in result.stderr
     with pytest.raises(thud.InputError, match=r"'a\?b\?' is not allowed; allowed: "):
         thud.read_case(path)
+
+
+def test_blanks_at_the_end_of_a_path_belong_to_it(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    case_file(MINIMAL, "ball.nml ")
+    assert run("ball.nml ", "-o", "out ").returncode == 0
+    assert (tmp_path / "out " / "effective.nml").exists()
+    assert "there is no such file" in run("ball.nml").stderr
+
+
+def test_name_that_is_no_text_is_refused(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    odd = os.fsdecode(b"\xff.nml")
+    case_file(MINIMAL, odd)
+    result = run(odd, errors="surrogateescape")
+    assert result.returncode == 1
+    assert "&case: name = '\udcff' is not allowed; allowed: a name for a directory, UTF-8" in (
+        result.stderr
+    )
+    assert not (tmp_path / "outputs").exists()
+    # A name in the file is enough.
+    case_file(f"&case name = 'ball' / {MINIMAL}", odd)
+    assert run(odd, errors="surrogateescape").returncode == 0
