@@ -4,7 +4,7 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgbsv, dgeev, dgels, dgemm, dgemv, dgesv, dgetf2, dgetrs, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr
+   public :: dgbsv, dgeev, dgels, dgemm, dgemv, dgetf2, dgetrs, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr
    public :: dsygv, dsyrk, dtrsm, dtrsv
 
    interface
