@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from thud.comparison import read_all as read_all
     from thud.compression_fit import CompressionFit as CompressionFit
     from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.mobility_fit import MobilityFit as MobilityFit
+    from thud.floors.mobility_fit import fit_mobility as fit_mobility
     from thud.floors.prediction import RoomPrediction as RoomPrediction
     from thud.floors.prediction import predict_level as predict_level
     from thud.floors.rating import Rating as Rating
@@ -83,7 +85,9 @@ _LATE = {
     "compare": "comparison",
     "CompressionFit": "compression_fit",
     "fit_compression": "compression_fit",
+    "fit_mobility": "floors.mobility_fit",
     "read_all": "comparison",
+    "MobilityFit": "floors.mobility_fit",
     "Rating": "floors.rating",
     "Recording": "recordings.recording",
     "RoomLevels": "floors.survey",
@@ -163,6 +167,7 @@ MAKERS.update(
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    mobility_fit=_maker("plot.mobility_fit", "mobility_fit"),
     prediction=_maker("plot.prediction", "draw_prediction"),
     room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),

@@ -18,6 +18,7 @@ from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
+from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
@@ -96,6 +97,7 @@ COMMANDS = {
         run_history,
     ),
     "rate": RATE,
+    "mobility": MOBILITY,
     **study_commands(),
     "examples": EXAMPLES,
     "figures": Command(

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+import f90nml
 import numpy as np
 
 from thud import _api
@@ -145,8 +146,9 @@ class MobilityFit(Displayed):
 
     def namelist(self) -> str:
         """Return the groups ``&floor`` and ``&measured_mobility`` as text for a case."""
-        groups = Case(floor=self.floor).to_namelist()
-        groups = type(groups)({k: groups[k] for k in ("floor", "measured_mobility")})
+        case, groups = Case(floor=self.floor).to_namelist(), f90nml.Namelist()
+        for group in ("floor", self.floor.name):
+            groups[group] = case[group]
         return f"! Mobility {self.name}, fitted: relative error {self.error:.2g}.\n{groups}\n"
 
     def plot(self) -> Figure:
@@ -156,7 +158,7 @@ class MobilityFit(Displayed):
 
     def _errors(self) -> NDArray[np.float64]:
         """Return the relative errors of the lines."""
-        errors: NDArray[np.float64] = abs(self.mobility(self.frequency) / self.measured - 1)
+        errors: NDArray[np.float64] = np.abs(self.mobility(self.frequency) / self.measured - 1)
         return errors
 
     def __repr__(self) -> str:
@@ -251,8 +253,8 @@ def _fit(
     n = len(frequency)
     routine = _api.mobility_api.fit_mobility
     found: dict[str, Any] = _api.call(routine, frequency, values.real, values.imag, int(order), n)
-    lists = {
-        key: value if np.isscalar(value) else tuple(map(float, value))
+    lists: dict[str, Any] = {
+        key: value if isinstance(value, float) else tuple(map(float, value))
         for key, value in found["floor"].items()
     }
     return MobilityFit(name, frequency, values, MeasuredMobility(**lists), found["free_error"])
@@ -299,5 +301,3 @@ def _read_universal(
     sign = 1 if one["rsp_dir"] * one["ref_dir"] >= 0 else -1
     known: Quantity = _RESPONSES[response]  # type: ignore[assignment]
     return np.asarray(one["x"], dtype=float), sign * np.asarray(one["data"], dtype=complex), known
-
-

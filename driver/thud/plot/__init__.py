@@ -37,6 +37,7 @@ from thud.plot.look import octave_axis as octave_axis
 from thud.plot.look import save as save
 from thud.plot.look import save_all as save_all
 from thud.plot.loss_factor import loss_factor as loss_factor
+from thud.plot.mobility_fit import mobility_fit as mobility_fit
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion
