@@ -73,10 +73,10 @@ contains
       real(wp) :: cost
 
       ! The number of elements, and of steps, which grows as they shrink.
-      cost = 0.3_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
+      cost = 0.15_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
       ! Branches cost more than all the rest.
       if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) then
-         cost = 2.5_wp*cost
+         cost = 3*cost
       end if
    end function get_cost
 
