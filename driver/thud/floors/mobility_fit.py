@@ -15,6 +15,7 @@ from thud.case import Case
 from thud.checks import refuse, require_choice
 from thud.columns import read_titled
 from thud.display import MAKERS, Displayed
+from thud.floors.mobility import mobility
 from thud.recordings.channel import guarded, library, require_small
 
 if TYPE_CHECKING:
@@ -77,15 +78,7 @@ class MobilityFit(Displayed):
 
     def mobility(self, frequency: ArrayLike) -> NDArray[np.complex128]:
         """Return the mobility of the fit, m/(N s), at frequencies, Hz."""
-        s = 2j * np.pi * np.asarray(frequency, dtype=float)[..., None]
-        floor = self.floor
-        damping = np.asarray(floor.damping_ratio)
-        size = 2 * np.pi * np.asarray(floor.pole_frequency)
-        pole = size * (-damping + 1j * np.sqrt(1 - damping**2))
-        residue = np.asarray(floor.residue_real) + 1j * np.asarray(floor.residue_imaginary)
-        pairs = residue / (s - pole) + residue.conj() / (s - pole.conj())
-        total: NDArray[np.complex128] = floor.direct + pairs.sum(axis=-1) / 2
-        return total
+        return mobility(self.floor, frequency)
 
     @property
     def error(self) -> float:
