@@ -35,7 +35,7 @@ def fit_by_scikit_rf(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, 2])
 def test_poles_of_exact_values_are_those_of_scikit_rf(seed: int) -> None:
     values = modal_mobility(seed)
     floor = thud.fit_mobility((FREQUENCY, values), order=12).floor
@@ -45,7 +45,7 @@ def test_poles_of_exact_values_are_those_of_scikit_rf(seed: int) -> None:
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("seed", [4, 5, 6])
+@pytest.mark.parametrize("seed", [4, 5])
 def test_noisy_values_are_fitted_as_well_as_by_scikit_rf(seed: int) -> None:
     exact = modal_mobility(seed)
     random = np.random.default_rng(seed)
