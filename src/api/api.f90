@@ -24,8 +24,8 @@ module thud_api
    implicit none (type, external)
    private
 
-   public :: check_text, collect, compress, describe_library, drop_on_floor, effective_case, end_calls, free_modes, loss_factors
-   public :: predict_room, run, solve
+   public :: check_text, collect, compress, describe_library, drop_on_floor, effective_case, end_calls, free_modes
+   public :: loss_factors, predict_room, run, solve
 
 contains
 

@@ -58,9 +58,9 @@ def test_executable_tells_of_a_floor_that_gives_way(
     told: bool,  # noqa: FBT001 - one of two cases
 ) -> None:
     text = ROOM_CASE.replace("0.2", f"{thickness}")
-    blocked = text.replace(
-        "&model /", "&model name = 'measured_modes' /\n&measured_modes frequency = 30, 100 /"
-    )
+    modes = "frequency = 24, 89\n damping_ratio = 0.05, 0.1\n effective_mass = 2.4, 0.1"
+    model = f"&model name = 'measured_modes' /\n&measured_modes {modes} /"
+    blocked = text.replace("&model /", model)
     done = run(case_file(blocked), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert ("gives way" in done.stdout) == told
