@@ -16,6 +16,7 @@ from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, ou
 from thud.cli.examples import EXAMPLES
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
+from thud.cli.floor import FLOOR
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
 from thud.cli.mobility import MOBILITY
@@ -97,6 +98,7 @@ COMMANDS = {
         run_history,
     ),
     "rate": RATE,
+    "floor": FLOOR,
     "mobility": MOBILITY,
     **study_commands(),
     "examples": EXAMPLES,
