@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,7 +30,8 @@ def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
     figure, axes = empty_axes(3.0)
     frequency = np.geomspace(_FROM, _TO, 1500)
     add_curves(
-        axes, {name: (frequency, abs(mobility(floor, frequency))) for name, floor in floors.items()}
+        axes,
+        {name: (frequency, np.abs(mobility(floor, frequency))) for name, floor in floors.items()},
     )
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -44,22 +46,25 @@ def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
 
 def _draw_floors() -> Figure:
     """Draw floors of the folder inputs/floors."""
-    place = {"source_x": 0.4, "source_y": 0.35}
-    timber = {"edges": "absorption", **place}
+    concrete = Plate(source_x=0.4, source_y=0.35)
+    timber = replace(concrete, edges="absorption")
     return floor_mobilities(
         {
-            "180 mm of concrete": Plate(**place),
+            "180 mm of concrete": concrete,
             "screed on a soft layer on it": FloatingFloor(
-                layer_stiffness=8e6, layer_loss_factor=0.15, screed_loss_factor=0.02, **place
+                layer_stiffness=8e6, layer_loss_factor=0.15, screed_loss_factor=0.02,
+                source_x=0.4, source_y=0.35,
             ),
-            "200 mm of cross-laminated timber": Plate(
-                thickness=0.2, density=470, wave_speed=3180, stiffness_ratio=0.293,
-                torsion_ratio=0.25, loss_factor=0.03, **timber,
+            "200 mm of cross-laminated timber": replace(
+                timber, thickness=0.2, density=470, wave_speed=3180, stiffness_ratio=0.293,
+                torsion_ratio=0.25, loss_factor=0.03,
             ),
-            "timber joists, between two": JoistFloor(sheathing_modulus=3.1e9, **place),
-            "22 mm of chipboard": Plate(
-                length=2.4, width=1.8, thickness=0.022, density=650, wave_speed=2200,
-                loss_factor=0.02, **timber,
+            "timber joists, between two": JoistFloor(
+                sheathing_modulus=3.1e9, source_x=0.4, source_y=0.35
+            ),
+            "22 mm of chipboard": replace(
+                timber, length=2.4, width=1.8, thickness=0.022, density=650, wave_speed=2200,
+                loss_factor=0.02,
             ),
         }
     )  # fmt: skip
