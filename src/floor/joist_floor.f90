@@ -9,8 +9,8 @@ module thud_joist_floor
    use thud_modal_receiver, only: new_modal_receiver
    use thud_new_field, only: choice_field, real_field
    use thud_plate, only: air_type, get_resistance, get_surface_mass, get_total_loss, plate_type
-   use thud_plate_modes, only: check_inside, check_mode_count, far, get_half_waves, get_modal_stiffness, get_shape, &
-      mode_limit, rest_corner
+   use thud_plate_modes, only: check_inside, check_losses, check_mode_count, far, get_half_waves, get_modal_stiffness, &
+      get_shape, mode_limit, rest_corner
    use thud_receiver, only: receiver_type
    implicit none (type, external)
    private
@@ -165,10 +165,10 @@ contains
    subroutine get_receiver(options, receiver, error)
       class(joist_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Never.
+      !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
 
-      call get_point_receiver(options, [options%source_x, options%source_y], .true., receiver)
+      call get_point_receiver(options, [options%source_x, options%source_y], .true., receiver, error)
    end subroutine get_receiver
 
    !> Velocity of another point: on or near a joist, as the smeared plate moves.
@@ -177,23 +177,26 @@ contains
       !> Place of the point, m.
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
-      !> The point lies outside.
+      !> The point lies outside, or the losses are too high.
       type(error_type), allocatable, intent(out) :: error
 
       call check_inside('joist_floor', options%length, options%width, x, y, error)
-      if (.not. allocated(error)) call get_point_receiver(options, [x/options%length, y/options%width], .false., transfer)
+      if (.not. allocated(error)) call get_point_receiver(options, [x/options%length, y/options%width], .false., transfer, &
+         error)
    end subroutine get_transfer
 
    !> Modes of the smeared plate, across the joists at most as many half waves as there are bays. Under a source on the
    !> sheathing the rest is that of the sheathing between two joists: its static compliance, and the conductance of the
    !> infinite sheathing at high frequencies. Under one on a joist it is that of the smeared plate.
-   subroutine get_point_receiver(options, point, under_source, receiver)
+   subroutine get_point_receiver(options, point, under_source, receiver, error)
       class(joist_floor_type), intent(in) :: options
       !> Place of the point, over length and width.
       real(wp), intent(in) :: point(2)
       !> The point is that of the source.
       logical, intent(in) :: under_source
       type(receiver_type), intent(out) :: receiver
+      !> There are too many modes, or the losses are too high.
+      type(error_type), allocatable, intent(out) :: error
       type(plate_type) :: plate
       integer, allocatable :: m(:), n(:)
       real(wp), allocatable :: omega(:), gain(:), loss_factor(:)
@@ -201,6 +204,8 @@ contains
       real(wp) :: rest, corner
 
       plate = get_smeared(options)
+      call check_mode_count('joist_floor', plate, error)
+      if (allocated(error)) return
       call get_half_waves(plate, far*mode_limit, m, n)
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
       smeared = n <= max(1, int(options%width/options%spacing))
@@ -208,6 +213,8 @@ contains
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width) &
          *get_shape(m, n, [options%source_x, options%source_y])*get_shape(m, n, point)
       loss_factor = get_total_loss(plate, air_type(), pack(omega, single)/(2*pi))
+      call check_losses('joist_floor', pack(omega, single), loss_factor, error)
+      if (allocated(error)) return
       corner = rest_corner
       if (under_source .and. options%source_on == 'sheathing') then
          rest = get_local_compliance(options)

@@ -2,6 +2,7 @@
 module thud_mobility_fit
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
+   use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
    use thud_passivity, only: make_passive
@@ -11,6 +12,9 @@ module thud_mobility_fit
    private
 
    public :: fit_mobility
+
+   !> Maximum number of lines: the time of a fit grows with it.
+   integer, parameter :: max_lines = 10000
 
    !> Least magnitude, over the largest, whose relative error counts in full.
    real(wp), parameter :: least_magnitude = 1.0e-6_wp
@@ -39,6 +43,8 @@ contains
       if (allocated(error)) return
       weight = 1/max(abs(mobility), least_magnitude*maxval(abs(mobility)))
       call fit_rational(2*pi*frequency, mobility, weight, order, pole, residue, floor%direct, free_error, failed)
+      call check_interrupt(error)
+      if (allocated(error)) return
       if (.not. failed) call make_passive(2*pi*frequency, weight, pole, residue, floor%direct, failed)
       if (failed) then
          error = numerical_error('the mobility: no passive function of '//to_text(order)//' poles was found')
@@ -77,6 +83,10 @@ contains
          if (order < 1 .or. order > min(n - 1, max_poles)) then
             error = input_error('order = '//to_text(order)//' is not allowed with '//to_text(n)//' lines; allowed: 1 to ' &
                //to_text(min(n - 1, max_poles)))
+            return
+         end if
+         if (n > max_lines) then
+            error = input_error('the mobility has '//to_text(n)//' lines; allowed: up to '//to_text(max_lines))
             return
          end if
          do i = 1, n

@@ -1,6 +1,7 @@
 !> Relaxed vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14, 1999; Gustavsen, 21, 2006): a stable
 !> rational function with real coefficients through values at frequencies.
 module thud_vector_fit
+   use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    use thud_lapack, only: dgels
    use thud_rational, only: get_basis, get_eigenvalues, get_order, get_residues, get_state_input, get_state_matrix
@@ -49,7 +50,7 @@ contains
       real(wp), intent(out) :: direct
       !> Weighted error over the weighted values, root of the mean square.
       real(wp), intent(out) :: misfit
-      !> LAPACK found no solution.
+      !> LAPACK found no solution, or an interrupt ended the search.
       logical, intent(out) :: failed
       complex(wp), allocatable :: found(:)
       real(wp), allocatable :: coefficient(:), best(:)
@@ -65,6 +66,7 @@ contains
          found = get_first_poles(omega(1)/scale, order, kind == 1)
          idle = 0
          do i = 0, n_move
+            if (is_interrupted()) return
             if (i > 0) call move_poles(s, response, weight, found, failed)
             if (i > 0 .and. failed) exit
             call fit_residues(s, response, weight, found, coefficient, here)

@@ -43,6 +43,8 @@ _TITLES = {
 }  # fmt: skip
 # Numbers of poles that are tried; the library takes no more.
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
+# Numbers without a gain after which no more are tried.
+_PATIENCE = 5
 # Error below which no more poles are tried: that of a table with eight digits.
 _EXACT = 1e-8
 # Error of the fit that is remarked, and of the change that makes it passive.
@@ -221,17 +223,18 @@ def _chosen(
     name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128]
 ) -> MobilityFit:
     """Return the fit with the least information criterion for relative errors of equal size."""
-    best, least = None, np.inf
+    best, least, worse = None, np.inf, 0
     for order in _ORDERS:
         # Three values for each coefficient, or noise is fitted.
-        if best is not None and 3 * (2 * order + 1) > 2 * len(frequency):
+        if best is not None and (worse == _PATIENCE or 3 * (2 * order + 1) > 2 * len(frequency)):
             break
         found = _fit(name, frequency, values, min(order, max(1, len(frequency) - 1)))
         error = max(found.error, _EXACT)
         count = 2 * len(frequency)
         criterion = count * np.log(error**2) + (2 * order + 1) * np.log(count)
+        worse += 1
         if criterion < least:
-            best, least = found, criterion
+            best, least, worse = found, criterion, 0
         if error <= _EXACT:
             break
     if best is None:
