@@ -389,7 +389,7 @@ def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> No
     )
     usual, found = example("drop_1.wav", tmp_path), example("drop_1.wav", tmp_path, lab, plate)
     drop = found.drops[0]
-    np.testing.assert_array_equal(found.levels(), measure_levels(drop, low_pass=True).level)
+    np.testing.assert_array_equal(found.levels(), measure_levels([drop], low_pass=True)[0].level)
     assert not np.array_equal(found.levels(), usual.levels())
     assert any("low-pass, -3 dB at 1.25 kHz" in step for step in found.steps)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]

@@ -130,7 +130,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
         recording = thud.Recording.from_array(record, rate, height=HEIGHT, mass=MASS)
     except InputError as error:
         return draw, str(error)
-    drop, levels = recording.drops[0], measure_levels(recording.drops[0])
+    drop, levels = recording.drops[0], measure_levels(recording.drops)[0]
     np.testing.assert_allclose(levels.level, recording.levels(), rtol=0, atol=1e-9)
     oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
     pairs = zip(BANDS.lower, BANDS.upper, strict=True)

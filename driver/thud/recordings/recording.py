@@ -258,9 +258,8 @@ class Recording(Displayed):
         """
         known = self._averages
         if (bands, method) not in known:
-            low = self.config.low_pass
-            drops = [measure_levels(drop, bands, method, low_pass=low) for drop in self.drops]
-            known[bands, method] = average_levels(drops)
+            found = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
+            known[bands, method] = average_levels(found)
         return known[bands, method]
 
     @cached_property
