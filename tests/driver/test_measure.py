@@ -20,7 +20,7 @@ from synthetic import make_recording
 
 import thud
 from thud import cli
-from thud.recordings import kept, measurement
+from thud.recordings import kept, measurement, results
 from thud.recordings.config import Config, read_config
 from thud.recordings.levels import measure_levels
 from thud.recordings.measurement import measure_window
@@ -339,6 +339,39 @@ def test_interrupted_measurement_goes_on_where_it_ended(
     whole = thud.read_recording(file, config=config)
     assert [one.contact_time for one in found.drops] == [one.contact_time for one in whole.drops]
     np.testing.assert_array_equal(found.levels(), whole.levels())
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
+def test_measurement_interrupted_in_its_report_is_not_measured_again(
+    error: type[BaseException] | BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, config = FOLDER / "three_drops.flac", str(FOLDER / "lab.toml")
+    command = ["measure", str(file), "--config", config, "--quiet", "--no-figures", "-o"]
+    measured: list[str] = []
+
+    def measure(window: Window, config: Config) -> Drop:
+        measured.append(window.name)
+        return measure_window(window, config)
+
+    def stop(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(measurement, "measure_window", measure)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "levels_csv", stop)
+        assert cli.main([*command, str(tmp_path / "out")]) != 0
+    assert len(measured) == 3
+    assert cli.main([*command, str(tmp_path / "out")]) == 0
+    assert len(measured) == 3
+    # The results have the bits of a measurement in one piece, and nothing else is left.
+    assert cli.main([*command, str(tmp_path / "whole")]) == 0
+    assert len(measured) == 6
+    written = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir()}
+    found = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    # HDF5 holds times of its own.
+    assert written.keys() == found.keys()
+    for name in written.keys() - {"recording.nc"}:
+        assert found[name] == written[name]
 
 
 class Call:

@@ -67,7 +67,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     touch, release, force = Estimate(0, 0), Estimate(0.02, 0), half_sine(time) + noise
     return Drop(
         name=f"drop {seed + 1}",
-        time=time,
+        begin=float(time[0]),
         force=force,
         sample_rate=rate,
         onset=before,

@@ -207,7 +207,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     truth = clean.sum() / rate / (MASS * speed) - 1 - GRAVITY * contact_time / speed
     time = np.arange(first, last) / rate - onset
     oracle = replace(
-        drop, time=time, force=clean[first:last], gate=(0, last - first), contact=contact
+        drop, begin=float(time[0]), force=clean[first:last], gate=(0, last - first), contact=contact
     )
     return oracle, Estimate(float(truth), spread)
 

@@ -49,8 +49,8 @@ class Drop:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    time : ndarray, shape (n,)
-        Time since first touch, s.
+    begin : float
+        Time of the first sample since first touch, s.
     force : ndarray, shape (n,)
         Force without offset, drift, hum and slow noise, N.
     sample_rate : float
@@ -79,7 +79,7 @@ class Drop:
     """
 
     name: str
-    time: NDArray[np.float64]
+    begin: float
     force: NDArray[np.float64]
     sample_rate: float
     onset: float
@@ -97,6 +97,12 @@ class Drop:
     steps: tuple[str, ...]
     remarks: tuple[str, ...]
     contact: Contact
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n,)."""
+        time: NDArray[np.float64] = self.begin + np.arange(len(self.force)) / self.sample_rate
+        return time
 
     def band_values(
         self, lower: float, upper: float
@@ -178,11 +184,10 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     )
     ways, told = fall.restitutions(impulse, contact_time, flights)
     restitution, shared = fall.mean(ways, impulse)
-    time = (np.arange(*contact.span)) / rate - touch.value
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
         name=window.name,
-        time=time,
+        begin=contact.span[0] / rate - touch.value,
         force=contact.force,
         sample_rate=rate,
         onset=window.start / rate + touch.value,

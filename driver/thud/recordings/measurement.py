@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -85,7 +85,7 @@ def measure_signals(
     *,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | None = None,
+    keep: str | os.PathLike[str] | KeptDrops | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
@@ -101,7 +101,8 @@ def measure_signals(
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     # Its many small products are slower by threads.
-    with _one_thread(), KeptDrops(keep) as kept, _Processes(workers) as processes:
+    keeping = nullcontext(keep) if isinstance(keep, KeptDrops) else KeptDrops(keep)
+    with _one_thread(), keeping as kept, _Processes(workers) as processes:
         for given in signals:
             signal = given
             if config.calibration_uncertainty is not None:

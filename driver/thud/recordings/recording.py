@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from thud._schema import BandSet, LevelsForce, LimitsSource
     from thud.recordings.estimates import Drop
+    from thud.recordings.kept import KeptDrops
     from thud.recordings.levels import AverageLevels
     from thud.recordings.measurement import Origin
     from thud.recordings.outliers import Outlier
@@ -125,7 +126,7 @@ class Recording(Displayed):
         *,
         progress: bool = False,
         workers: int = 1,
-        keep: str | os.PathLike[str] | None = None,
+        keep: str | os.PathLike[str] | KeptDrops | None = None,
     ) -> Recording:
         """Measure the drops of signals; the other arguments are those of `read_recording`.
 
