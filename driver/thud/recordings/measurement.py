@@ -21,6 +21,7 @@ from thud.recordings.estimates import Estimate, measure_drop
 from thud.recordings.kept import KeptDrops
 from thud.recordings.plate import REACH
 from thud.recordings.plate_correction import correct_window
+from thud.recordings.ringing import tell_ringing
 
 if TYPE_CHECKING:
     import os
@@ -206,7 +207,8 @@ def measure_window(window: Window, config: Config) -> Drop:
     )
     # Factors that the background has cached serve the fit alone, and are larger than all else.
     contact = replace(drop.contact, background=replace(drop.contact.background))
-    drop = replace(drop, contact=contact)
+    ringing = tell_ringing(contact, plate)
+    drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
     if plate is None:
         return drop
     time = drop.contact_time
