@@ -42,8 +42,10 @@ CONTACT_CELL = 2e-4
 # whose anti-aliasing filter comes close to the octave of 500 Hz: (GATE_RATE/rate)2 more.
 GATE_SAMPLES = 8
 GATE_RATE = 10_000.0
-# The response to a sample of the correction of a plate dies away within these periods.
+# The response to a sample of the correction of a plate dies away within these periods; what lies
+# above its reach moves an edge by up to this part of one.
 PLATE_PERIODS = 2.0
+PLATE_LEFT = 0.03
 # Errors of samples that are no noise, as part of the peak: digits, the filter of the recorder.
 FLOOR = 2e-4
 
@@ -154,8 +156,20 @@ def _spread(rate: float, plate: Plate | None) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class _Edges:
-    """First touch and release, and the background between two quiet parts."""
+class Edges:
+    """What is known of first touch and release, and the background between two quiet parts.
+
+    Attributes
+    ----------
+    touch, release : Posterior
+        First touch and release, whose time runs backwards, s from the first sample of the window.
+    background : Background
+        The noise, fitted.
+    offset : float
+        Median of the quiet, which was removed before, N.
+    quiet : tuple of int
+        Where the quiet ends, and begins again, in samples.
+    """
 
     touch: Posterior
     release: Posterior
@@ -165,11 +179,8 @@ class _Edges:
 
 
 def find_edges(window: Window, known: Background | None = None) -> tuple[Estimate, Estimate]:
-    """Return first touch and release, s from the first sample of a window, to about 0.1 ms.
-
-    The noise may be known from elsewhere in the signal.
-    """
-    edges = _search(window, window.force, known, passes=1)
+    """Return first touch and release, s from the first sample of a window, to about 0.1 ms."""
+    edges = find_posteriors(window, window.force, known, passes=1)
     (t0, s0), (t1, s1) = edges.touch.touch(), edges.release.touch()
     return Estimate(t0, s0), Estimate(-t1, s1)
 
@@ -178,11 +189,12 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     """Return the contact of a window, the force of which, N, may have been repaired."""
     rate, contact = window.sample_rate, window.contact
     middle = (contact[0] + contact[1]) / 2 / rate
-    edges = _search(window, force, None, passes=2)
+    edges = find_posteriors(window, force, None, passes=2)
     background, (left, right) = edges.background, edges.quiet
     (t0, s0), begin = edges.touch.edge()
     (t1, s1), end = edges.release.edge()
     t1 = -t1
+    left_by_plate = PLATE_LEFT / window.plate.resonance if window.plate else 0.0
     margin = GATE_SAMPLES + _spread(rate, window.plate)
     gate = (
         max(int((t0 - 3 * s0) * rate) - margin, 0),
@@ -200,8 +212,8 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     return Contact(
         Estimate(t0, s0),
         Estimate(t1, s1),
-        Estimate(*begin),
-        Estimate(-end[0], end[1]),
+        Estimate(begin[0], math.hypot(begin[1], left_by_plate)),
+        Estimate(-end[0], math.hypot(end[1], left_by_plate)),
         background.peak,
         span,
         force[slice(*span)] - under,
@@ -214,10 +226,13 @@ def find_contact(window: Window, force: NDArray[np.float64]) -> Contact:
     )
 
 
-def _search(
+def find_posteriors(
     window: Window, force: NDArray[np.float64], known: Background | None, passes: int
-) -> _Edges:
-    """Return the edges of a contact; the second pass knows where the quiet ends."""
+) -> Edges:
+    """Return the edges of a contact; the second pass knows where the quiet ends.
+
+    The noise may be known from elsewhere in the signal.
+    """
     rate, (first, stop) = window.sample_rate, window.contact
     middle = (first + stop) / 2 / rate
     # Half of a short quiet is kept.
@@ -253,7 +268,7 @@ def _search(
             beyond = _spread(rate, window.plate)
             left = max(int(touch[0] * rate) - beyond, first // 2)
             right = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
-    return _Edges(found[0], found[1], background, offset, (left, right))
+    return Edges(found[0], found[1], background, offset, (left, right))
 
 
 def even_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:
