@@ -61,7 +61,7 @@ class Drop:
         First sample of the contact with its margins, and the one behind it: levels are those of
         ``force[gate[0]:gate[1]]``.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
-        In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+        In s (`thud.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN where not known.
     restitution_shared : dict of str to float
         Standard uncertainties that calibration, mass and drop height make of the restitution of
         all drops alike, beside that stated; signed.
@@ -159,9 +159,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     # The flight behind the drop gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if height else 2)
     touch, release = contact.touch, contact.release
-    contact_time = Estimate(
-        release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
-    )
+    contact_time = _between(contact.begin, contact.end)
     if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
         refuse(
             f"{window.name}: the contact cannot be told from the noise: "
@@ -173,16 +171,12 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     flights = []
     leaving = release
     for landing, again in landings:
-        flights.append(
-            Estimate(
-                landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty)
-            )
-        )
+        flights.append(_between(leaving, landing))
         leaving = again
     fall = Fall(
         height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty, gravity
     )
-    ways, told = fall.restitutions(impulse, contact_time, flights)
+    ways, told = fall.restitutions(impulse, _between(touch, release), flights)
     restitution, shared = fall.mean(ways, impulse)
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
@@ -206,6 +200,11 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
         contact=contact,
     )
+
+
+def _between(first: Estimate, last: Estimate) -> Estimate:
+    """Return the time between two times, s."""
+    return Estimate(last.value - first.value, math.hypot(last.uncertainty, first.uncertainty))
 
 
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:

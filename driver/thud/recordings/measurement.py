@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from concurrent.futures import BrokenExecutor
 from contextlib import ExitStack, nullcontext
@@ -17,9 +16,8 @@ from thud.checks import refuse
 from thud.errors import NumericalError
 from thud.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import Estimate, measure_drop
+from thud.recordings.estimates import measure_drop
 from thud.recordings.kept import KeptDrops
-from thud.recordings.plate import REACH
 from thud.recordings.plate_correction import correct_window
 from thud.recordings.ringing import tell_ringing
 
@@ -211,12 +209,4 @@ def measure_window(window: Window, config: Config) -> Drop:
     drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
     if plate is None:
         return drop
-    time = drop.contact_time
-    # The correction ends at its reach: an edge is spread over half a period of that.
-    spread = 1 / (2 * REACH * plate.resonance)
-    return replace(
-        drop,
-        contact_time=Estimate(time.value, math.hypot(time.uncertainty, spread)),
-        steps=(*steps, *drop.steps),
-        remarks=(*remarks, *drop.remarks),
-    )
+    return replace(drop, steps=(*steps, *drop.steps), remarks=(*remarks, *drop.remarks))
