@@ -81,11 +81,11 @@ def _matched(
     rate = contact.sample_rate
     windows = np.exp(-np.arange(len(force)) / rate / DECAYS[:, None])
     length = next_fast_len(2 * len(force), real=True)
-    frequency = np.fft.rfftfreq(length, 1 / rate)[1:]
+    frequency = np.asarray(np.fft.rfftfreq(length, 1 / rate), dtype=np.float64)[1:]
     power = np.abs(np.fft.rfft(windows * force, length)[:, 1:]) ** 2
     white, pink, brown = contact.background.variances[:3]
     density = white + pink / frequency + brown / frequency**2
     if plate is not None:
         density /= np.abs(plate.response(frequency)) ** 2
     noise = density * rate / 2 * (windows**2).sum(axis=1)[:, None]
-    return np.asarray(frequency), np.asarray(power / noise)
+    return frequency, np.asarray(power / noise)
