@@ -42,9 +42,10 @@ def test_examples_are_measured_as_they_were_made(
     monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
-    assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 0
+    # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
+    assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out
-    assert "The source conforms to the limits of the rubber ball at 95 %" in shown
+    assert "The source does not conform to the limits of the rubber ball at 95 %" in shown
     assert "hum of 50 Hz" in shown
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {
         "levels.csv",
@@ -61,13 +62,15 @@ def test_examples_are_measured_as_they_were_made(
         assert drop.restitution.value == pytest.approx(made["restitution"], abs=0.01)
         assert drop.peak_force.value == pytest.approx(made["peak_force"], rel=2e-3)
         assert drop.onset == pytest.approx(made["onset"], abs=1e-3)
-        # The foot of the pulse of finite elements is soft: docs/recordings_theory.md.
-        assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=0.6e-3)
+        assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=1e-4)
     with (tmp_path / "out/levels.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
     assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
     report = json.loads((tmp_path / "out/report.json").read_text())
-    assert report["verdict"] == recording.conformity().verdict == "conforms"
+    assert report["verdict"] == recording.conformity().verdict == "does not conform"
+    assert [one["name"] for one in report["criteria"] if one["verdict"] != "conforms"] == [
+        "octave_500"
+    ]
 
 
 def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
@@ -183,8 +186,8 @@ def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str)
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str) -> None:
     impact = thud.solve_case(thud.read_case(REPOSITORY / f"inputs/{name}.nml"))
-    truth = impact.exact_contact_time
-    pulse = impact.floor_force[: int(truth * impact.sample_rate) + 2]
+    truth = impact.measured_contact_time
+    pulse = impact.floor_force[: int(impact.exact_contact_time * impact.sample_rate) + 2]
     for rate in (44_100.0, 48_000.0):
         for seed, noise in enumerate((0.5, 1.5, 5.0)):
             level = 20 * np.log10(pulse.max() / noise)

@@ -58,7 +58,7 @@ def tell_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...
         if energy[k, place] < OVER_BEFORE * same[k, max(at - 1, 0) : at + 2].max():
             return ()
     density, _ = contact.background.density(found)
-    density /= abs(plate.response(np.array([found]))[0]) ** 2 if plate else 1.0
+    density *= float(_gain(plate, np.array([found]))[0]) if plate else 1.0
     window = np.exp(-2 * np.arange(len(after)) / rate / decay).sum()
     amplitude = 2 * np.sqrt(energy[k, place] * density * rate / 2 / window)
     if amplitude < NOTABLE[plate is not None] * contact.peak:
@@ -74,6 +74,11 @@ def tell_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...
     return (told,)
 
 
+def _gain(plate: Plate, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what the correction of a plate makes of the density of noise, where it raises it."""
+    return np.asarray(np.maximum(1 / np.abs(plate.response(frequency)) ** 2, 1.0))
+
+
 def _matched(
     force: NDArray[np.float64], contact: Contact, plate: Plate | None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -86,6 +91,6 @@ def _matched(
     white, pink, brown = contact.background.variances[:3]
     density = white + pink / frequency + brown / frequency**2
     if plate is not None:
-        density /= np.abs(plate.response(frequency)) ** 2
+        density *= _gain(plate, frequency)
     noise = density * rate / 2 * (windows**2).sum(axis=1)[:, None]
     return frequency, np.asarray(power / noise)
