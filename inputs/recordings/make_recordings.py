@@ -157,8 +157,8 @@ hum = {{ {hum} }} # N
 plate = {{ f0 = {PLATE_F0}, Q = {PLATE_Q} }} # Hz
 
 # Of each drop: first touch in the sound file, s; height, m; contact time at 1 % of the peak, s;
-# restitution; peak, N; impulse, N s; octave levels 31.5 to 500 Hz, dB. Bounces are those of the drop
-# above them.
+# restitution; peak, N; impulse, N s; octave levels 31.5 to 500 Hz, dB. Bounces are those of the
+# drop above them.
 """
     text = head + drops_alone(heights[:5]) + drops_in_one(heights[5:])
     (HERE / "truth.toml").write_text(text, encoding="utf-8")
