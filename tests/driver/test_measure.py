@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 
 FOLDER = REPOSITORY / "inputs/recordings"
 TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
+# The contact times of the truth are those from first touch to release; 1 % of the peak is reached
+# and left within this time, s, which hardly depends on the drop height.
+BELOW = 0.357e-3
 DROPS = [drop for drop in TRUTH["drop"] if drop["file"].startswith("drop_")]
 
 
@@ -61,8 +64,7 @@ def test_examples_are_measured_as_they_were_made(
         assert drop.restitution.value == pytest.approx(made["restitution"], abs=0.01)
         assert drop.peak_force.value == pytest.approx(made["peak_force"], rel=2e-3)
         assert drop.onset == pytest.approx(made["onset"], abs=1e-3)
-        # The foot of the pulse of finite elements is soft: docs/recordings_theory.md.
-        assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=0.6e-3)
+        assert drop.contact_time.value == pytest.approx(made["contact_time"] - BELOW, abs=1e-4)
     with (tmp_path / "out/levels.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
     assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
@@ -79,7 +81,7 @@ def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
         force = np.pad(impact.floor_force, int(quiet * impact.sample_rate)) + offset
         force += random.normal(scale=noise, size=len(force))
         found = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)
-        assert found.contact_time == pytest.approx(impact.contact_time, abs=0.6e-3)
+        assert found.contact_time == pytest.approx(impact.measured_contact_time, abs=1e-4)
         assert found.restitution == pytest.approx(impact.restitution, abs=0.01)
         np.testing.assert_allclose(found.levels(), impact.levels(), atol=0.3)
 
@@ -162,29 +164,29 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
 def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str) -> None:
     # Five drops read 19.548 ms with an expanded uncertainty of 0.168 ms: their common error, that
-    # of a soft foot, was averaged away.
+    # of a soft foot and of the edge that the correction of the plate spreads, was averaged away.
     config = read_config(FOLDER / "lab.toml")
     if ending == "csv":
         config = replace(config, calibration=None, polarity=None)
     made = [drop for drop in TRUTH["drop"] if drop["file"].endswith("flac")]
     made = made if ending == "flac" else DROPS
     files = {FOLDER / drop["file"].replace("wav", ending): drop for drop in made}
-    truth = [drop["contact_time"] for drop in made]
+    truth = [drop["contact_time"] - BELOW for drop in made]
     recording = thud.read_recording(files, config=config)
     whole = recording.quantities["contact_time"]
     assert abs(whole.value - np.mean(truth)) <= whole.expanded
     assert "edges of the pulse" in {part.name for part in whole.contributions}
     for drop, time in zip(recording.drops, truth, strict=True):
         one = average_estimates([drop.contact_time])
-        assert abs(one.value - time) <= one.expanded
+        assert abs(one.value - time) <= min(one.expanded, 1e-4)
 
 
 @pytest.mark.parametrize("name", ["rubber_ball_fe", "rubber_ball_fe_elastic"])
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str) -> None:
     impact = thud.solve_case(thud.read_case(REPOSITORY / f"inputs/{name}.nml"))
-    truth = impact.exact_contact_time
-    pulse = impact.floor_force[: int(truth * impact.sample_rate) + 2]
+    truth = impact.measured_contact_time
+    pulse = impact.floor_force[: int(impact.exact_contact_time * impact.sample_rate) + 2]
     for rate in (44_100.0, 48_000.0):
         for seed, noise in enumerate((0.5, 1.5, 5.0)):
             level = 20 * np.log10(pulse.max() / noise)
