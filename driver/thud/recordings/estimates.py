@@ -191,17 +191,17 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         peak = _peak_of(window.bounces[0]) / contact.peak
         if not peak / UNLIKE < gravity * flight / (2 * fall.speed) < peak * UNLIKE:
             landings = []
-            told = (
-                f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: it "
-                f"is no bounce from {height:g} m"
+            unlike = (
+                f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: "
+                f"it is no bounce from {height:g} m"
             )
-            remarks += (told,)
+            remarks += (unlike,)
     flights = []
     leaving = contact.end
     for landing, again in landings:
         flights.append(_between(leaving, landing))
         leaving = again
-    ways, disagreement = fall.restitutions(impulse, contact_time, flights)
+    ways, told = fall.restitutions(impulse, contact_time, flights)
     restitution, shared = fall.mean(ways, impulse)
     time = (np.arange(*contact.span)) / rate - contact.touch.value
     first, stop = (place - contact.span[0] for place in contact.gate)
@@ -223,7 +223,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         noise=_noise(contact),
         bounces=tuple(landing.value - contact.touch.value for landing, _ in landings),
         steps=steps,
-        remarks=(*window.remarks, *remarks, *_told_aliased(contact), *disagreement),
+        remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
         contact=contact,
     )
 
