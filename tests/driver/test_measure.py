@@ -82,7 +82,7 @@ def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
         force = np.pad(impact.floor_force, int(quiet * impact.sample_rate)) + offset
         force += random.normal(scale=noise, size=len(force))
         found = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)
-        assert found.contact_time == pytest.approx(impact.contact_time, abs=0.6e-3)
+        assert found.contact_time == pytest.approx(impact.measured_contact_time, abs=1e-4)
         assert found.restitution == pytest.approx(impact.restitution, abs=0.01)
         np.testing.assert_allclose(found.levels(), impact.levels(), atol=0.3)
 
@@ -165,7 +165,7 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
 def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str) -> None:
     # Five drops read 19.548 ms with an expanded uncertainty of 0.168 ms: their common error, that
-    # of a soft foot, was averaged away.
+    # of a soft foot and of the edge that the correction of the plate spreads, was averaged away.
     config = read_config(FOLDER / "lab.toml")
     if ending == "csv":
         config = replace(config, calibration=None, polarity=None)
@@ -179,7 +179,7 @@ def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str)
     assert "edges of the pulse" in {part.name for part in whole.contributions}
     for drop, time in zip(recording.drops, truth, strict=True):
         one = average_estimates([drop.contact_time])
-        assert abs(one.value - time) <= one.expanded
+        assert abs(one.value - time) <= min(one.expanded, 1e-4)
 
 
 @pytest.mark.parametrize("name", ["rubber_ball_fe", "rubber_ball_fe_elastic"])

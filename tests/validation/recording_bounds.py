@@ -153,9 +153,11 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
     pull = np.where(upper, np.maximum(-pull, 0), pull)
     begin, end = contact_span(force, FINE)
     late = drop.contact_time.value - (end - begin)
-    bounce = drop.restitution.value - restitution.value
-    lasting, *flanks = flank_bounds(draw, oracle, record)
-    gravity = GRAVITY * lasting / np.sqrt(2 * GRAVITY * HEIGHT)
+    # The velocities are those at begin and end of the contact.
+    fall = GRAVITY * (contact_time - (end - begin)) / np.sqrt(2 * GRAVITY * HEIGHT)
+    bounce = drop.restitution.value - (restitution.value + fall)
+    flanks = flank_bounds(draw, oracle, record)
+    gravity = GRAVITY * flanks[0] / np.sqrt(2 * GRAVITY * HEIGHT)
     doubt = drop.contact_time.uncertainty
     return draw, Result(
         np.array([*(found - energy), bounce, late, late]),
@@ -226,11 +228,11 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     return oracle, Estimate(float(truth), spread)
 
 
-def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, float, float]:
-    """Return bounds of the time from touch to release, and two of the contact time, s.
+def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, float]:
+    """Return bounds of the contact time, s: of any flank, and of one that is known to be smooth.
 
-    The first two are deviations of this method where the noise is known, and the contact to the
-    sample in the search for drops; the third is the Cramer-Rao bound for flanks of unknown slope
+    The first is the deviation of this method where the noise is known, and the contact to the
+    sample in the search for drops; the second is the Cramer-Rao bound for flanks of unknown slope
     and curvature, for the half sine.
     """
     rate, contact = draw.rate, oracle.contact
@@ -243,10 +245,9 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
         found = contact_module.find_posteriors(window, record, contact.background, passes=2)
     finally:
         contact_module.QUIET_CELLS = saved
-    deviations = [[one for _, one in edge.edge()] for edge in (found.touch, found.release)]
-    lasting, spread = map(float, np.hypot(*deviations))
+    spread = float(np.hypot(*(edge.edge()[1][1] for edge in (found.touch, found.release))))
     if draw.shape != "half sine":
-        return lasting, spread, np.nan
+        return spread, np.nan
     count = max(4, int(contact_module.FLANK * min(rate, 2e4)))
     edges = np.linspace(0, contact_module.FLANK, count + 1)
     tau = (edges[1:] + edges[:-1]) / 2
@@ -261,7 +262,7 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, f
     # What the three make of the time at which the flank passes the threshold.
     delay = THRESHOLD * contact.peak / slope
     change = np.array([1, delay / slope, delay**2 / slope / 2])
-    return lasting, spread, float(np.sqrt(2 * change @ inverse @ change))
+    return spread, float(np.sqrt(2 * change @ inverse @ change))
 
 
 def realise_all(count: int, first: int = 0) -> list[tuple[Draw, Result | str]]:

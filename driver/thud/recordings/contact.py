@@ -182,9 +182,9 @@ class Edges:
 
 
 def find_edges(window: Window, known: Background | None = None) -> tuple[Estimate, Estimate]:
-    """Return first touch and release, s from the first sample of a window, to about 0.1 ms."""
+    """Return begin and end of a contact, s from the first sample of a window, to about 0.1 ms."""
     edges = find_posteriors(window, window.force, known, passes=1)
-    (t0, s0), (t1, s1) = edges.touch.touch(), edges.release.touch()
+    (t0, s0), (t1, s1) = edges.touch.edge()[1], edges.release.edge()[1]
     return Estimate(t0, s0), Estimate(-t1, s1)
 
 

@@ -204,6 +204,9 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         if top < behind:
             continue
         low, high = (_walk(level, top, step, level[top] / 2) for step in (-1, 1))
+        # Noise that runs into a pulse is none.
+        if level[low : high + 1].max() > level[top]:
+            continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
         # The quiet next to the pulse, which slow noise moves away from that of a second.

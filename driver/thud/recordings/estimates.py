@@ -37,6 +37,9 @@ TOP = 0.4
 NOTABLE_ERROR = 0.1
 # Least contact time over its uncertainty.
 MOST_DOUBT = 4.0
+# A pulse whose flight and whose peak, over those of the drop, differ by this factor is no bounce:
+# the force follows the velocity.
+UNLIKE = 3.0
 # Standard deviations that make a difference worth telling.
 NOTABLE = 3.0
 
@@ -72,7 +75,7 @@ class Drop:
     noise : Noise
         Noise of the quiet parts.
     bounces : tuple of float
-        Times of first touch of the later bounces that were measured since the onset, s: of one
+        Times at which the later bounces that were measured begin, since the onset, s: of one
         where the drop height is known, else of up to two.
     steps, remarks : tuple of str
         What was done to the signal, and what is doubtful; a sentence each.
@@ -158,7 +161,6 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     rate = window.sample_rate
     # The flight behind the drop gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if height else 2)
-    touch, release = contact.touch, contact.release
     contact_time = _between(contact.begin, contact.end)
     if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
         refuse(
@@ -168,23 +170,33 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
             f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
         )
     impulse = _impulse(contact)
-    flights = []
-    leaving = release
-    for landing, again in landings:
-        flights.append(_between(leaving, landing))
-        leaving = again
     fall = Fall(
         height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty, gravity
     )
-    ways, told = fall.restitutions(impulse, _between(touch, release), flights)
+    if height and landings:
+        flight = _between(contact.end, landings[0][0]).value
+        peak = _peak_of(window.bounces[0]) / contact.peak
+        if not peak / UNLIKE < gravity * flight / (2 * fall.speed) < peak * UNLIKE:
+            landings = []
+            unlike = (
+                f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: "
+                f"it is no bounce from {height:g} m"
+            )
+            remarks += (unlike,)
+    flights = []
+    leaving = contact.end
+    for landing, again in landings:
+        flights.append(_between(leaving, landing))
+        leaving = again
+    ways, told = fall.restitutions(impulse, contact_time, flights)
     restitution, shared = fall.mean(ways, impulse)
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
         name=window.name,
-        begin=contact.span[0] / rate - touch.value,
+        begin=contact.span[0] / rate - contact.touch.value,
         force=contact.force,
         sample_rate=rate,
-        onset=window.start / rate + touch.value,
+        onset=window.start / rate + contact.touch.value,
         gate=(first, stop),
         contact_time=contact_time,
         restitution=restitution,
@@ -195,7 +207,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         impulse=impulse,
         effective_mass=fall.effective_mass(impulse, contact_time, ways.get("bounces")),
         noise=_noise(contact),
-        bounces=tuple(landing.value - touch.value for landing, _ in landings),
+        bounces=tuple(landing.value - contact.touch.value for landing, _ in landings),
         steps=steps,
         remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
         contact=contact,
@@ -208,22 +220,28 @@ def _between(first: Estimate, last: Estimate) -> Estimate:
 
 
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
-    """Return first touch and release of the first bounces, s from the start of the window."""
+    """Return begin and end of the first bounces, s from the start of the window."""
     found = []
     for bounce in window.bounces[:count]:
         first, stop = bounce.contact
         least = least_quiet(bounce.sample_rate)
         if first < least or len(bounce.force) - stop < least:
             break
-        touch, release = find_edges(bounce, drop.background)
         late = (bounce.start - window.start) / window.sample_rate
-        found.append(
-            (
-                Estimate(late + touch.value, touch.uncertainty),
-                Estimate(late + release.value, release.uncertainty),
-            )
+        begin, end = (
+            Estimate(late + edge.value, edge.uncertainty)
+            for edge in find_edges(bounce, drop.background)
         )
+        found.append((begin, end))
     return found
+
+
+def _peak_of(window: Window) -> float:
+    """Return the maximum of a pulse above its quiet, N."""
+    first, stop = window.contact
+    force = window.force
+    quiet = np.concatenate([force[:first], force[stop:]])
+    return float(force[first:stop].max() - np.median(quiet))
 
 
 def _impulse(contact: Contact) -> Estimate:

@@ -82,7 +82,8 @@ LEFT = np.array([kind.left for kind in KINDS])
 # What the shapes miss of a flank, as part of the force itself: of smooth kinds and of rough.
 MISSED = (0.005, 0.1)
 # The force is nowhere negative, and that of smooth kinds nowhere falls, by more than this part of
-# the peak; and it has left its foot, a part of the peak, this long after the begin, ms.
+# the peak; it reaches the threshold within FOOT_TIME ms, and as long after that has left its foot,
+# a part of the peak.
 FALL = 0.002
 FOOT = 0.03
 FOOT_TIME = 1.0
@@ -165,7 +166,7 @@ class Posterior:
     def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return first touch and begin of the contact, s, with their standard deviations.
 
-        From draws of kind, time and shape; those whose force is negative, or falls, are left out.
+        From draws of kind, time and shape; flanks that no force has are left out.
         """
         total = self.weight.sum(axis=1)
         kinds = np.nonzero(total > LEAST)[0]
@@ -176,8 +177,8 @@ class Posterior:
         path = self._paths(kind, np.minimum(at, len(self.time) - 1))
         highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
         delay = _crossing(path, THRESHOLD)
-        left_foot = _crossing(path, FOOT) <= delay + FOOT_TIME
-        chance = total[kind] * ((highest - path).max(axis=1) <= FALL) * left_foot
+        fast = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
+        chance = total[kind] * ((highest - path).max(axis=1) <= FALL) * fast
         if not chance.any():
             chance = total[kind]
         chance /= chance.sum()
