@@ -22,8 +22,9 @@ from thud.display import MAKERS
 from thud.ensemble import solve_many
 from thud.errors import FitWarning, InputError, NumericalError, PlausibilityWarning, ThudError
 from thud.extras import require_extra
+from thud.floors.mobility import mobility
 from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import Impact, solve_case
+from thud.impact import FloorEnergy, FloorImpact, Impact, solve_case
 from thud.levels import Bands, force_exposure_levels, get_bands, judge
 from thud.motion import Motion
 from thud.outcomes import Ensemble
@@ -106,6 +107,8 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "Criterion",
     "Ensemble",
     "FitWarning",
+    "FloorEnergy",
+    "FloorImpact",
     "FreeModes",
     "Impact",
     "InputError",
@@ -119,6 +122,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "get_bands",
     "judge",
     "loss_factors",
+    "mobility",
     "read_case",
     "read_results",
     "solve",
@@ -158,6 +162,7 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
+    floor=_maker("plot.floor", "draw_floor"),
     compression=_maker("plot.compression", "compression"),
     compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),

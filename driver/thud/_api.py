@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     Bundle = dict[str, Any]
 
 api = _core.thud_api
+floor_api = _core.thud_floor_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
 

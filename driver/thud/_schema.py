@@ -546,6 +546,10 @@ class Plate(Group):
         Place of the source along the length, over the length; 0 < source_x < 1.
     source_y : float
         Place of the source along the width, over the width; 0 < source_y < 1.
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -561,6 +565,8 @@ class Plate(Group):
     edge_absorption: float = 0.0
     source_x: float = 0.5
     source_y: float = 0.5
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -609,6 +615,10 @@ class FloatingFloor(Group):
         Place of the source along the length, over the length; 0 < source_x < 1.
     source_y : float
         Place of the source along the width, over the width; 0 < source_y < 1.
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "floating_floor"
@@ -630,6 +640,8 @@ class FloatingFloor(Group):
     layer_loss_factor: float = 0.1
     source_x: float = 0.5
     source_y: float = 0.5
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -669,6 +681,10 @@ class JoistFloor(Group):
         Place of the source across the joists, over the width; 0 < source_y < 1.
     source_on : str
         What the source drops on there: sheathing between joists, or a joist; "sheathing", "joist".
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
     """
 
     name: ClassVar[FloorName] = "joist_floor"
@@ -687,6 +703,8 @@ class JoistFloor(Group):
     source_x: float = 0.5
     source_y: float = 0.5
     source_on: JoistFloorSourceOn = "sheathing"
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
 
 
 @dataclass(frozen=True)
@@ -874,6 +892,8 @@ KEYS = (
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
     Key("plate", "plate", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
     Key("plate", "plate", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("plate", "plate", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
     Key("floating_floor", "floating_floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
@@ -892,6 +912,8 @@ KEYS = (
     Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "width", "real", "m", "width of the floor across the joists", (), 0.5, 100.0),
     Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
@@ -907,6 +929,8 @@ KEYS = (
     Key("joist_floor", "joist_floor", "source_x", "real", "", "place of the source along the joists, over the length", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "place of the source across the joists, over the width", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "what the source drops on there: sheathing between joists, or a joist", ('sheathing', 'joist')),
+    Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles over 2 pi", (), 1e-06, 10000000.0),
     Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 0.0, 1.0),

@@ -10,7 +10,7 @@ module thud_api
    use thud_case, only: case_type, get_model_number
    use thud_case_text, only: get_case_text, read_case
    use thud_compression, only: compression_type
-   use thud_compute, only: compress_case, compute_case, predict_room_level, results_type
+   use thud_compute, only: compress_case, compute_case, drop_on_case_floor => drop_on_floor, predict_room_level, results_type
    use thud_constants, only: compiler, version
    use thud_error, only: error_type
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
@@ -24,7 +24,7 @@ module thud_api
    implicit none (type, external)
    private
 
-   public :: check_text, collect, compress, describe_library, effective_case, end_calls, free_modes, loss_factors
+   public :: check_text, collect, compress, describe_library, drop_on_floor, effective_case, end_calls, free_modes, loss_factors
    public :: predict_room, run, solve
 
 contains
@@ -128,6 +128,28 @@ contains
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine solve
 
+   !> The impact of a case on its floor alone.
+   subroutine drop_on_floor(text, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !> Text of a namelist file with the group `&floor`.
+      character(len=*), intent(in) :: text
+      !> Status, handle and sizes as in `leave`; the bundle is empty where the force is the blocked one.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(force_history_type), allocatable :: on_floor
+      type(error_type), allocatable :: error
+
+      allocate (bundle)
+      call begin_call()
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call drop_on_case_floor(case, on_floor, error)
+      if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
+      call end_call()
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine drop_on_floor
+
    !> Adds what a case has computed to a bundle.
    subroutine add_results(bundle, case, results)
       type(bundle_type), intent(inout) :: bundle
@@ -135,7 +157,8 @@ contains
       type(results_type), intent(in) :: results
       integer :: i
 
-      if (case%has_impact) call add_history(bundle, results%history)
+      if (case%has_impact) call add_history(bundle, '', results%history)
+      if (allocated(results%on_floor)) call add_history(bundle, 'on_floor.', results%on_floor)
       if (case%has_modes) call add_modes(bundle, results%modes)
       if (case%has_compression) call add_compression(bundle, results%compression)
       do i = 1, size(results%remark)
@@ -144,8 +167,10 @@ contains
    end subroutine add_results
 
    !> Adds a force history to a bundle.
-   subroutine add_history(bundle, history)
+   subroutine add_history(bundle, prefix, history)
       type(bundle_type), intent(inout) :: bundle
+      !> What the names of its items begin with.
+      character(len=*), intent(in) :: prefix
       type(force_history_type), intent(in) :: history
       real(wp) :: scalars(size(scalar_fields))
       integer :: n(1)
@@ -154,32 +179,37 @@ contains
       n = size(history%deflection)
       scalars = get_scalars(history)
       do i = 1, size(scalars)
-         call bundle%add_number('scalars.'//scalar_fields(i)%name, scalars(i))
+         call bundle%add_number(prefix//'scalars.'//scalar_fields(i)%name, scalars(i))
       end do
       do i = 1, size(history%fact)
-         call bundle%add_number('facts.'//history%fact_name(i), history%fact(i))
+         call bundle%add_number(prefix//'facts.'//history%fact_name(i), history%fact(i))
       end do
-      call bundle%add_array('samples.deflection', n, history%deflection)
-      call bundle%add_array('samples.velocity', n, history%velocity)
-      call bundle%add_array('samples.elastic_force', n, history%elastic_force)
-      call bundle%add_array('samples.floor_force', n, history%floor_force)
+      call bundle%add_array(prefix//'samples.deflection', n, history%deflection)
+      call bundle%add_array(prefix//'samples.velocity', n, history%velocity)
+      call bundle%add_array(prefix//'samples.elastic_force', n, history%elastic_force)
+      call bundle%add_array(prefix//'samples.floor_force', n, history%floor_force)
+      if (allocated(history%floor_velocity)) then
+         call bundle%add_array(prefix//'floor.floor_displacement', n, history%floor_displacement)
+         call bundle%add_array(prefix//'floor.floor_velocity', n, history%floor_velocity)
+         call bundle%add_number(prefix//'floor.floor_work', history%floor_work)
+      end if
       do i = 1, size(history%part_name)
-         call bundle%add_array('parts.'//history%part_name(i), n, history%part(:, i))
+         call bundle%add_array(prefix//'parts.'//history%part_name(i), n, history%part(:, i))
       end do
       if (allocated(history%channel)) then
          do i = 1, size(history%channel_name)
-            call bundle%add_array('channels.'//history%channel_name(i), n, history%channel(:, i))
+            call bundle%add_array(prefix//'channels.'//history%channel_name(i), n, history%channel(:, i))
          end do
       end if
       associate (motion => history%motion, n_frame => history%motion%n_frame)
          if (n_frame == 0) return
-         call bundle%add_array('motion.time', [n_frame], motion%time)
-         call bundle%add_array('motion.start', shape(motion%start), motion%start)
-         call bundle%add_array('motion.position', [shape(motion%start), n_frame], motion%position)
-         call bundle%add_array('motion.velocity', [shape(motion%start), n_frame], motion%velocity)
-         call bundle%add_array('motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
-         call bundle%add_array('motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
-         call bundle%add_array('motion.cavity_pressure', [n_frame], motion%cavity_pressure)
+         call bundle%add_array(prefix//'motion.time', [n_frame], motion%time)
+         call bundle%add_array(prefix//'motion.start', shape(motion%start), motion%start)
+         call bundle%add_array(prefix//'motion.position', [shape(motion%start), n_frame], motion%position)
+         call bundle%add_array(prefix//'motion.velocity', [shape(motion%start), n_frame], motion%velocity)
+         call bundle%add_array(prefix//'motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
+         call bundle%add_array(prefix//'motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
+         call bundle%add_array(prefix//'motion.cavity_pressure', [n_frame], motion%cavity_pressure)
       end associate
    end subroutine add_history
 

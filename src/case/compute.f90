@@ -4,6 +4,7 @@ module thud_compute
    use thud_case, only: case_type, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
+   use thud_floor_result, only: floor_result_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
@@ -40,6 +41,8 @@ module thud_compute
       type(verdict_type) :: verdict
       !> The force on a floor that moves, where one is asked for and the model couples with it.
       type(force_history_type), allocatable :: on_floor
+      !> What it makes of the floor.
+      type(floor_result_type) :: floor
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
       !> Level in the room below, where it is asked for.

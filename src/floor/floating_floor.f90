@@ -40,7 +40,7 @@ contains
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(floating_floor_type), intent(in), target :: options
-      !> Those of the plate over the room, and one per component: [18].
+      !> Those of the plate over the room, one per component, and the points: [20].
       type(field_type), allocatable :: fields(:)
 
       fields = [get_plate_fields(options%plate), &
@@ -53,7 +53,8 @@ contains
          'dynamic stiffness of the resilient layer over area (ISO 9052-1)', '[1e4, 1e12]'), &
          real_field('layer_loss_factor', options%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]'), &
          real_field('source_x', options%source_x, '', 'place of the source along the length, over the length', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)')]
+         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)'), &
+         options%get_point_fields()]
    end function get_fields
 
    !> Plates and layer.

@@ -56,7 +56,7 @@ contains
    function get_fields(options) result(fields)
       !> The options that the fields read and set.
       class(joist_floor_type), intent(in), target :: options
-      !> One field per component: [15].
+      !> One field per component, and the points: [17].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -77,7 +77,8 @@ contains
          real_field('source_x', options%source_x, '', 'place of the source along the joists, over the length', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'place of the source across the joists, over the width', '(0, 1)'), &
          choice_field('source_on', options%source_on, &
-         'what the source drops on there: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist'])]
+         'what the source drops on there: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
+         options%get_point_fields()]
    end function get_fields
 
    !> Refuses floors with too many modes.

@@ -32,12 +32,13 @@ contains
    !> Keys and allowed ranges of the group `&plate`.
    function get_fields(options) result(fields)
       class(plate_floor_type), intent(in), target :: options
-      !> One field per component.
+      !> Those of the plate, the place of the source, and the points: [12].
       type(field_type), allocatable :: fields(:)
 
       fields = [get_plate_fields(options%plate), &
          real_field('source_x', options%source_x, '', 'place of the source along the length, over the length', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)')]
+         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)'), &
+         options%get_point_fields()]
    end function get_fields
 
    !> Refuses plates with too many modes.

@@ -65,8 +65,10 @@ contains
    end function estimate_motion_bytes
 
    !> Snapshots, their list, and the pressures on the floor.
-   subroutine get_motion_files(motion, files)
+   subroutine get_motion_files(motion, prefix, files)
       type(motion_type), intent(in) :: motion
+      !> What the names of the files begin with.
+      character(len=*), intent(in) :: prefix
       !> The files: [n_frame + 2].
       type(text_file_type), intent(out) :: files(:)
       real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), stress(size(vector, 2), 3)
@@ -75,7 +77,7 @@ contains
       n_polar = ubound(motion%start, 1)
       n_radial = ubound(motion%start, 2)
       do i = 1, motion%n_frame
-         files(i)%name = get_frame_name(i)
+         files(i)%name = prefix//get_frame_name(i)
          vector(:, :, 1) = get_points(motion%position(:, :, 1, i) - motion%start(:, :, 1), &
             motion%position(:, :, 2, i) - motion%start(:, :, 2))
          vector(:, :, 2) = get_points(motion%velocity(:, :, 1, i), motion%velocity(:, :, 2, i))
@@ -87,7 +89,9 @@ contains
             get_cells(n_polar, n_radial, 1), quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
             [character(len=16) :: 'contact_pressure', 'contact_shear', 'cavity_pressure'], stress, files(i)%content)
       end do
-      files(motion%n_frame + 1:)%name = motion_names
+      do i = 1, size(motion_names)
+         files(motion%n_frame + i)%name = prefix//trim(motion_names(i))
+      end do
       call get_pvd(files(:motion%n_frame)%name, motion%time(:motion%n_frame), files(motion%n_frame + 1)%content)
       call get_pressure_csv(motion, files(motion%n_frame + 2)%content)
    end subroutine get_motion_files

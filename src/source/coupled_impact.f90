@@ -174,8 +174,9 @@ contains
          history%floor_displacement(i) = motion%motion%displacement
          history%floor_velocity(i) = motion%floor_velocity
          call source%record_sample(get_relative_state(source, motion), i, history)
-         ! Of a force that sets in with a jump the first sample is its half.
+         ! Of a force that sets in with a jump, and of the velocity that jumps with it, the first sample is the half.
          if (i > 1) history%floor_force(i) = motion%force
+         if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
       end associate
    end subroutine record
 

@@ -63,7 +63,11 @@ tables = (
 floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
 floors += [thud.FloatingFloor(), thud.JoistFloor(), thud.MeasuredMobility()]
 light: thud.Impact = thud.solve(ball, floor=floors[1])
-chosen: thud.FloorName = floors[1].name
+moved: thud.FloorImpact | None = light.on_floor
+assert moved is not None
+shares: thud.FloorEnergy = moved.injected_energy("third")
+print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]), moved.difference())
+name: thud.FloorName = chosen
 floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
 below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")

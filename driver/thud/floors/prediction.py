@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
 from thud.floors.rating import Rating, rated_bands, rating, standardised_level
 from thud.floors.survey import RoomLevels
-from thud.impact import Impact
+from thud.impact import FloorImpact, Impact, new_floor_impact
 from thud.levels import BANDWIDTHS, get_bands
 from thud.recordings.recording import Recording
 
@@ -55,10 +55,12 @@ class RoomPrediction(Displayed):
         Expected number of modes in each third.
     conductance : ndarray, shape (12,)
         Power that a force of unit mean square gives to the floor, m/(N s).
+    force : str
+        ``"contact"``: the prediction is of the force on the floor, which moves under the source;
+        ``"blocked"``: of the force on a rigid floor, as recordings and measured modes have it.
     force_change : float
-        What the peak of the force would change by if the floor gave way, dB: of a linear source
-        with the mass and the contact time of the impact. The prediction uses the force on a rigid
-        floor.
+        Change of the peak of the force by the floor, dB; of a blocked force that which a linear
+        source with the mass and the contact time of the impact would have.
     """
 
     floor: FloorOptions
@@ -73,6 +75,7 @@ class RoomPrediction(Displayed):
     floor_modes: NDArray[np.float64]
     room_modes: NDArray[np.float64]
     conductance: NDArray[np.float64]
+    force: Literal["contact", "blocked"]
     force_change: float
 
     @property
@@ -106,7 +109,7 @@ class RoomPrediction(Displayed):
                 f"fewer than {FEW_MODES} modes of floor or room at {bands} Hz: levels there are "
                 "means over many floors and rooms, single ones differ by several dB"
             )
-        if abs(self.force_change) > NOTICED:
+        if self.force == "blocked" and abs(self.force_change) > NOTICED:
             found.append(
                 f"the floor gives way: the peak of the force would change by about "
                 f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
@@ -155,7 +158,8 @@ def predict_level(
 
     Transient statistical energy analysis in thirds: the floor takes the energy of an infinite
     plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
-    the Fast detector shows its maximum. The force is that on a rigid floor.
+    the Fast detector shows its maximum. The force is that on the floor, where the model knows it:
+    on floors that the impact has not seen, the source is dropped once more.
 
     Parameters
     ----------
@@ -176,23 +180,37 @@ def predict_level(
         refuse(
             f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
         )
+    asked = replace(case, modes=None, floor=floor, room=room)
+    moved = _on_floor(source, asked) if isinstance(source, Impact) else None
     levels = (
-        source.levels(THIRDS, force="floor")
+        (moved or source).levels(THIRDS, force="floor")
         if isinstance(source, Impact)
         else source.levels(THIRDS)
     )
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    asked = replace(case, modes=None, floor=floor, room=room)
     found = call(api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
     bands = found["bands"]
-    mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+    if moved and isinstance(source, Impact):
+        change = 20 * math.log10(moved.peak("floor") / source.peak("floor"))
+    else:
+        mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+        change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
     return RoomPrediction(
         floor=floor,
         room=room,
-        force_change=_force_change(mass, source.contact_time, 1 / bands["conductance"].max()),
+        force="contact" if moved else "blocked",
+        force_change=change,
         time_of_maximum=bands.pop("time"),
         **bands,
     )
+
+
+def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
+    """Return the impact on the floor of a case; None where its force is the blocked one."""
+    if source.case.floor == case.floor:
+        return source.on_floor
+    plain = replace(case, compression=None)
+    return new_floor_impact(case, call(api.drop_on_floor, case_text(plain)), source.floor_force)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

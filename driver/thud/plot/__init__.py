@@ -19,6 +19,7 @@ from thud.plot.comparison import comparison_page as comparison_page
 from thud.plot.compression import compression as compression
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
+from thud.plot.floor import draw_floor as draw_floor
 from thud.plot.force_history import force_history as force_history
 from thud.plot.history import draw_history as draw_history
 from thud.plot.level_changes import level_changes as level_changes
