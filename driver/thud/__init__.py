@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from thud.comparison import read_all as read_all
     from thud.compression_fit import CompressionFit as CompressionFit
     from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.impedance import BallImpedance as BallImpedance
+    from thud.floors.impedance import ball_impedance as ball_impedance
     from thud.floors.prediction import RoomPrediction as RoomPrediction
     from thud.floors.prediction import predict_level as predict_level
     from thud.floors.rating import Rating as Rating
@@ -79,6 +81,8 @@ __version__ = version()
 # What is imported at first use, by its module; modules themselves have none.
 _LATE = {
     "plot": "",
+    "BallImpedance": "floors.impedance",
+    "ball_impedance": "floors.impedance",
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
@@ -163,6 +167,7 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
     floor=_maker("plot.floor", "draw_floor"),
+    impedance=_maker("plot.impedance", "ball_impedances"),
     compression=_maker("plot.compression", "compression"),
     compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),
