@@ -43,8 +43,12 @@ if TYPE_CHECKING:
     from thud.comparison import read_all as read_all
     from thud.compression_fit import CompressionFit as CompressionFit
     from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.floor_comparison import FloorComparison as FloorComparison
+    from thud.floors.floor_comparison import compare_floors as compare_floors
     from thud.floors.impedance import BallImpedance as BallImpedance
     from thud.floors.impedance import ball_impedance as ball_impedance
+    from thud.floors.modal_room import ModalRoom as ModalRoom
+    from thud.floors.modal_room import modal_room as modal_room
     from thud.floors.prediction import RoomPrediction as RoomPrediction
     from thud.floors.prediction import predict_level as predict_level
     from thud.floors.rating import Rating as Rating
@@ -52,6 +56,8 @@ if TYPE_CHECKING:
     from thud.floors.rating import standardised_level as standardised_level
     from thud.floors.survey import RoomLevels as RoomLevels
     from thud.floors.survey import read_room_levels as read_room_levels
+    from thud.floors.tapping import TappingLevel as TappingLevel
+    from thud.floors.tapping import tapping_level as tapping_level
     from thud.recordings.read_recording import read_recording as read_recording
     from thud.recordings.recording import Recording as Recording
     from thud.studies.blocks import read_sweep as read_sweep
@@ -86,19 +92,25 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "compare_floors": "floors.floor_comparison",
     "CompressionFit": "compression_fit",
     "fit_compression": "compression_fit",
     "read_all": "comparison",
+    "FloorComparison": "floors.floor_comparison",
+    "ModalRoom": "floors.modal_room",
     "Rating": "floors.rating",
     "Recording": "recordings.recording",
     "RoomLevels": "floors.survey",
     "RoomPrediction": "floors.prediction",
+    "TappingLevel": "floors.tapping",
+    "modal_room": "floors.modal_room",
     "predict_level": "floors.prediction",
     "quantity": "units",
     "rating": "floors.rating",
     "read_recording": "recordings.read_recording",
     "read_room_levels": "floors.survey",
     "standardised_level": "floors.rating",
+    "tapping_level": "floors.tapping",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
@@ -173,6 +185,10 @@ MAKERS.update(
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    floors=_maker("plot.floors", "draw_floors"),
+    floors_html=_maker("plot.floors", "floors_html"),
+    save_all=_maker("plot.look", "save_all"),
+    modal_room=_maker("plot.modal_room", "draw_modal_room"),
     prediction=_maker("plot.prediction", "draw_prediction"),
     room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),

@@ -70,6 +70,7 @@ FloorName = Literal[
 PlateEdges = Literal["laboratory", "absorption"]
 FloatingFloorEdges = Literal["laboratory", "absorption"]
 JoistFloorSourceOn = Literal["sheathing", "joist"]
+RoomWallJunction = Literal["cross", "t", "index"]
 BandSet = Literal["octave", "third"]
 
 
@@ -240,6 +241,31 @@ class Room(Group):
         Density of the air, kg/m3; 0.5 <= air_density <= 2.
     sound_speed : float
         Speed of sound in the air, m/s; 200 <= sound_speed <= 500.
+    wall_lengths : sequence of float
+        Lengths of the flanking walls along the floor (default: no walls), m; 0.1 <= wall_lengths
+        <= 100.
+    wall_height : float
+        Height of the walls, m; 0.5 <= wall_height <= 20.
+    wall_thickness : float
+        Thickness of the walls, m; 0.005 <= wall_thickness <= 2.
+    wall_density : float
+        Density of the walls, kg/m3; 10 <= wall_density <= 20000.
+    wall_wave_speed : float
+        Speed of longitudinal waves in the walls, m/s; 100 <= wall_wave_speed <= 10000.
+    wall_loss_factor : float
+        Internal loss factor of the walls; 0 <= wall_loss_factor <= 1.
+    wall_junction : str
+        Junction of floor and walls: rigid cross or t, or one of a given index; "cross", "t",
+        "index".
+    junction_index : float
+        Vibration reduction index from floor to wall, of the junction index, dB; -10 <=
+        junction_index <= 80.
+    ceiling_mass : float
+        Mass of a suspended ceiling over its area; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
+    ceiling_depth : float
+        Depth of the air above the ceiling, m; 0.01 <= ceiling_depth <= 2.
+    ceiling_loss_factor : float
+        Loss factor of that air; 0.001 <= ceiling_loss_factor <= 1.
     """
 
     volume: float = 50.0
@@ -247,6 +273,17 @@ class Room(Group):
     reverberation_times: Sequence[float] = ()
     air_density: float = 1.2
     sound_speed: float = 343.0
+    wall_lengths: Sequence[float] = ()
+    wall_height: float = 2.5
+    wall_thickness: float = 0.2
+    wall_density: float = 2300.0
+    wall_wave_speed: float = 3500.0
+    wall_loss_factor: float = 0.005
+    wall_junction: RoomWallJunction = "cross"
+    junction_index: float = 10.0
+    ceiling_mass: float = 0.0
+    ceiling_depth: float = 0.1
+    ceiling_loss_factor: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -943,4 +980,15 @@ KEYS = (
     Key("room", "room", "reverberation_times", "list", "s", "the same for each third from 50 to 630 Hz", (), 0.05, 20.0),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
+    Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),
+    Key("room", "room", "wall_height", "real", "m", "height of the walls", (), 0.5, 20.0),
+    Key("room", "room", "wall_thickness", "real", "m", "thickness of the walls", (), 0.005, 2.0),
+    Key("room", "room", "wall_density", "real", "kg/m3", "density of the walls", (), 10.0, 20000.0),
+    Key("room", "room", "wall_wave_speed", "real", "m/s", "speed of longitudinal waves in the walls", (), 100.0, 10000.0),
+    Key("room", "room", "wall_loss_factor", "real", "", "internal loss factor of the walls", (), 0.0, 1.0),
+    Key("room", "room", "wall_junction", "choice", "", "junction of floor and walls: rigid cross or t, or one of a given index", ('cross', 't', 'index')),
+    Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, of the junction index", (), -10.0, 80.0),
+    Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass of a suspended ceiling over its area; 0: none", (), 0.0, 200.0),
+    Key("room", "room", "ceiling_depth", "real", "m", "depth of the air above the ceiling", (), 0.01, 2.0),
+    Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of that air", (), 0.001, 1.0),
 )

@@ -7,7 +7,7 @@
 module thud_api
    use thud_band, only: band_type
    use thud_bundle, only: bundle_type, leave, take
-   use thud_case, only: case_type, get_model_number
+   use thud_case, only: case_type, get_floor_number, get_model_number
    use thud_case_text, only: get_case_text, read_case
    use thud_compression, only: compression_type
    use thud_compute, only: compress_case, compute_case, drop_on_case_floor => drop_on_floor, predict_room_level, results_type
@@ -16,6 +16,8 @@ module thud_api
    use thud_force_history, only: force_history_type, get_scalars, scalar_fields
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: int64, int8, wp
+   use thud_plate, only: get_critical_frequency, get_radiation_factor, get_surface_mass, get_total_loss, plate_type
+   use thud_progress, only: latest_progress
    use thud_progress_line, only: begin_progress, end_progress
    use thud_room, only: get_room_bands, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
@@ -24,8 +26,8 @@ module thud_api
    implicit none (type, external)
    private
 
-   public :: check_text, collect, compress, describe_library, drop_on_floor, effective_case, end_calls, free_modes, loss_factors
-   public :: predict_room, run, solve
+   public :: check_text, collect, compress, describe_library, drop_on_floor, effective_case, end_calls, free_modes
+   public :: get_progress, get_radiator, loss_factors, predict_room, run, solve
 
 contains
 
@@ -53,6 +55,14 @@ contains
 
       call end_all_calls()
    end subroutine end_calls
+
+   !> How far the latest long work of this process is.
+   subroutine get_progress(done)
+      !> Part that is done, 0 to 1.
+      real(wp), intent(out) :: done
+
+      done = latest_progress
+   end subroutine get_progress
 
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
@@ -210,6 +220,7 @@ contains
          call bundle%add_array(prefix//'motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
          call bundle%add_array(prefix//'motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
          call bundle%add_array(prefix//'motion.cavity_pressure', [n_frame], motion%cavity_pressure)
+         call bundle%add_array(prefix//'motion.floor_displacement', [n_frame], motion%floor_displacement)
       end associate
    end subroutine add_history
 
@@ -373,6 +384,7 @@ contains
       if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
       if (.not. allocated(error)) then
          n = n_band
+         call bundle%add_number('surface_mass', prediction%surface_mass)
          call bundle%add_array('bands.conductance', n, prediction%conductance)
          call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
          call bundle%add_array('bands.energy', n, prediction%energy)
@@ -383,8 +395,56 @@ contains
          call bundle%add_array('bands.room_modes', n, prediction%room_modes)
          call bundle%add_array('bands.level', n, prediction%level)
          call bundle%add_array('bands.time', n, prediction%time)
+         call bundle%add_array('bands.spread', n, prediction%spread)
+         call bundle%add_array('octaves.frequency', shape(prediction%octave_level), prediction%octaves%nominal)
+         call bundle%add_array('octaves.level', shape(prediction%octave_level), prediction%octave_level)
+         call bundle%add_array('octaves.time', shape(prediction%octave_level), prediction%octave_time)
+         call bundle%add_array('history.time', shape(prediction%history_time), prediction%history_time)
+         call bundle%add_array('history.level', shape(prediction%history), prediction%history)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine predict_room
+
+   !> The plate of a floor that radiates into the room below, at some frequencies.
+   subroutine get_radiator(text, frequency, n_frequency, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(frequency) :: n_frequency = len(frequency)
+      !> Text of a namelist file with floor and room.
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: n_frequency
+      !> Frequencies, Hz: [n_frequency].
+      real(wp), intent(in) :: frequency(n_frequency)
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(plate_type) :: plate
+      type(error_type), allocatable :: error
+      real(wp) :: conductance(n_frequency)
+      integer :: n(1)
+
+      allocate (bundle)
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) then
+         associate (floor => case%floors(get_floor_number(case))%model)
+            call floor%get_radiator(frequency, plate, conductance, error)
+         end associate
+      end if
+      if (.not. allocated(error)) then
+         n = n_frequency
+         associate (critical => get_critical_frequency(plate, case%room%air))
+            call bundle%add_number('surface_mass', get_surface_mass(plate))
+            call bundle%add_number('critical_frequency', critical)
+            call bundle%add_number('length', plate%length)
+            call bundle%add_number('width', plate%width)
+            call bundle%add_array('conductance', n, conductance)
+            call bundle%add_array('loss_factor', n, get_total_loss(plate, case%room%air, frequency))
+            call bundle%add_array('radiation_factor', n, get_radiation_factor(frequency, critical, plate%length, &
+               plate%width, case%room%air%sound_speed))
+         end associate
+      end if
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine get_radiator
 
 end module thud_api

@@ -14,7 +14,7 @@ module thud_run
       motion_names
    use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
-   use thud_room_report, only: get_room_csv, get_room_table
+   use thud_room_report, only: get_room_files, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
    use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
@@ -32,8 +32,6 @@ module thud_run
    !> Files of a floor that moves.
    character(len=16), parameter :: floor_names(2) = [character(len=16) :: 'floor_force.csv', 'floor_levels.csv']
 
-   !> File of cases with a room below.
-   character(len=*), parameter :: room_file = 'room_levels.csv'
    !> File of a slow compression.
    character(len=*), parameter :: compression_file = 'compression.csv'
 
@@ -205,8 +203,8 @@ contains
       if (case%has_room) then
          call get_room_table(case, results%room, results%history%contact_time, allocated(results%on_floor), text)
          outcome%table = outcome%table//newline//text
-         call get_room_csv(results%room, text)
-         call add_file(files, room_file, text)
+         call extend(files, size(room_file_names))
+         call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))
       end if
       outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_compression) return

@@ -53,6 +53,18 @@ class RoomPrediction(Displayed):
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
         Expected number of modes in each third.
+    surface_mass : float
+        Mass of the radiating plate over its area, kg/m2.
+    spread : ndarray, shape (12,)
+        Expected standard deviation of the level for one position of the source and one of the
+        microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
+    octave_level, octave_time : ndarray, shape (4,)
+        Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
+        of their thirds.
+    history_time : ndarray, shape (n_time,)
+        Instants after the impact, s.
+    history : ndarray, shape (n_time, 12)
+        What the Fast detector shows in each third then, dB.
     conductance : ndarray, shape (12,)
         Power that a force of unit mean square gives to the floor, m/(N s).
     force : str
@@ -75,6 +87,12 @@ class RoomPrediction(Displayed):
     floor_modes: NDArray[np.float64]
     room_modes: NDArray[np.float64]
     conductance: NDArray[np.float64]
+    surface_mass: float
+    spread: NDArray[np.float64]
+    octave_level: NDArray[np.float64]
+    octave_time: NDArray[np.float64]
+    history_time: NDArray[np.float64]
+    history: NDArray[np.float64]
     force: Literal["contact", "blocked"]
     force_change: float
 
@@ -82,6 +100,18 @@ class RoomPrediction(Displayed):
     def rating(self) -> Rating:
         """Single numbers of the levels in the room."""
         return rating(self.level, THIRDS)
+
+    @property
+    def radiated_share(self) -> NDArray[np.float64]:
+        """Share of the floor's losses that it radiates into the room, shape (12,)."""
+        air = self.room.air_density * self.room.sound_speed
+        omega = 2 * np.pi * self.frequency
+        return air * self.radiation_factor / (self.surface_mass * omega * self.loss_factor)
+
+    @property
+    def octave_rating(self) -> Rating:
+        """Single numbers of the octaves in the room, with the Korean class."""
+        return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
     def standardised(self) -> NDArray[np.float64]:
@@ -107,7 +137,9 @@ class RoomPrediction(Displayed):
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             found.append(
                 f"fewer than {FEW_MODES} modes of floor or room at {bands} Hz: levels there are "
-                "means over many floors and rooms, single ones differ by several dB"
+                "means over many floors and rooms; single positions are expected to differ with a "
+                f"standard deviation of {self.spread[few].max():.1f} to "
+                f"{self.spread[few].min():.1f} dB"
             )
         if self.force == "blocked" and abs(self.force_change) > NOTICED:
             found.append(
@@ -129,9 +161,12 @@ class RoomPrediction(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
-        head = ("third, Hz", "L_i,Fmax, dB", "standardised, dB", "energy, mJ", "floor modes")
-        columns = (self.level, self.standardised, 1e3 * self.energy, self.floor_modes)
-        forms = (".1f", ".1f", ".3g", ".1f")
+        head = (
+            "third, Hz", "L_i,Fmax, dB", "standardised, dB", "spread, dB", "energy, mJ",
+            "floor modes",
+        )  # fmt: skip
+        columns = (self.level, self.standardised, self.spread, 1e3 * self.energy, self.floor_modes)
+        forms = (".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
             for column, form in zip(columns, forms, strict=True)
@@ -201,6 +236,11 @@ def predict_level(
         force="contact" if moved else "blocked",
         force_change=change,
         time_of_maximum=bands.pop("time"),
+        surface_mass=found["surface_mass"],
+        octave_level=found["octaves"]["level"],
+        octave_time=found["octaves"]["time"],
+        history_time=found["history"]["time"],
+        history=found["history"]["level"],
         **bands,
     )
 
