@@ -79,7 +79,7 @@ class Case(Group, Displayed):
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
-    floor : Rigid, InfinitePlate, Oscillator, Plate or None
+    floor : FloorOptions or None
         Floor on which the ball is dropped too, beside the rigid one; None: no other.
     room : Room or None
         Room below the floor; None: no level in a room.

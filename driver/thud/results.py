@@ -19,13 +19,24 @@ from thud.case import Case
 from thud.checks import refuse
 from thud.errors import PlausibilityWarning, ThudError
 from thud.files import MANIFEST, locked, read_manifest
-from thud.impact import Impact
+from thud.impact import FloorImpact, Impact
 from thud.motion import Motion
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+# Columns of every history, by the names of an impact; parts of the force follow the first three.
+_OWN = {
+    "time": "time_s",
+    "deflection": "deflection_m",
+    "velocity": "velocity_m_per_s",
+    "elastic_force": "elastic_force_N",
+    "floor_force": "floor_force_N",
+}
+_MOTION = ("time", "deflection", "velocity")
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -95,30 +106,48 @@ def _new_impact(files: _Files) -> Impact:
     with redirect_stdout(None):
         case = Case.from_namelist(f90nml.reads(files.read("effective.nml")))
         numbers = f90nml.reads(files.read("summary.nml"))
-    force = _table(files.read("force.csv"))
-    found = _table(files.read("channels.csv")) if "channels.csv" in files else {}
-    motion = _read_motion(files) if "motion.pvd" in files else None
+    history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
     remarks = _texts(numbers.get("remarks", {}).get("remark", []))
     if not files.checksums:
         remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
         warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
         remarks += (remark,)
-    time = force.pop("time_s")
-    named = {name.rsplit("_", 1)[0]: values for name, values in force.items()}
-    return Impact(
-        case,
-        time,
-        named.pop("deflection"),
-        force["velocity_m_per_s"],
-        named.pop("elastic_force"),
-        named.pop("floor_force"),
-        {name: values for name, values in named.items() if name != "velocity_m_per"},
-        {name: values for name, values in found.items() if name != "time_s"},
-        dict(numbers.get("facts", {})),
-        remarks,
-        motion,
-        **{name: numbers["summary"][name] for name in SCALARS},
-    )
+    on_floor = None
+    if "floor_summary" in numbers:
+        scalars, facts = numbers["floor_summary"], numbers.get("floor_facts", {})
+        moving, columns = _read_history(files, "floor_", scalars, facts)
+        on_floor = FloorImpact(
+            case=case,
+            remarks=(),
+            blocked_force=columns.pop("blocked_force_N"),
+            floor_displacement=columns.pop("floor_displacement_m"),
+            floor_velocity=columns.pop("floor_velocity_m_per_s"),
+            floor_work=scalars["floor_work"],
+            point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
+            **moving,
+        )
+    return Impact(case=case, remarks=remarks, on_floor=on_floor, **history)
+
+
+def _read_history(
+    files: _Files, prefix: str, scalars: Mapping[str, float], facts: Mapping[str, float]
+) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    """Return what the files of a history hold, and further columns of its forces."""
+    force = _table(files.read(f"{prefix}force.csv"))
+    channels = f"{prefix}channels.csv"
+    found = _table(files.read(channels)) if channels in files else {}
+    # Parts of the force stand before the whole one, further columns behind.
+    columns = list(force)
+    last = columns.index("floor_force_N")
+    history = {
+        **{name: force[column] for name, column in _OWN.items()},
+        "parts": {name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]},
+        "channels": {name: values for name, values in found.items() if name != "time_s"},
+        "facts": dict(facts),
+        "motion": _read_motion(files, prefix) if f"{prefix}motion.pvd" in files else None,
+        **{name: scalars[name] for name in SCALARS},
+    }
+    return history, {name: force[name] for name in columns[last + 1 :]}
 
 
 def _texts(value: str | list[str]) -> tuple[str, ...]:
@@ -136,9 +165,10 @@ def _table(text: str) -> dict[str, NDArray[np.float64]]:
     return dict(zip(names.split(","), columns, strict=True))
 
 
-def _read_motion(files: _Files) -> Motion:
+def _read_motion(files: _Files, prefix: str) -> Motion:
     """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
-    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', files.read("motion.pvd"))
+    listed = files.read(f"{prefix}motion.pvd")
+    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', listed)
     shots = [_read_vtu(files.read(name)) for _, name in entries]
     # The first element has its first two nodes on neighbouring rings.
     line = int(shots[0]["connectivity"][1])
@@ -159,6 +189,8 @@ def _read_motion(files: _Files) -> Motion:
         outer["contact_pressure"],
         outer["contact_shear"],
         np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
+        # Left out where the floor is rigid.
+        np.array([float(shot.get("floor_displacement", [0.0])[0]) for shot in shots]),
     )
 
 

@@ -4,6 +4,7 @@ module thud_compute
    use thud_case, only: case_type, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
+   use thud_floor_result, only: floor_result_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
@@ -12,7 +13,7 @@ module thud_compute
    use thud_plate, only: plate_type
    use thud_receiver, only: is_rigid, receiver_type
    use thud_remarks, only: get_remarks, remark_length
-   use thud_room, only: get_room_bands, get_room_level, room_level_type
+   use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
    use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
@@ -45,6 +46,8 @@ module thud_compute
       type(verdict_type) :: verdict
       !> The force on a floor that moves, where one is asked for and the model couples with it.
       type(force_history_type), allocatable :: on_floor
+      !> What it makes of the floor.
+      type(floor_result_type) :: floor
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
       !> Level in the room below, where it is asked for.
@@ -201,6 +204,7 @@ contains
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_radiator(bands%centre, plate, conductance, error)
       end associate
+      if (.not. allocated(error)) call check_below(plate, case%room, error)
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
    end subroutine predict_room_level
 

@@ -1,10 +1,12 @@
-!> A homogeneous rectangular plate over the room below.
+!> A homogeneous rectangular plate over the room below, simply supported.
 module thud_plate_floor
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_floor_model, only: floor_model_type
+   use thud_floor_model, only: floor_model_type, reason_length
    use thud_kinds, only: wp
-   use thud_plate, only: get_plate_fields, get_resistance, plate_type
+   use thud_new_field, only: real_field
+   use thud_plate, only: get_plate_fields, get_resistance, get_thin_limit, plate_type
+   use thud_plate_modes, only: check_inside, check_mode_count, new_plate_receiver
    use thud_receiver, only: receiver_type
    implicit none (type, external)
    private
@@ -14,10 +16,15 @@ module thud_plate_floor
    !> The floor.
    type, extends(floor_model_type) :: plate_floor_type
       type(plate_type) :: plate
+      !> Place of the source, over length and width.
+      real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
    contains
       procedure, pass(options) :: get_fields
+      procedure, pass(options) :: check
       procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
+      procedure, pass(options) :: get_validity
    end type plate_floor_type
 
 contains
@@ -25,22 +32,51 @@ contains
    !> Keys and allowed ranges of the group `&plate`.
    function get_fields(options) result(fields)
       class(plate_floor_type), intent(in), target :: options
-      !> One field per component.
+      !> Those of the plate, the place of the source, and the points: [12].
       type(field_type), allocatable :: fields(:)
 
-      fields = get_plate_fields(options%plate)
+      fields = [get_plate_fields(options%plate), &
+         real_field('source_x', options%source_x, '', 'place of the source along the length, over the length', '(0, 1)'), &
+         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)'), &
+         options%get_point_fields()]
    end function get_fields
 
-   !> The mobility of the infinite plate, the mean over positions of a finite one.
+   !> Refuses plates with too many modes.
+   subroutine check(options, error)
+      class(plate_floor_type), intent(in) :: options
+      !> Names the size.
+      type(error_type), allocatable, intent(out) :: error
+
+      call check_mode_count('plate', options%plate, error)
+   end subroutine check
+
+   !> What a source feels.
    subroutine get_receiver(options, receiver, error)
       class(plate_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Never.
+      !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
 
-      receiver%direct = 1/get_resistance(options%plate)
-      allocate (receiver%pole(0), receiver%residue(0))
+      associate (source => [options%source_x, options%source_y])
+         call new_plate_receiver('plate', options%plate, source, source, receiver, error)
+      end associate
    end subroutine get_receiver
+
+   !> Velocity of another point.
+   subroutine get_transfer(options, x, y, transfer, error)
+      class(plate_floor_type), intent(in) :: options
+      !> Place of the point, m.
+      real(wp), intent(in) :: x, y
+      type(receiver_type), intent(out) :: transfer
+      !> The point lies outside, or the losses are too high.
+      type(error_type), allocatable, intent(out) :: error
+
+      associate (plate => options%plate)
+         call check_inside('plate', plate%length, plate%width, x, y, error)
+         if (.not. allocated(error)) call new_plate_receiver('plate', plate, [options%source_x, options%source_y], &
+            [x/plate%length, y/plate%width], transfer, error)
+      end associate
+   end subroutine get_transfer
 
    !> The plate itself; of a finite one the conductance of the infinite one is the mean over positions.
    subroutine get_radiator(options, frequency, plate, conductance, error)
@@ -56,5 +92,18 @@ contains
       plate = options%plate
       conductance = 1/get_resistance(plate)
    end subroutine get_radiator
+
+   !> Band in which the plate is thin.
+   subroutine get_validity(options, lowest, highest, reason)
+      class(plate_floor_type), intent(in) :: options
+      !> Ends of the band, Hz.
+      real(wp), intent(out) :: lowest, highest
+      !> What ends it.
+      character(len=reason_length), intent(out) :: reason
+
+      lowest = 0.0_wp
+      highest = get_thin_limit(options%plate)
+      reason = 'bending waves are shorter than six thicknesses, and the plate is not thin'
+   end subroutine get_validity
 
 end module thud_plate_floor

@@ -9,7 +9,7 @@ module thud_coupled_impact
    use thud_force_history, only: force_history_type
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_receiver, only: new_receiver_motion, receiver_motion_type, receiver_type
+   use thud_receiver, only: can_strike, new_receiver_motion, receiver_type
    use thud_receiver_stages, only: new_receiver_stages
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
@@ -174,8 +174,9 @@ contains
          history%floor_displacement(i) = motion%motion%displacement
          history%floor_velocity(i) = motion%floor_velocity
          call source%record_sample(get_relative_state(source, motion), i, history)
-         ! Of a force that sets in with a jump the first sample is its half.
+         ! Of a force that sets in with a jump, and of the velocity that jumps with it, the first sample is the half.
          if (i > 1) history%floor_force(i) = motion%force
+         if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
       end associate
    end subroutine record
 
@@ -202,37 +203,6 @@ contains
          end if
       end associate
    end subroutine check_end
-
-   !> Whether free motion may bring a receiver to a line that leaves it: each pole moves it by at most
-   !> |r x| min(t, 2/|p|) in the time t.
-   pure function can_strike(receiver, motion, gap, speed) result(yes)
-      type(receiver_type), intent(in) :: receiver
-      type(receiver_motion_type), intent(in) :: motion
-      !> Gap between both, m; velocity of the line upwards, m/s.
-      real(wp), intent(in) :: gap, speed
-      logical :: yes
-      real(wp), dimension(size(motion%amplitude)) :: rate, time
-      real(wp) :: away
-      integer :: k
-
-      away = speed
-      rate = 0.0_wp
-      time = 0.0_wp
-      do k = 1, size(rate)
-         if (abs(receiver%pole(k)) > 0.0_wp) then
-            rate(k) = abs(receiver%residue(k)*motion%amplitude(k))
-            time(k) = 2/abs(receiver%pole(k))
-         else
-            ! A free mass goes on downwards.
-            away = away + real(receiver%residue(k)*motion%amplitude(k), wp)
-         end if
-      end do
-      ! The gap that is left is convex in time: it is least at one of the times, or never ends to shrink.
-      yes = gap < 0.0_wp .or. away < 0.0_wp
-      do k = 1, size(rate)
-         yes = yes .or. gap + away*time(k) < sum(rate*min(time, time(k)))
-      end do
-   end function can_strike
 
    !> Clears the flight after the last contact, and writes what the march has summed up.
    pure subroutine finish_record(source, impact, history)

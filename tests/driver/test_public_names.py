@@ -194,7 +194,7 @@ def test_names_whose_packages_are_missing_say_so_when_called() -> None:
     [
         (lambda: thud.solve(height=1.0), "&hollow_sphere: 'height' is a key of Drop; allowed: "),
         (lambda: thud.solve(bounces=2), "'bounces' is a key of FiniteElement; allowed: "),
-        (lambda: thud.solve(loss_factor=1), "is a key of .*FiniteElement and Plate; allowed: "),
+        (lambda: thud.solve(loss_factor=1), "is a key of .*FiniteElement and Plate"),
         (lambda: thud.solve(force="floor"), "'force' is a key of Levels; allowed: "),
         (lambda: thud.solve_many({}, mass=2.0), r"solve_many\(\): 'mass' is a key of Ball and Osc"),
         (lambda: thud.free_modes(mass=2.0), r"free_modes\(\): 'mass' is a key of Ball and Osc"),
