@@ -1,4 +1,4 @@
-"""Namelists by grammar and mutation, in processes of their own: refused in a sentence, or computed."""
+"""Namelists by grammar and mutation: refused in a sentence, or computed in another process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import subprocess
 import sys
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from campaign import Finding
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 CASE_TIME, SHARE_TIME = 20, 900
 # Models that take too long to be computed often, and the part of their cases that is.
 SLOW = {"modal_ball": 0.05, "finite_element": 0.01}
-NUMBERS = ["0", "-1", "1e-300", "1e300", "nan", "inf", "-0.0", "1d0", "1e", "2*1.0", "9" * 400, "''",
-           ".true.", "1,2", "", "(1,2)", "0x1p3", "é", "1e-9", "0.5", "100", "3"]  # fmt: skip
+NUMBERS = ["0", "-1", "1e-300", "1e300", "nan", "inf", "-0.0", "1d0", "1e", "2*1.0", "9" * 400,
+           "''", ".true.", "1,2", "", "(1,2)", "0x1p3", "é", "1e-9", "0.5", "100", "3"]  # fmt: skip
 INSERTIONS = ["&", "/", "'", '"', "!", "\0", "\t", "\n", "\r", "=", ",", "*", "é", "&ball", "&end",
               "x" * 300, "'" * 99, "(1)", "%", "$"]  # fmt: skip
 
