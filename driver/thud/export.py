@@ -11,7 +11,7 @@ import xarray as xr
 
 from thud._schema import SCALARS
 from thud.impact import FloorImpact, Impact
-from thud.keys import find_key
+from thud.keys import find_key, users
 from thud.levels import BANDWIDTHS
 from thud.studies.dataset import MEANINGS, band_coordinates, coordinate, origin
 from thud.studies.evaluation import LEVELS
@@ -91,7 +91,7 @@ def _of_ensemble(ensemble: Ensemble) -> xr.Dataset:
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
     for name, values in ensemble.parameters.items():
-        key, _ = find_key(name, ensemble.case.model.name)
+        key, _ = find_key(name, users(ensemble.case))
         words = _attributes(key.unit, key.meaning)
         coordinates[coordinate(Parameter(name=name, key=key))] = ("set", values, words)
     variables: dict[str, Any] = {}

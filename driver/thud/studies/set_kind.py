@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud._schema import KEYS
 from thud.checks import refuse, require_choice
-from thud.keys import OF_FILES
+from thud.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
@@ -60,7 +60,7 @@ class DropsKind(Kind[SetStudy, R]):
         """Return a parameter that varies."""
         if name == "bands":
             refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all sets")
-        return varied(name, given, case.model.name, centre)  # type: ignore[union-attr]
+        return varied(name, given, users(case), centre)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
         """Return a study with its design."""

@@ -20,7 +20,7 @@ from thud._schema import MODELS
 from thud.case import Case, check_case, new_model, read_case
 from thud.checks import refuse, refuse_value, require_kind, require_words
 from thud.errors import InputError
-from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
+from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ def fix_keys(
         if name == "model":
             continue
         place = f"{table} {name}"
-        key, place_in_list = find_key(name, case.model.name)  # type: ignore[union-attr]
+        key, place_in_list = find_key(name, users(case))
         if key == TEMPERATURE:
             refuse(f"{place} is not allowed", "temperature in [parameters]")
         value = quantity(place, entry, key.unit)
