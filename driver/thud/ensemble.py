@@ -24,7 +24,7 @@ from thud.impact import FORCES
 from thud.key import check_keywords
 from thud.keys import find_key, users
 from thud.levels import BANDWIDTHS, get_bands
-from thud.outcomes import ROOM_LEVEL, Ensemble
+from thud.outcomes import RATING, ROOM_LEVEL, Ensemble
 
 # Not empty in a forked process.
 _FORKED: list[bool] = []
@@ -201,7 +201,7 @@ def _further(values: NDArray[np.float64], case: Case) -> dict[str, Any]:
     if case.room:
         room = rest[:, 1:]
         found |= {ROOM_LEVEL: room[:, :-2]}
-        found |= {"room_rating": room[:, -2], "standardised_rating": room[:, -1]}
+        found |= {"room_rating": room[:, -2], RATING: room[:, -1]}
     return found
 
 

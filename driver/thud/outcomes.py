@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 
 ROOM_LEVEL = "room_level"
+RATING = "standardised_rating"
 # Unit and meaning of what drops on a floor have in addition, levels of the contact force apart.
 FURTHER = {
     "floor_work": ("J", "energy that the source gives to the floor"),
     ROOM_LEVEL: ("dB", "maximum Fast level in the room, re 20 uPa"),
     "room_rating": ("dB", "A-weighted maximum Fast level in the room, re 20 uPa"),
-    "standardised_rating": ("dB", "A-weighted maximum Fast level, standardised, re 20 uPa"),
+    RATING: ("dB", "A-weighted maximum Fast level, standardised, re 20 uPa"),
 }
 
 

@@ -32,8 +32,8 @@ module thud_many
    character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
       'case', 'model', 'modes', 'compression', 'output', 'floor']
 
-   !> Approximate time of a drop on a floor over that of a drop on a rigid one.
-   real(wp), parameter :: floor_cost = 20.0_wp
+   !> Approximate time of a drop on a plate beyond that of a drop on a rigid floor, s.
+   real(wp), parameter :: floor_cost = 1.2e-2_wp
 
    !> Approximate time of one drop in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-5_wp
@@ -192,7 +192,7 @@ contains
       many%judged = judged
       many%cost = case%models(get_model_number(case))%model%get_cost()
       if (suits_batch(case, columns)) many%cost = batch_cost
-      if (case%has_floor) many%cost = floor_cost*many%cost
+      if (case%has_floor) many%cost = many%cost + floor_cost
       call name_further(case, many)
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted

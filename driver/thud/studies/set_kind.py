@@ -47,6 +47,12 @@ MAX_SETS = 100_000
 _FILE_FORMATS = ("auto", "netcdf", "zarr")
 
 
+def _require_no_floor(case: Case) -> None:
+    """Raise InputError where a surrogate would have to know a floor."""
+    if case.floor:
+        refuse("[surrogate] knows no floors", "a case without &floor")
+
+
 class DropsKind(Kind[SetStudy, R]):
     """A kind of study that needs drops around its case."""
 
@@ -79,6 +85,7 @@ class DropsKind(Kind[SetStudy, R]):
         found = SetStudy(**head, **design, temperature=temperature, format=written)
         if "surrogate" not in given:
             return found
+        _require_no_floor(case)
         plan = read_plan(table_of(given, "surrogate"), folder)
         if isinstance(plan, Surrogate):
             return self.with_surrogate(found, plan)
@@ -88,6 +95,7 @@ class DropsKind(Kind[SetStudy, R]):
         self, study: SetStudy, given: Surrogate | str | os.PathLike[str]
     ) -> SetStudy:
         """Return a study whose sets a surrogate answers. Raises InputError where it cannot."""
+        _require_no_floor(study.case)
         surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
         surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
         return replace(study, plan=None, surrogate=surrogate)

@@ -265,8 +265,14 @@ def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 
 
 def value_in(case: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None where it has none, or a list of them."""
-    groups = (case.ball, case.drop, case.sampling, case.levels, case.limits, case.model)
-    key, _, entry = name.partition("(")
+    groups: tuple[object, ...] = (
+        case.ball, case.drop, case.sampling, case.levels, case.limits, case.model, case.floor,
+        case.room,
+    )  # fmt: skip
+    group, dot, rest = name.rpartition(".")
+    if dot:
+        groups = (case.room if group == "room" else case.floor,)
+    key, _, entry = rest.partition("(")
     values = (getattr(group, key, None) for group in groups)
     found = next((value for value in values if value is not None), None)
     if isinstance(found, tuple) and entry:
