@@ -122,3 +122,8 @@ def version() -> str:
 def compiler() -> str:
     """Return the compiler of the library and its options, without those that hold paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))
+
+
+def progress() -> float:
+    """Return the part of the latest long work of this process that is done, 0 to 1."""
+    return float(api.get_progress())

@@ -283,7 +283,7 @@ class Room(Group):
     junction_index: float = 10.0
     ceiling_mass: float = 0.0
     ceiling_depth: float = 0.1
-    ceiling_loss_factor: float = 0.1
+    ceiling_loss_factor: float = 0.3
 
 
 @dataclass(frozen=True)

@@ -186,6 +186,8 @@ def _read_motion(files: _Files, prefix: str) -> Motion:
         outer["contact_pressure"],
         outer["contact_shear"],
         np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
+        # Left out where the floor is rigid.
+        np.array([float(shot.get("floor_displacement", [0.0])[0]) for shot in shots]),
     )
 
 

@@ -17,6 +17,7 @@ module thud_api
    use thud_free_modes, only: free_modes_type
    use thud_kinds, only: int64, int8, wp
    use thud_plate, only: get_critical_frequency, get_radiation_factor, get_surface_mass, get_total_loss, plate_type
+   use thud_progress, only: latest_progress
    use thud_progress_line, only: begin_progress, end_progress
    use thud_room, only: get_room_bands, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
@@ -26,7 +27,7 @@ module thud_api
    private
 
    public :: check_text, collect, compress, describe_library, drop_on_floor, effective_case, end_calls, free_modes
-   public :: get_radiator, loss_factors, predict_room, run, solve
+   public :: get_progress, get_radiator, loss_factors, predict_room, run, solve
 
 contains
 
@@ -54,6 +55,14 @@ contains
 
       call end_all_calls()
    end subroutine end_calls
+
+   !> How far the latest long work of this process is.
+   subroutine get_progress(done)
+      !> Part that is done, 0 to 1.
+      real(wp), intent(out) :: done
+
+      done = latest_progress
+   end subroutine get_progress
 
    !> Version and compiler of the library.
    subroutine describe_library(status, handle, n_byte, n_value)
@@ -211,6 +220,7 @@ contains
          call bundle%add_array(prefix//'motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
          call bundle%add_array(prefix//'motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
          call bundle%add_array(prefix//'motion.cavity_pressure', [n_frame], motion%cavity_pressure)
+         call bundle%add_array(prefix//'motion.floor_displacement', [n_frame], motion%floor_displacement)
       end associate
    end subroutine add_history
 

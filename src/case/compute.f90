@@ -9,10 +9,12 @@ module thud_compute
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
+   use thud_memory, only: require_memory
    use thud_plate, only: plate_type
    use thud_receiver, only: is_rigid, receiver_type
    use thud_remarks, only: get_remarks, remark_length
-   use thud_room, only: get_room_bands, get_room_level, room_level_type
+   use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
+   use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    implicit none (type, external)
@@ -20,6 +22,9 @@ module thud_compute
 
    public :: compress_case, compute_case, drop_on_floor, get_judged_force, is_conforming, judge_case, predict_room
    public :: predict_room_level, results_type, verdict_type
+
+   !> Memory that a sample of a record takes, its transforms and text included, bytes; measured.
+   real(wp), parameter :: sample_memory = 600.0_wp
 
    !> Levels and criteria of an impact.
    type :: verdict_type
@@ -63,7 +68,10 @@ contains
       !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
 
-      if (case%has_modes) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, results%modes, error)
+      if (case%has_impact) call require_memory(sample_memory*get_sample_count(case%sampling), &
+         '&sampling: so many samples', 'a lower sample_rate or duration', error)
+      if (case%has_modes .and. .not. allocated(error)) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, &
+         results%modes, error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
       if (allocated(error)) return
       if (case%has_impact) then
@@ -196,6 +204,7 @@ contains
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%get_radiator(bands%centre, plate, conductance, error)
       end associate
+      if (.not. allocated(error)) call check_below(plate, case%room, error)
       if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
    end subroutine predict_room_level
 

@@ -211,7 +211,7 @@ contains
                latest = i
                ! Pressures are means over the sampling interval, as the force is.
                if (mod(i - 1, stride) == 0) call take_snapshot(history%motion, time, run%position, run%velocity, &
-                  get_contact_stress(run, interval), run%state%gas_pressure)
+                  get_contact_stress(run, interval), run%state%gas_pressure, run%floor%displacement)
                run%node_impulse = 0.0_wp
             end if
             call add_impulse(run%impulse, interval, i, min(1.0_wp, max(0.0_wp, k + 0.5_wp - n_step/2.0_wp)), history)
@@ -355,7 +355,8 @@ contains
       else if (run%state%failure /= no_failure) then
          error = numerical_error(trim(place(time))//' an element is turned inside out (ratio of volumes ' &
             //to_text(run%state%min_jacobian)//'); allowed: a lower height, a stiffer ball, more polar_elements')
-      else if (run%sink > max_sink*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
+      else if (run%contact%layer_stiffness > 0.0_wp &
+         .and. run%sink > max_sink*(run%body%mesh%z(0, 0) - run%body%mesh%z(0, run%body%mesh%n_radial))) then
          error = numerical_error('&contact: layer_stiffness = '//to_text(run%contact%layer_stiffness) &
             //' N/m3 lets the surface sink '//to_text(1.0e3_wp*run%sink)//' mm into the layer; allowed: up to ' &
             //to_text(max_sink)//' of the wall, by a higher layer_stiffness')

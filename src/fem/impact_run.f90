@@ -182,7 +182,8 @@ contains
       if (starts) run%kinetic = sum(run%mass*before**2)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
-      if (run%contact%layer_stiffness > 0.0_wp) run%sink = max(run%sink, -minval(surface(:, 2)))
+      ! Nodes rest where they stopped; the force that comes anew moves a floor on.
+      if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%sink = max(run%sink, -minval(surface(:, 2)))
    end subroutine kick
 
    !> Adds the work that impulses of the floor take from nodes. Half of it comes with the velocities after them, in the

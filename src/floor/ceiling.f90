@@ -18,7 +18,7 @@ module thud_ceiling
       !> Depth of the air above it, m.
       real(wp) :: depth = 0.1_wp
       !> Loss factor of that air, large with absorber in it.
-      real(wp) :: loss_factor = 0.1_wp
+      real(wp) :: loss_factor = 0.3_wp
    end type ceiling_type
 
 contains

@@ -19,7 +19,7 @@ module thud_room
    implicit none (type, external)
    private
 
-   public :: check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
+   public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
 
    !> Sets of bands of a prediction.
    character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
@@ -123,6 +123,26 @@ contains
       error = input_error('&room: reverberation_times has '//to_text(room%reverberation_times%count) &
          //' values; allowed: '//to_text(size(bands))//', one for each third from 50 to 630 Hz')
    end subroutine check_room
+
+   !> Refuses walls and a ceiling that a floor cannot have below it.
+   subroutine check_below(plate, room, error)
+      !> The plate that radiates.
+      type(plate_type), intent(in) :: plate
+      type(room_type), intent(in) :: room
+      !> Names the lengths of the walls, or the depth of the air above the ceiling.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: walls, height
+
+      walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
+      height = room%volume/(plate%length*plate%width)
+      if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
+         error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
+            //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
+      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
+         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than volume over area of ' &
+            //'the floor; allowed: up to '//to_text(height)//' m')
+      end if
+   end subroutine check_below
 
    !> Thirds of a prediction: those of the rating.
    subroutine get_room_bands(bands, error)
@@ -273,7 +293,7 @@ contains
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
-         energies%loss = get_loss(flow)
+         allocate (energies%loss, source=get_loss(flow))
          allocate (energies%start(size(flow%own)), energies%weight(size(flow%own)), source=0.0_wp)
          energies%start(1) = prediction%energy(band)
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume

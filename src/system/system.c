@@ -12,6 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <time.h>
@@ -58,6 +59,36 @@ void thud_prepare_process(void)
    for (int i = 0; i < 2; i++)
       if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
          sigaction(ending_signals[i], &action, NULL);
+}
+
+// Ends the process at once. Threads of OpenBLAS that wait for memory would hold up the usual end.
+void thud_end_process(int code)
+{
+   _exit(code);
+}
+
+// 1 where addresses for that many bytes can be had now, and where asked for the memory behind them, as far as the
+// system tells.
+int thud_has_memory(double bytes, int behind)
+{
+   size_t wanted = bytes < 1e18 ? (size_t)bytes : (size_t)1e18;
+   void *place = mmap(NULL, wanted, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+   char line[128];
+   double kilobytes, free = -1.0;
+   FILE *file;
+
+   if (place == MAP_FAILED) return 0;
+   munmap(place, wanted);
+   if (!behind) return 1;
+   // Linux promises more than it has, and then ends a process that writes to it.
+   file = fopen("/proc/meminfo", "re");
+   if (!file) return 1;
+   while (fgets(line, sizeof line, file)) {
+      if (sscanf(line, "MemAvailable: %lf", &kilobytes) == 1) free = (free < 0.0 ? 0.0 : free) + 1024.0*kilobytes;
+      if (sscanf(line, "SwapFree: %lf", &kilobytes) == 1 && free >= 0.0) free += 1024.0*kilobytes;
+   }
+   fclose(file);
+   return free < 0.0 || bytes <= free;
 }
 
 // Handlers of the process that `note` calls first, and the library's calls that are running.

@@ -1,7 +1,7 @@
 !> The calls of the operating system that Fortran lacks; `system.c` holds them.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_int64_t, c_intptr_t, c_null_char, &
-      c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_int64_t, c_intptr_t, &
+      c_null_char, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_kinds, only: wp
    implicit none (type, external)
@@ -9,7 +9,7 @@ module thud_system
 
    public :: standard_error, standard_output
    public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
-   public :: end_calls, exchange_directories, flush_directory, get_file_size, get_free_bytes, get_system_message
+   public :: end_calls, end_process, exchange_directories, flush_directory, get_file_size, get_free_bytes, get_system_message
    public :: is_terminal, keep_interrupts, link_file, list_directory, lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
@@ -55,6 +55,14 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
    interface
+      !> Ends the process at once; nothing must be left to be written.
+      subroutine end_process(code) bind(c, name='thud_end_process')
+         import :: c_int
+         implicit none (type, external)
+         !> Exit code.
+         integer(c_int), value :: code
+      end subroutine end_process
+
       !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a sentence.
       subroutine prepare_process() bind(c, name='thud_prepare_process')
          implicit none (type, external)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import resource
 import signal
 import subprocess
 import time
@@ -298,3 +300,26 @@ def test_name_that_is_no_text_is_refused(run: Run, case_file: CaseFile, tmp_path
     # A name in the file is enough.
     case_file(f"&case name = 'ball' / {MINIMAL}", odd)
     assert run(odd, errors="surrogateescape").returncode == 0
+
+
+@pytest.mark.parametrize("megabytes", [100, 250, 350, 500])
+def test_memory_that_is_short_is_told_in_one_sentence(
+    run: Run, case_file: CaseFile, tmp_path: Path, megabytes: int
+) -> None:
+    def limit_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+
+    case_file(MINIMAL)
+    (tmp_path / "table.csv").write_text("height\n1\n0.5\n")
+    case_file("&ball / &mesh radial_elements = 64 polar_elements = 1024 / &modes /", "modes.nml")
+    case_file("&ball / &drop / &model / &sampling sample_rate = 4e6, duration = 1 /", "long.nml")
+    for arguments in (
+        ("case.nml",),
+        ("case.nml", "--sets", "table.csv", "--threads", "2"),
+        ("modes.nml",),
+        ("long.nml",),
+    ):
+        done = run(*arguments, preexec_fn=limit_memory)
+        if done.returncode != 0:
+            assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+            assert re.match(r"thud: .*\d bytes.*; allowed: ", done.stderr)

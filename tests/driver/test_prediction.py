@@ -156,6 +156,15 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
         (ROOM_CASE.replace("0.2", "-0.2"), r"&plate: thickness = -0\.2"),
         (ROOM_CASE.replace("volume = 40", "volume = 0"), "&room: volume = 0"),
         (
+            ROOM_CASE.replace("volume = 40", "wall_lengths = 9, 9.5"),
+            "wall_lengths are 18.5 m together",
+        ),
+        (
+            ROOM_CASE.replace("volume = 40", "volume = 10, ceiling_mass = 9, ceiling_depth = 0.6"),
+            "ceiling_depth = 0.6 m is more than",
+        ),
+        (ROOM_CASE.replace("volume = 40", "wall_junction = 'x'"), "wall_junction = 'x'"),
+        (
             ROOM_CASE.replace("volume = 40", "reverberation_times = 1, 2"),
             "has 2 values; allowed: 12",
         ),
@@ -181,8 +190,39 @@ def test_prediction_without_floor_or_room_is_refused(impact: thud.Impact) -> Non
         thud.predict_level(impact, thud.Plate(thickness=0.0), thud.Room())
 
 
+def test_walls_ceiling_octaves_and_history_are_written(
+    run: Callable[..., subprocess.CompletedProcess[str]],
+    case_file: Callable[[str], Path],
+    impact: thud.Impact,
+) -> None:
+    more = "volume = 40\n wall_lengths = 5, 4\n ceiling_mass = 12\n reverberation_time = 0.8"
+    done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
+    assert done.returncode == 0, done.stderr
+    assert "Room of 40.0 m3, reverberation time 0.80 s." in done.stdout
+    assert "no class (KS F 2863-2)" in done.stdout
+    folder = case_file(ROOM_CASE).parent / "out"
+    octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
+    history = np.genfromtxt(folder / "room_history.csv", delimiter=",", skip_header=1)
+    levels = np.genfromtxt(folder / "room_levels.csv", delimiter=",", names=True)
+    # The maximum of a history in steps of 5 ms, and none above that of the prediction.
+    highest = history[:, 1:].max(axis=0)
+    assert highest == pytest.approx(levels["level_dB"], abs=0.01)
+    assert (highest <= levels["level_dB"] + 1e-9).all()
+    assert octaves["nominal_Hz"].tolist() == [63, 125, 250, 500]
+    sums = 10 * np.log10((10 ** (levels["level_dB"].reshape(4, 3) / 10)).sum(axis=1))
+    assert (octaves["level_dB"] <= sums + 1e-9).all()
+    room = thud.read_case(folder / "effective.nml").room
+    assert room is not None
+    assert room.wall_lengths == (5, 4)
+    found = thud.predict_level(impact, thud.Plate(thickness=0.2), room)
+    bare = thud.predict_level(impact, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
+    assert (found.level[6:] < bare.level[6:] - 10).all()
+    assert f"{found.spread[0]:.1f} to" in found.remarks[0]
+
+
 def test_run_draws_the_chain(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
     case.write_text(ROOM_CASE, encoding="utf-8")
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
-    assert (tmp_path / "out" / "room.png").exists()
+    for name in ("room", "room_decay", "floor_modes"):
+        assert (tmp_path / "out" / f"{name}.png").exists()

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from campaign import Part, Report
 from directories import check_calls, check_damage, check_races, plan
+from memory import check_memory
 
 
 def parts() -> dict[str, Part]:
@@ -22,6 +23,7 @@ def parts() -> dict[str, Part]:
         "calls": Part(len(plan()), 60, check_calls),
         "races": Part(80, 8, check_races),
         "damage": Part(10_000, 60, check_damage, share=100),
+        "memory": Part(1000, 12, check_memory),
     }
 
 

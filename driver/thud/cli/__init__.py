@@ -14,6 +14,7 @@ from thud.checks import suggestion
 from thud.cli.calibrate import CALIBRATE
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
 from thud.cli.examples import EXAMPLES
+from thud.cli.explore import EXPLORE
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.floor import FLOOR
@@ -76,6 +77,7 @@ COMMANDS = {
         compare_cases,
         "nothing is written",
     ),
+    "explore": EXPLORE,
     "measure": MEASURE,
     "calibrate": CALIBRATE,
     "export": EXPORT,

@@ -41,6 +41,8 @@ from thud.plot.loss_factor import loss_factor as loss_factor
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion
+from thud.plot.plate_modes import plate_modes as plate_modes
+from thud.plot.prediction import draw_decay as draw_decay
 from thud.plot.prediction import draw_prediction as draw_prediction
 from thud.plot.recording import recording_forces as recording_forces
 from thud.plot.recording import recording_levels as recording_levels

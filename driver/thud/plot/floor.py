@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from thud.levels import BANDWIDTHS, get_bands, record_force
+from thud.plot.examples import solve_chipboard
 from thud.plot.force_history import TIME_LABEL
 from thud.plot.look import COLOURS, SIZE, band_axis, dress, legend_above, line_style, new_figure
 
@@ -97,3 +98,4 @@ def _draw_on_floor(impact: Impact) -> Figure | None:
 
 
 IMPACT_FIGURES = {"floor": _draw_on_floor}
+DOCUMENTATION_FIGURES = {"floor_chipboard": lambda: _draw_on_floor(solve_chipboard())}
