@@ -127,8 +127,8 @@ contains
       do i = 1, size(names)
          call split_name(names(i), group, key, columns(i)%entry, known)
          ! Of keys of one name the first is meant, that of the source, unless a group is named.
-         columns(i)%place = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), .true., &
-            dim=1)
+         columns(i)%place = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
+            .true., dim=1)
          nullify (list)
          known = known .and. columns(i)%place > 0
          if (columns(i)%place > 0) then
