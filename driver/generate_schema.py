@@ -49,7 +49,7 @@ def solve(
     ball: Ball | None{default}, drop: Drop | None{default}, {star}model: {model},
     **options: Unpack[{options}],
 ) -> Impact:
-    """Drop a ball on a rigid floor{by}."""
+    """Drop a ball on a floor{by}."""
 '''
 # What a class has beside its keys.
 STANDARD_BALL = '''
@@ -70,12 +70,12 @@ EXTRAS = {"ball": STANDARD_BALL}
 OPTIONAL = {
     "modes": "Free modes that are asked for.",
     "compression": "Slow compression that is asked for.",
-    "floor": "Floor over the room below: a homogeneous plate.",
     "room": "Room below the floor.",
 }
 # What uses the keys of such an owner.
 USERS = {"modes": "free modes", "compression": "a slow compression"}
-USERS["floor"] = USERS["room"] = "the level in the room below"
+USERS["floor"] = "drops on a floor"
+USERS["room"] = "the level in the room below"
 INDENT = " " * 8
 LONGEST = 100
 PAGE = """# Keys of an input file
@@ -132,10 +132,10 @@ def python_default(key: Entry) -> str:
     return json.dumps(default) if isinstance(default, str) else repr(default)
 
 
-def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> str:
-    """Return the dataclass of some keys."""
+def python_class(title: str, keys: list[Entry], group: str, kind: str = "") -> str:
+    """Return the dataclass of some keys; a model and a floor name their kind of names."""
     attributes: list[str] = []
-    members = [f'    name: ClassVar[ModelName] = "{model}"'] if model else []
+    members = [f'    name: ClassVar[{kind}] = "{group}"'] if kind else []
     for key in keys:
         unit = f", {key['unit']}" if key["unit"] else ""
         words = [key["meaning"][0].upper() + key["meaning"][1:] + unit, allowed(key)]
@@ -151,20 +151,22 @@ def python_class(title: str, keys: list[Entry], group: str, model: str = "") -> 
         attributes.append(f"    {key['name']} : {plain_type}")
         attributes += textwrap.wrap(text, 99, subsequent_indent=INDENT)
         members.append(f"    {key['name']}: {type_name} = {default}")
-    head = f'\n\n@dataclass(frozen=True)\nclass {class_name(group)}(Group):\n    """{title}\n'
-    attributes = ["    Attributes", "    ----------", *attributes, '    """\n']
+    head = f'\n\n@dataclass(frozen=True)\nclass {class_name(group)}(Group):\n    """{title}'
+    if not keys:
+        return "\n".join([f'{head}"""', "", *members, ""])
+    attributes = ["\n    Attributes", "    ----------", *attributes, '    """\n']
     return "\n".join([head, *attributes, *members, EXTRAS.get(group, "")])
 
 
 def python_module(schema: Entry) -> str:
     """Return the text of ``_schema.py``."""
-    keys, models = schema["keys"], schema["models"]
+    keys, models, floors = schema["keys"], schema["models"], schema["floors"]
     shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
     groups = list(dict.fromkeys(key["group"] for key in shared))
-    names = list(map(class_name, models))
     optional = list(dict.fromkeys(key["owner"] for key in keys if key["owner"]))
-    optional = [owner for owner in optional if owner not in models]
-    public = sorted([*map(class_name, [*groups, *optional]), *names, "ModelName", "ModelOptions"])
+    optional = [owner for owner in optional if owner not in {*models, *floors, "floor"}]
+    names = map(class_name, [*groups, *optional, *models, *floors])
+    public = sorted([*names, "FloorName", "FloorOptions", "ModelName", "ModelOptions"])
     choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
     choices.append(literal("BandSet", schema["band_sets"]))
     quoted_names = "".join(f"    {quoted(name)},\n" for name in public)
@@ -178,13 +180,19 @@ def python_module(schema: Entry) -> str:
     for model in models:
         members = [key for key in keys if key["owner"] == model]
         title = f"Options of the source model ``{model}``."
-        parts.append(python_class(title, members, model, model))
+        parts.append(python_class(title, members, model, "ModelName"))
+    for floor in floors:
+        members = [key for key in keys if key["owner"] == floor]
+        parts.append(python_class(f"Floor ``{floor}``.", members, floor, "FloorName"))
     scalars = [f"{quoted(s['name'])}: ({quoted(s['unit'])}, {quoted(s['meaning'])})"
                for s in schema["scalars"]]  # fmt: skip
     parts += [
-        f"\n\nModelOptions = {' | '.join(names)}\n",
+        union("ModelOptions", models),
+        union("FloorOptions", floors),
         table("Source models by name, the default first.", "MODELS: dict[str, type[ModelOptions]]",
-              [f"{name}.name: {name}" for name in names]),
+              [f"{name}.name: {name}" for name in map(class_name, models)]),
+        table("Floors by name, the default first.", "FLOORS: dict[str, type[FloorOptions]]",
+              [f"{name}.name: {name}" for name in map(class_name, floors)]),
         table("Groups that every model uses.", "GROUPS",
               [f"{quoted(group)}: {class_name(group)}" for group in groups]),
         table("Unit and meaning of the numbers that describe an impact.", "SCALARS", scalars),
@@ -197,12 +205,21 @@ def python_module(schema: Entry) -> str:
     return "".join(parts)
 
 
+def union(name: str, members: list[str]) -> str:
+    """Return the type of an object of one of some classes as Python writes it."""
+    classes = list(map(class_name, members))
+    line = f"{name} = {' | '.join(classes)}\n"
+    if len(line) > LONGEST:
+        line = f"{name} = (\n    " + "\n    | ".join(classes) + "\n)\n"
+    return f"\n\n{line}" if name == "ModelOptions" else line
+
+
 def python_calls(schema: Entry) -> str:
     """Return the text of ``_solve.pyi``."""
     keys, models = schema["keys"], schema["models"]
     owned = {model: [key for key in keys if key["owner"] == model] for model in models}
     choices = {choice_name(key) for key in keys if key["owner"] in models and key["choices"]}
-    names = sorted({"Ball", "Drop", "ModelName", "ModelOptions", *choices})
+    names = sorted({"Ball", "Drop", "FloorOptions", "ModelName", "ModelOptions", *choices})
     parts = [SOLVE.format(names="".join(f"    {name},\n" for name in names))]
     shared = [key for key in keys if key["group"] == "sampling"]
     for name, base, members in [
@@ -211,6 +228,8 @@ def python_calls(schema: Entry) -> str:
     ]:
         parts.append(f"\nclass {name}Options({base}, total=False):\n")
         parts += [f"    {key['name']}: {python_type(key)}\n" for key in members]
+        if base == "TypedDict":
+            parts.append("    floor: FloorOptions | None\n")
     for model in models:
         words = {"options": f"{class_name(model)}Options", "by": f" by the model ``{model}``"}
         name = f"Literal[{quoted(model)}]"

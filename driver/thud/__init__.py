@@ -22,8 +22,9 @@ from thud.display import MAKERS
 from thud.ensemble import solve_many
 from thud.errors import FitWarning, InputError, NumericalError, PlausibilityWarning, ThudError
 from thud.extras import require_extra
+from thud.floors.mobility import mobility
 from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import Impact, solve_case
+from thud.impact import FloorEnergy, FloorImpact, Impact, solve_case
 from thud.levels import Bands, force_exposure_levels, get_bands, judge
 from thud.motion import Motion
 from thud.outcomes import Ensemble
@@ -42,6 +43,10 @@ if TYPE_CHECKING:
     from thud.comparison import read_all as read_all
     from thud.compression_fit import CompressionFit as CompressionFit
     from thud.compression_fit import fit_compression as fit_compression
+    from thud.floors.floor_comparison import FloorComparison as FloorComparison
+    from thud.floors.floor_comparison import compare_floors as compare_floors
+    from thud.floors.modal_room import ModalRoom as ModalRoom
+    from thud.floors.modal_room import modal_room as modal_room
     from thud.floors.prediction import RoomPrediction as RoomPrediction
     from thud.floors.prediction import predict_level as predict_level
     from thud.floors.rating import Rating as Rating
@@ -49,6 +54,8 @@ if TYPE_CHECKING:
     from thud.floors.rating import standardised_level as standardised_level
     from thud.floors.survey import RoomLevels as RoomLevels
     from thud.floors.survey import read_room_levels as read_room_levels
+    from thud.floors.tapping import TappingLevel as TappingLevel
+    from thud.floors.tapping import tapping_level as tapping_level
     from thud.recordings.read_recording import read_recording as read_recording
     from thud.recordings.recording import Recording as Recording
     from thud.studies.blocks import read_sweep as read_sweep
@@ -81,19 +88,25 @@ _LATE = {
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
+    "compare_floors": "floors.floor_comparison",
     "CompressionFit": "compression_fit",
     "fit_compression": "compression_fit",
     "read_all": "comparison",
+    "FloorComparison": "floors.floor_comparison",
+    "ModalRoom": "floors.modal_room",
     "Rating": "floors.rating",
     "Recording": "recordings.recording",
     "RoomLevels": "floors.survey",
     "RoomPrediction": "floors.prediction",
+    "TappingLevel": "floors.tapping",
+    "modal_room": "floors.modal_room",
     "predict_level": "floors.prediction",
     "quantity": "units",
     "rating": "floors.rating",
     "read_recording": "recordings.read_recording",
     "read_room_levels": "floors.survey",
     "standardised_level": "floors.rating",
+    "tapping_level": "floors.tapping",
 }
 __all__ = [  # noqa: PLE0604 - all are strings
     *_groups,
@@ -106,6 +119,8 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "Criterion",
     "Ensemble",
     "FitWarning",
+    "FloorEnergy",
+    "FloorImpact",
     "FreeModes",
     "Impact",
     "InputError",
@@ -119,6 +134,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "get_bands",
     "judge",
     "loss_factors",
+    "mobility",
     "read_case",
     "read_results",
     "solve",
@@ -158,11 +174,16 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
+    floor=_maker("plot.floor", "draw_floor"),
     compression=_maker("plot.compression", "compression"),
     compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),
     table=_maker("export", "table"),
     recording=_maker("plot.recording", "recording_figure"),
+    floors=_maker("plot.floors", "draw_floors"),
+    floors_html=_maker("plot.floors", "floors_html"),
+    save_all=_maker("plot.look", "save_all"),
+    modal_room=_maker("plot.modal_room", "draw_modal_room"),
     prediction=_maker("plot.prediction", "draw_prediction"),
     room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     Bundle = dict[str, Any]
 
 api = _core.thud_api
+floor_api = _core.thud_floor_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
 
@@ -121,3 +122,8 @@ def version() -> str:
 def compiler() -> str:
     """Return the compiler of the library and its options, without those that hold paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", text(call(api.describe_library)["compiler"]))
+
+
+def progress() -> float:
+    """Return the part of the latest long work of this process that is done, 0 to 1."""
+    return float(api.get_progress())

@@ -4,3 +4,4 @@ from typing import Any
 thud_api: Any
 thud_level_api: Any
 thud_ensemble_api: Any
+thud_floor_api: Any

@@ -16,16 +16,24 @@ __all__ = [
     "Compression",
     "Drop",
     "FiniteElement",
-    "Floor",
+    "FloatingFloor",
+    "FloorName",
+    "FloorOptions",
     "HollowSphere",
     "HuntCrossley",
+    "InfinitePlate",
+    "JoistFloor",
     "Levels",
     "Limits",
+    "MeasuredMobility",
     "MeasuredModes",
     "ModalBall",
     "ModelName",
     "ModelOptions",
     "Modes",
+    "Oscillator",
+    "Plate",
+    "Rigid",
     "Room",
     "Sampling",
     "TwoMass",
@@ -50,7 +58,19 @@ LevelsMethod = Literal["exact", "fft"]
 LevelsBands = Literal["octave", "third", "both"]
 LevelsForce = Literal["floor", "elastic"]
 LimitsSource = Literal["rubber_ball", "tyre"]
-FloorEdges = Literal["laboratory", "absorption"]
+FloorName = Literal[
+    "rigid",
+    "infinite_plate",
+    "oscillator",
+    "plate",
+    "floating_floor",
+    "joist_floor",
+    "measured_mobility",
+]
+PlateEdges = Literal["laboratory", "absorption"]
+FloatingFloorEdges = Literal["laboratory", "absorption"]
+JoistFloorSourceOn = Literal["sheathing", "joist"]
+RoomWallJunction = Literal["cross", "t", "index"]
 BandSet = Literal["octave", "third"]
 
 
@@ -206,41 +226,6 @@ class Compression(Group):
 
 
 @dataclass(frozen=True)
-class Floor(Group):
-    """Floor over the room below: a homogeneous plate.
-
-    Attributes
-    ----------
-    length : float
-        Length of the floor, m; 0.5 <= length <= 100.
-    width : float
-        Width of the floor, m; 0.5 <= width <= 100.
-    thickness : float
-        Thickness of the floor, m; 0.001 <= thickness <= 2.
-    density : float
-        Density of the floor, kg/m3; 10 <= density <= 20000.
-    wave_speed : float
-        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
-    loss_factor : float
-        Internal loss factor of the floor; 0 <= loss_factor <= 1.
-    edges : str
-        Losses at the edges of the floor; "laboratory", "absorption".
-    edge_absorption : float
-        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
-        edge_absorption <= 1000.
-    """
-
-    length: float = 5.0
-    width: float = 4.0
-    thickness: float = 0.18
-    density: float = 2300.0
-    wave_speed: float = 3500.0
-    loss_factor: float = 0.005
-    edges: FloorEdges = "laboratory"
-    edge_absorption: float = 0.0
-
-
-@dataclass(frozen=True)
 class Room(Group):
     """Room below the floor.
 
@@ -256,6 +241,31 @@ class Room(Group):
         Density of the air, kg/m3; 0.5 <= air_density <= 2.
     sound_speed : float
         Speed of sound in the air, m/s; 200 <= sound_speed <= 500.
+    wall_lengths : sequence of float
+        Lengths of the flanking walls along the floor (default: no walls), m; 0.1 <= wall_lengths
+        <= 100.
+    wall_height : float
+        Height of the walls, m; 0.5 <= wall_height <= 20.
+    wall_thickness : float
+        Thickness of the walls, m; 0.005 <= wall_thickness <= 2.
+    wall_density : float
+        Density of the walls, kg/m3; 10 <= wall_density <= 20000.
+    wall_wave_speed : float
+        Speed of longitudinal waves in the walls, m/s; 100 <= wall_wave_speed <= 10000.
+    wall_loss_factor : float
+        Internal loss factor of the walls; 0 <= wall_loss_factor <= 1.
+    wall_junction : str
+        Junction of floor and walls: rigid cross or t, or one of a given index; "cross", "t",
+        "index".
+    junction_index : float
+        Vibration reduction index from floor to wall, of the junction index, dB; -10 <=
+        junction_index <= 80.
+    ceiling_mass : float
+        Mass of a suspended ceiling over its area; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
+    ceiling_depth : float
+        Depth of the air above the ceiling, m; 0.01 <= ceiling_depth <= 2.
+    ceiling_loss_factor : float
+        Loss factor of that air; 0.001 <= ceiling_loss_factor <= 1.
     """
 
     volume: float = 50.0
@@ -263,6 +273,17 @@ class Room(Group):
     reverberation_times: Sequence[float] = ()
     air_density: float = 1.2
     sound_speed: float = 343.0
+    wall_lengths: Sequence[float] = ()
+    wall_height: float = 2.5
+    wall_thickness: float = 0.2
+    wall_density: float = 2300.0
+    wall_wave_speed: float = 3500.0
+    wall_loss_factor: float = 0.005
+    wall_junction: RoomWallJunction = "cross"
+    junction_index: float = 10.0
+    ceiling_mass: float = 0.0
+    ceiling_depth: float = 0.1
+    ceiling_loss_factor: float = 0.3
 
 
 @dataclass(frozen=True)
@@ -488,7 +509,284 @@ class TwoMass(Group):
     belt_damping: float = 0.2
 
 
+@dataclass(frozen=True)
+class Rigid(Group):
+    """Floor ``rigid``."""
+
+    name: ClassVar[FloorName] = "rigid"
+
+
+@dataclass(frozen=True)
+class InfinitePlate(Group):
+    """Floor ``infinite_plate``.
+
+    Attributes
+    ----------
+    resistance : float
+        Force over velocity, N s/m; 1 <= resistance <= 1e+15.
+    """
+
+    name: ClassVar[FloorName] = "infinite_plate"
+    resistance: float = 1600.0
+
+
+@dataclass(frozen=True)
+class Oscillator(Group):
+    """Floor ``oscillator``.
+
+    Attributes
+    ----------
+    mass : float
+        Mass that moves under the source, kg; 0.001 <= mass <= 1e+12.
+    stiffness : float
+        Stiffness of its support, N/m; 0 <= stiffness <= 1e+15.
+    damping : float
+        Damping of its support, N s/m; 0 <= damping <= 1e+12.
+    """
+
+    name: ClassVar[FloorName] = "oscillator"
+    mass: float = 100.0
+    stiffness: float = 2467000.0
+    damping: float = 785.0
+
+
+@dataclass(frozen=True)
+class Plate(Group):
+    """Floor ``plate``.
+
+    Attributes
+    ----------
+    length : float
+        Length of the floor, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor, m; 0.5 <= width <= 100.
+    thickness : float
+        Thickness of the floor, m; 0.001 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    stiffness_ratio : float
+        Bending stiffness along the width over that along the length; 0.0001 <= stiffness_ratio <=
+        10000.
+    torsion_ratio : float
+        Twisting stiffness over the geometric mean of both bending stiffnesses; 0 <= torsion_ratio
+        <= 1.
+    loss_factor : float
+        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+    edges : str
+        Losses at the edges of the floor; "laboratory", "absorption".
+    edge_absorption : float
+        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
+        edge_absorption <= 1000.
+    source_x : float
+        Place of the source along the length, over the length; 0 < source_x < 1.
+    source_y : float
+        Place of the source along the width, over the width; 0 < source_y < 1.
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
+    """
+
+    name: ClassVar[FloorName] = "plate"
+    length: float = 5.0
+    width: float = 4.0
+    thickness: float = 0.18
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    stiffness_ratio: float = 1.0
+    torsion_ratio: float = 1.0
+    loss_factor: float = 0.005
+    edges: PlateEdges = "laboratory"
+    edge_absorption: float = 0.0
+    source_x: float = 0.5
+    source_y: float = 0.5
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class FloatingFloor(Group):
+    """Floor ``floating_floor``.
+
+    Attributes
+    ----------
+    length : float
+        Length of the floor, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor, m; 0.5 <= width <= 100.
+    thickness : float
+        Thickness of the floor, m; 0.001 <= thickness <= 2.
+    density : float
+        Density of the floor, kg/m3; 10 <= density <= 20000.
+    wave_speed : float
+        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+    stiffness_ratio : float
+        Bending stiffness along the width over that along the length; 0.0001 <= stiffness_ratio <=
+        10000.
+    torsion_ratio : float
+        Twisting stiffness over the geometric mean of both bending stiffnesses; 0 <= torsion_ratio
+        <= 1.
+    loss_factor : float
+        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+    edges : str
+        Losses at the edges of the floor; "laboratory", "absorption".
+    edge_absorption : float
+        Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
+        edge_absorption <= 1000.
+    screed_thickness : float
+        Thickness of the floating plate, m; 0.003 <= screed_thickness <= 0.5.
+    screed_density : float
+        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
+    screed_wave_speed : float
+        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
+    screed_loss_factor : float
+        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
+    layer_stiffness : float
+        Dynamic stiffness of the resilient layer over area (ISO 9052-1), N/m3; 10000 <=
+        layer_stiffness <= 1e+12.
+    layer_loss_factor : float
+        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
+    source_x : float
+        Place of the source along the length, over the length; 0 < source_x < 1.
+    source_y : float
+        Place of the source along the width, over the width; 0 < source_y < 1.
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
+    """
+
+    name: ClassVar[FloorName] = "floating_floor"
+    length: float = 5.0
+    width: float = 4.0
+    thickness: float = 0.18
+    density: float = 2300.0
+    wave_speed: float = 3500.0
+    stiffness_ratio: float = 1.0
+    torsion_ratio: float = 1.0
+    loss_factor: float = 0.005
+    edges: FloatingFloorEdges = "laboratory"
+    edge_absorption: float = 0.0
+    screed_thickness: float = 0.05
+    screed_density: float = 2000.0
+    screed_wave_speed: float = 3500.0
+    screed_loss_factor: float = 0.03
+    layer_stiffness: float = 10000000.0
+    layer_loss_factor: float = 0.1
+    source_x: float = 0.5
+    source_y: float = 0.5
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class JoistFloor(Group):
+    """Floor ``joist_floor``.
+
+    Attributes
+    ----------
+    length : float
+        Span of the joists, m; 0.5 <= length <= 100.
+    width : float
+        Width of the floor across the joists, m; 0.5 <= width <= 100.
+    sheathing_thickness : float
+        Thickness of the sheathing, m; 0.003 <= sheathing_thickness <= 0.3.
+    sheathing_density : float
+        Density of the sheathing, kg/m3; 10 <= sheathing_density <= 20000.
+    sheathing_modulus : float
+        Modulus of elasticity of the sheathing in bending, Pa; 1e+07 <= sheathing_modulus <= 1e+12.
+    spacing : float
+        Distance between the axes of two joists, m; joist_width < spacing < width.
+    joist_width : float
+        Width of a joist, m; 0.005 <= joist_width <= 1.
+    joist_height : float
+        Height of a joist, m; 0.01 <= joist_height <= 2.
+    joist_density : float
+        Density of the joists, kg/m3; 10 <= joist_density <= 20000.
+    joist_modulus : float
+        Modulus of elasticity of the joists, Pa; 1e+07 <= joist_modulus <= 1e+12.
+    connection : float
+        Composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B);
+        0 <= connection <= 1.
+    loss_factor : float
+        Total loss factor of the floor; 0 < loss_factor <= 1.
+    source_x : float
+        Place of the source along the joists, over the length; 0 < source_x < 1.
+    source_y : float
+        Place of the source across the joists, over the width; 0 < source_y < 1.
+    source_on : str
+        What the source drops on there: sheathing between joists, or a joist; "sheathing", "joist".
+    point_x : sequence of float
+        Places of further points along the length, m; 0 <= point_x <= 1000.
+    point_y : sequence of float
+        Their places along the width, m; 0 <= point_y <= 1000.
+    """
+
+    name: ClassVar[FloorName] = "joist_floor"
+    length: float = 4.0
+    width: float = 5.0
+    sheathing_thickness: float = 0.022
+    sheathing_density: float = 650.0
+    sheathing_modulus: float = 3000000000.0
+    spacing: float = 0.4
+    joist_width: float = 0.06
+    joist_height: float = 0.22
+    joist_density: float = 420.0
+    joist_modulus: float = 11000000000.0
+    connection: float = 0.1
+    loss_factor: float = 0.05
+    source_x: float = 0.5
+    source_y: float = 0.5
+    source_on: JoistFloorSourceOn = "sheathing"
+    point_x: Sequence[float] = ()
+    point_y: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class MeasuredMobility(Group):
+    """Floor ``measured_mobility``.
+
+    Attributes
+    ----------
+    direct : float
+        Mobility at high frequencies, m/(N s); 0 <= direct <= 1000.
+    pole_frequency : sequence of float
+        Magnitudes of the poles over 2 pi, Hz; 1e-06 <= pole_frequency <= 1e+07.
+    damping_ratio : sequence of float
+        Damping ratios of the poles, 1 of a real pole; 0 < damping_ratio <= 1.
+    residue_real : sequence of float
+        Real parts of the residues, of a pair of poles doubled, m/(N s2); -1e+12 <= residue_real <=
+        1e+12.
+    residue_imaginary : sequence of float
+        Imaginary parts of the residues, m/(N s2); -1e+12 <= residue_imaginary <= 1e+12.
+    lowest_frequency : float
+        First frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
+    highest_frequency : float
+        Last frequency of the measurement, Hz; 0 < highest_frequency <= 1e+07.
+    """
+
+    name: ClassVar[FloorName] = "measured_mobility"
+    direct: float = 0.0
+    pole_frequency: Sequence[float] = ()
+    damping_ratio: Sequence[float] = ()
+    residue_real: Sequence[float] = ()
+    residue_imaginary: Sequence[float] = ()
+    lowest_frequency: float = 10.0
+    highest_frequency: float = 1000.0
+
+
 ModelOptions = HollowSphere | ModalBall | FiniteElement | MeasuredModes | HuntCrossley | TwoMass
+FloorOptions = (
+    Rigid
+    | InfinitePlate
+    | Oscillator
+    | Plate
+    | FloatingFloor
+    | JoistFloor
+    | MeasuredMobility
+)
 
 # Source models by name, the default first.
 MODELS: dict[str, type[ModelOptions]] = {
@@ -498,6 +796,17 @@ MODELS: dict[str, type[ModelOptions]] = {
     MeasuredModes.name: MeasuredModes,
     HuntCrossley.name: HuntCrossley,
     TwoMass.name: TwoMass,
+}
+
+# Floors by name, the default first.
+FLOORS: dict[str, type[FloorOptions]] = {
+    Rigid.name: Rigid,
+    InfinitePlate.name: InfinitePlate,
+    Oscillator.name: Oscillator,
+    Plate.name: Plate,
+    FloatingFloor.name: FloatingFloor,
+    JoistFloor.name: JoistFloor,
+    MeasuredMobility.name: MeasuredMobility,
 }
 
 # Groups that every model uses.
@@ -603,17 +912,83 @@ KEYS = (
     Key("", "levels", "bands", "choice", "", "bands of levels.csv", ('octave', 'third', 'both')),
     Key("", "levels", "force", "choice", "", "force whose levels, peak and verdict count", ('floor', 'elastic')),
     Key("", "limits", "source", "choice", "", "source whose limits apply", ('rubber_ball', 'tyre')),
-    Key("floor", "floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
-    Key("floor", "floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
-    Key("floor", "floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
-    Key("floor", "floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
-    Key("floor", "floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
-    Key("floor", "floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
-    Key("floor", "floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
-    Key("floor", "floor", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("floor", "floor", "name", "choice", "", "floor under the source", ('rigid', 'infinite_plate', 'oscillator', 'plate', 'floating_floor', 'joist_floor', 'measured_mobility')),
+    Key("infinite_plate", "infinite_plate", "resistance", "real", "N s/m", "force over velocity", (), 1.0, 1000000000000000.0),
+    Key("oscillator", "oscillator", "mass", "real", "kg", "mass that moves under the source", (), 0.001, 1000000000000.0),
+    Key("oscillator", "oscillator", "stiffness", "real", "N/m", "stiffness of its support", (), 0.0, 1000000000000000.0),
+    Key("oscillator", "oscillator", "damping", "real", "N s/m", "damping of its support", (), 0.0, 1000000000000.0),
+    Key("plate", "plate", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
+    Key("plate", "plate", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("plate", "plate", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
+    Key("plate", "plate", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("plate", "plate", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("plate", "plate", "stiffness_ratio", "real", "", "bending stiffness along the width over that along the length", (), 0.0001, 10000.0),
+    Key("plate", "plate", "torsion_ratio", "real", "", "twisting stiffness over the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
+    Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("plate", "plate", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
+    Key("plate", "plate", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("plate", "plate", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("plate", "plate", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
+    Key("floating_floor", "floating_floor", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
+    Key("floating_floor", "floating_floor", "thickness", "real", "m", "thickness of the floor", (), 0.001, 2.0),
+    Key("floating_floor", "floating_floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
+    Key("floating_floor", "floating_floor", "wave_speed", "real", "m/s", "speed of longitudinal waves in the floor", (), 100.0, 10000.0),
+    Key("floating_floor", "floating_floor", "stiffness_ratio", "real", "", "bending stiffness along the width over that along the length", (), 0.0001, 10000.0),
+    Key("floating_floor", "floating_floor", "torsion_ratio", "real", "", "twisting stiffness over the geometric mean of both bending stiffnesses", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
+    Key("floating_floor", "floating_floor", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "screed_thickness", "real", "m", "thickness of the floating plate", (), 0.003, 0.5),
+    Key("floating_floor", "floating_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
+    Key("floating_floor", "floating_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
+    Key("floating_floor", "floating_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer over area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
+    Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("floating_floor", "floating_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
+    Key("joist_floor", "joist_floor", "width", "real", "m", "width of the floor across the joists", (), 0.5, 100.0),
+    Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
+    Key("joist_floor", "joist_floor", "sheathing_density", "real", "kg/m3", "density of the sheathing", (), 10.0, 20000.0),
+    Key("joist_floor", "joist_floor", "sheathing_modulus", "real", "Pa", "modulus of elasticity of the sheathing in bending", (), 10000000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "spacing", "real", "m", "distance between the axes of two joists", (), "joist_width", "width"),
+    Key("joist_floor", "joist_floor", "joist_width", "real", "m", "width of a joist", (), 0.005, 1.0),
+    Key("joist_floor", "joist_floor", "joist_height", "real", "m", "height of a joist", (), 0.01, 2.0),
+    Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
+    Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
+    Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "total loss factor of the floor", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "place of the source along the joists, over the length", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_y", "real", "", "place of the source across the joists, over the width", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_on", "choice", "", "what the source drops on there: sheathing between joists, or a joist", ('sheathing', 'joist')),
+    Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
+    Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
+    Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
+    Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles over 2 pi", (), 1e-06, 10000000.0),
+    Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 0.0, 1.0),
+    Key("measured_mobility", "measured_mobility", "residue_real", "list", "m/(N s2)", "real parts of the residues, of a pair of poles doubled", (), -1000000000000.0, 1000000000000.0),
+    Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues", (), -1000000000000.0, 1000000000000.0),
+    Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "first frequency of the measurement", (), 0.0, "highest_frequency"),
+    Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "last frequency of the measurement", (), 0.0, 10000000.0),
     Key("room", "room", "volume", "real", "m3", "volume of the room", (), 1.0, 100000.0),
     Key("room", "room", "reverberation_time", "real", "s", "reverberation time of the room", (), 0.05, 20.0),
     Key("room", "room", "reverberation_times", "list", "s", "the same for each third from 50 to 630 Hz", (), 0.05, 20.0),
     Key("room", "room", "air_density", "real", "kg/m3", "density of the air", (), 0.5, 2.0),
     Key("room", "room", "sound_speed", "real", "m/s", "speed of sound in the air", (), 200.0, 500.0),
+    Key("room", "room", "wall_lengths", "list", "m", "lengths of the flanking walls along the floor (default: no walls)", (), 0.1, 100.0),
+    Key("room", "room", "wall_height", "real", "m", "height of the walls", (), 0.5, 20.0),
+    Key("room", "room", "wall_thickness", "real", "m", "thickness of the walls", (), 0.005, 2.0),
+    Key("room", "room", "wall_density", "real", "kg/m3", "density of the walls", (), 10.0, 20000.0),
+    Key("room", "room", "wall_wave_speed", "real", "m/s", "speed of longitudinal waves in the walls", (), 100.0, 10000.0),
+    Key("room", "room", "wall_loss_factor", "real", "", "internal loss factor of the walls", (), 0.0, 1.0),
+    Key("room", "room", "wall_junction", "choice", "", "junction of floor and walls: rigid cross or t, or one of a given index", ('cross', 't', 'index')),
+    Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, of the junction index", (), -10.0, 80.0),
+    Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass of a suspended ceiling over its area; 0: none", (), 0.0, 200.0),
+    Key("room", "room", "ceiling_depth", "real", "m", "depth of the air above the ceiling", (), 0.01, 2.0),
+    Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of that air", (), 0.001, 1.0),
 )

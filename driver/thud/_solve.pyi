@@ -11,6 +11,7 @@ from thud._schema import (
     Drop,
     FiniteElementLaw,
     FiniteElementViscosity,
+    FloorOptions,
     HollowSphereMomentumFlux,
     ModalBallDampingLaw,
     ModalBallFloorFriction,
@@ -23,6 +24,7 @@ class SamplingOptions(TypedDict, total=False):
     sample_rate: float
     duration: float
     substeps: int
+    floor: FloorOptions | None
 
 class HollowSphereOptions(SamplingOptions, total=False):
     momentum_flux: HollowSphereMomentumFlux
@@ -89,81 +91,81 @@ def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., model: Literal["hollow_sphere"] = ...,
     **options: Unpack[HollowSphereOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``hollow_sphere``."""
+    """Drop a ball on a floor by the model ``hollow_sphere``."""
 
 @overload
 def solve(
     ball: Ball | None, drop: Drop | None, model: Literal["modal_ball"],
     **options: Unpack[ModalBallOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``modal_ball``."""
+    """Drop a ball on a floor by the model ``modal_ball``."""
 
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["modal_ball"],
     **options: Unpack[ModalBallOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``modal_ball``."""
+    """Drop a ball on a floor by the model ``modal_ball``."""
 
 @overload
 def solve(
     ball: Ball | None, drop: Drop | None, model: Literal["finite_element"],
     **options: Unpack[FiniteElementOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``finite_element``."""
+    """Drop a ball on a floor by the model ``finite_element``."""
 
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["finite_element"],
     **options: Unpack[FiniteElementOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``finite_element``."""
+    """Drop a ball on a floor by the model ``finite_element``."""
 
 @overload
 def solve(
     ball: Ball | None, drop: Drop | None, model: Literal["measured_modes"],
     **options: Unpack[MeasuredModesOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``measured_modes``."""
+    """Drop a ball on a floor by the model ``measured_modes``."""
 
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["measured_modes"],
     **options: Unpack[MeasuredModesOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``measured_modes``."""
+    """Drop a ball on a floor by the model ``measured_modes``."""
 
 @overload
 def solve(
     ball: Ball | None, drop: Drop | None, model: Literal["hunt_crossley"],
     **options: Unpack[HuntCrossleyOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``hunt_crossley``."""
+    """Drop a ball on a floor by the model ``hunt_crossley``."""
 
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["hunt_crossley"],
     **options: Unpack[HuntCrossleyOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``hunt_crossley``."""
+    """Drop a ball on a floor by the model ``hunt_crossley``."""
 
 @overload
 def solve(
     ball: Ball | None, drop: Drop | None, model: Literal["two_mass"],
     **options: Unpack[TwoMassOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``two_mass``."""
+    """Drop a ball on a floor by the model ``two_mass``."""
 
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., *, model: Literal["two_mass"],
     **options: Unpack[TwoMassOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor by the model ``two_mass``."""
+    """Drop a ball on a floor by the model ``two_mass``."""
 
 @overload
 def solve(
     ball: Ball | None = ..., drop: Drop | None = ..., model: ModelName | ModelOptions = ...,
     **options: Unpack[SamplingOptions],
 ) -> Impact:
-    """Drop a ball on a rigid floor."""
+    """Drop a ball on a floor."""

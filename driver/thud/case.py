@@ -11,13 +11,14 @@ import numpy as np
 
 from thud._api import api, call, text
 from thud._schema import (
+    FLOORS,
     GROUPS,
     KEYS,
     MODELS,
     Ball,
     Compression,
     Drop,
-    Floor,
+    FloorOptions,
     HollowSphere,
     Levels,
     Limits,
@@ -42,7 +43,7 @@ Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 # The keys that take lists of numbers.
 LISTS = {key.name for key in KEYS if key.kind == "list"}
 # Groups that an impact may have, and all that a case may ask for.
-FURTHER: dict[str, type[Group]] = {"compression": Compression, "floor": Floor, "room": Room}
+FURTHER: dict[str, type[Group]] = {"compression": Compression, "room": Room}
 OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **FURTHER}
 # Keys of the mesh, which free modes and finite elements share.
 _MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
@@ -78,8 +79,10 @@ class Case(Group, Displayed):
         Options of the source model; None: no impact.
     modes : Modes or None
         Options of the free modes; None: no free modes.
-    floor, room : Floor and Room, or None
-        Floor and room below; None: no level in a room.
+    floor : FloorOptions or None
+        Floor on which the ball is dropped too, beside the rigid one; None: no other.
+    room : Room or None
+        Room below the floor; None: no level in a room.
     compression : Compression or None
         Options of the slow compression by the source model; None: no compression.
     ball, drop, sampling, levels, limits
@@ -94,7 +97,7 @@ class Case(Group, Displayed):
     levels: Levels = field(default_factory=Levels)
     limits: Limits = field(default_factory=Limits)
     modes: Modes | None = None
-    floor: Floor | None = None
+    floor: FloorOptions | None = None
     room: Room | None = None
     compression: Compression | None = None
 
@@ -102,9 +105,10 @@ class Case(Group, Displayed):
         """Return what is computed."""
         model = self.model.name if isinstance(self.model, ModelOptions) else ""
         modes = "free modes" if self.modes else ""
+        floor = f"on {self.floor.name}" if self.floor else ""
         room = "room below" if self.room else ""
         press = "slow compression" if self.compression else ""
-        return f"<Case {self.name}: {', '.join(filter(None, (model, modes, room, press)))}>"
+        return f"<Case {self.name}: {', '.join(filter(None, (model, floor, modes, room, press)))}>"
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
@@ -128,6 +132,7 @@ class Case(Group, Displayed):
         for group, kind in GROUPS.items():
             require_kind(group, getattr(self, group), kind)
         require_kind("model", self.model, ModelOptions | None)
+        require_kind("floor", self.floor, FloorOptions | None)
         for group, optional in OPTIONAL.items():
             require_kind(group, getattr(self, group), optional | None)
         groups: dict[str, dict[str, object]] = {
@@ -150,6 +155,9 @@ class Case(Group, Displayed):
                     )
                     raise InputError(message)
                 values[option.name] = value
+        if self.floor:
+            groups["floor"] = {"name": self.floor.name}
+            groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
         groups |= {group: vars(given) for group in FURTHER if (given := getattr(self, group))}
         namelist = f90nml.Namelist()
         for group, options in groups.items():
@@ -181,13 +189,17 @@ class Case(Group, Displayed):
                 if option.name in given:
                     options[option.name] = given[option.name]
             model = MODELS[name](**_with_lists(options))
+        floor = None
+        if "floor" in content:
+            name = content["floor"].get("name", next(iter(FLOORS)))
+            floor = FLOORS[name](**_with_lists(content.get(name, {})))
         further: dict[str, Any] = {
             group: kind(**_with_lists(content[group]))
             for group, kind in FURTHER.items()
             if group in content
         }
         title = content.get("case", {}).get("name", cls.name)
-        return cls(name=title, model=model, modes=modes, **groups, **further)
+        return cls(name=title, model=model, floor=floor, modes=modes, **groups, **further)
 
 
 def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pandas as pd
 import xarray as xr
 
 from thud._schema import SCALARS
-from thud.impact import Impact
+from thud.impact import FloorImpact, Impact
 from thud.keys import find_key
 from thud.levels import BANDWIDTHS
 from thud.studies.dataset import MEANINGS, band_coordinates, coordinate, origin
@@ -43,6 +43,9 @@ def _of_impact(impact: Impact) -> xr.Dataset:
         variables[name] = (bands, impact.levels(bands, force=force), _attributes(*MEANINGS[name]))
     for name, entry in SCALARS.items():
         variables[name] = ((), getattr(impact, name), _attributes(*entry))
+    if isinstance(impact, FloorImpact):
+        words = _attributes("J", "energy that the source gives to the floor")
+        variables["floor_work"] = ((), impact.floor_work, words)
     conforms = impact.conformity().conforms
     variables["conforms"] = ((), conforms, _attributes(*MEANINGS["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
@@ -66,10 +69,20 @@ def compression_table(curve: CompressionCurve) -> pd.DataFrame:
 def _columns(impact: Impact) -> dict[str, NDArray[np.float64]]:
     """Return the histories of an impact by name and unit, shape (n_sample,)."""
     forces = {"elastic_force": impact.elastic_force, "floor_force": impact.floor_force}
+    moving = {}
+    if isinstance(impact, FloorImpact):
+        forces["blocked_force"] = impact.blocked_force
+        moving = {
+            "floor_displacement_m": impact.floor_displacement,
+            "floor_velocity_m_per_s": impact.floor_velocity,
+        }
+        for i, velocity in enumerate(impact.point_velocity, 1):
+            moving[f"point_{i}_velocity_m_per_s"] = velocity
     return {
         "deflection_m": impact.deflection,
         "velocity_m_per_s": impact.velocity,
         **{f"{name}_N": values for name, values in (forces | impact.parts).items()},
+        **moving,
         **impact.channels,
     }
 

@@ -16,7 +16,7 @@ from thud.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
-# Lists the files of a result directory that runs may replace.
+# Lists the files of a result directory that runs may replace, and the checksums of some.
 MANIFEST = ".thud"
 # Temporary name of a file in a result directory; listed too, so that it is removed after a kill.
 PART = ".thud.new"
@@ -88,16 +88,29 @@ def add_files(
     if not files:
         return
     folder = Path(directory)
-    with _locked(folder):
+    with locked(folder):
         if marker is not None and marker not in _markers(folder):
             message = f"{folder} now holds results of another input; allowed: run the case again"
             raise InputError(message)
-        manifest = folder / MANIFEST
-        listed = manifest.read_text(encoding="utf-8").splitlines() if manifest.exists() else []
+        listed = read_manifest(folder) | dict.fromkeys([PART, *files], "")
         # Written first: a file that is not listed counts as the user's.
-        names = sorted({*listed, PART, *files})
-        for name, content in {MANIFEST: "".join(f"{n}\n" for n in names).encode(), **files}.items():
+        lines = [f"{name}\t{checksum}".rstrip() for name, checksum in sorted(listed.items())]
+        manifest = "\n".join([*lines, ""]).encode("utf-8", "surrogateescape")
+        for name, content in {MANIFEST: manifest, **files}.items():
             _replace(folder / name, content, folder / PART)
+
+
+def read_manifest(folder: Path) -> dict[str, str]:
+    """Return the checksums of the files of a result directory by name, "" where not known.
+
+    They are CRC-32 in hexadecimal digits. Without a manifest there are none.
+    """
+    listed: dict[str, str] = {}
+    with suppress(FileNotFoundError):
+        for line in (folder / MANIFEST).read_text("utf-8", "surrogateescape").splitlines():
+            name, _, checksum = line.partition("\t")
+            listed[name] = checksum or listed.get(name, "")
+    return listed
 
 
 def _markers(folder: Path) -> Iterator[bytes]:
@@ -108,13 +121,13 @@ def _markers(folder: Path) -> Iterator[bytes]:
 
 
 @contextmanager
-def _locked(folder: Path) -> Iterator[None]:
+def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
     """Hold the lock of a result directory, so that no other run switches or adds to it."""
     while True:
         descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         # Some file systems have no locks.
         with suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            fcntl.flock(descriptor, kind)
         # The previous holder of the lock may have switched the directory.
         with suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(descriptor), folder.stat()):

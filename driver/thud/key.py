@@ -26,8 +26,8 @@ class Key:
     Attributes
     ----------
     owner : str
-        What uses it: a source model, ``"modes"``, ``"compression"``, ``"floor"`` or ``"room"``;
-        empty for keys of every impact.
+        What uses it: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
+        ``"room"``; empty for keys of every impact.
     group, name : str
         Namelist group and name.
     kind : str

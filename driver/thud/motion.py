@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Snapshots of the half section of the ball, the floor at height 0.
+    """Snapshots of the half section of the ball, the floor at rest at height 0.
 
     Nodes run from the lowest point to the highest and from the inner surface to the outer one;
     components are the distance from the axis and the height.
@@ -34,6 +34,8 @@ class Motion:
         Radial stress of the floor on the same nodes, positive outwards, Pa.
     cavity_pressure : ndarray, shape (n_snapshot,)
         Overpressure of the gas in the ball, Pa.
+    floor_displacement : ndarray, shape (n_snapshot,)
+        Displacement of the floor under the ball, downwards, m; 0 on a rigid floor.
     """
 
     time: NDArray[np.float64]
@@ -43,6 +45,7 @@ class Motion:
     contact_pressure: NDArray[np.float64]
     contact_shear: NDArray[np.float64]
     cavity_pressure: NDArray[np.float64]
+    floor_displacement: NDArray[np.float64]
 
     def __repr__(self) -> str:
         """Return the size of the snapshots, without their arrays."""

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import re
+import warnings
+import zlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,14 +16,26 @@ import numpy as np
 from thud._schema import SCALARS
 from thud.case import Case
 from thud.checks import refuse
-from thud.errors import InputError
-from thud.impact import Impact
+from thud.errors import PlausibilityWarning, ThudError
+from thud.files import MANIFEST, locked, read_manifest
+from thud.impact import FloorImpact, Impact
 from thud.motion import Motion
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
+
+# Columns of every history, by the names of an impact; parts of the force follow the first three.
+_OWN = {
+    "time": "time_s",
+    "deflection": "deflection_m",
+    "velocity": "velocity_m_per_s",
+    "elastic_force": "elastic_force_N",
+    "floor_force": "floor_force_N",
+}
+_MOTION = ("time", "deflection", "velocity")
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -39,37 +54,97 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Raises
     ------
     InputError
-        Where the directory does not hold the results of an impact.
+        Where the directory does not hold the results of an impact, or one of the files is not as
+        the run has written it.
+
+    Warns
+    -----
+    PlausibilityWarning
+        Where the file that says so, ``.thud``, is missing; also in `Impact.remarks`.
     """
     try:
         folder = Path(directory)
-        case = Case.from_namelist(f90nml.read(folder / "effective.nml"))
-        numbers = f90nml.read(folder / "summary.nml")
-        force = _table(folder / "force.csv")
-        channels = folder / "channels.csv"
-        found = _table(channels) if channels.exists() else {}
-        motion = _read_motion(folder) if (folder / "motion.pvd").exists() else None
+        with locked(folder, fcntl.LOCK_SH):
+            return _new_impact(_Files(folder))
+    except ThudError:
+        raise
     except FileNotFoundError as error:
         refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        message = f"{directory}: cannot be read ({error}); allowed: the results of an impact"
-        raise InputError(message) from error
-    time = force.pop("time_s")
-    named = {name.rsplit("_", 1)[0]: values for name, values in force.items()}
-    return Impact(
-        case,
-        time,
-        named.pop("deflection"),
-        force["velocity_m_per_s"],
-        named.pop("elastic_force"),
-        named.pop("floor_force"),
-        {name: values for name, values in named.items() if name != "velocity_m_per"},
-        {name: values for name, values in found.items() if name != "time_s"},
-        dict(numbers.get("facts", {})),
-        _texts(numbers.get("remarks", {}).get("remark", [])),
-        motion,
-        **{name: numbers["summary"][name] for name in SCALARS},
-    )
+    except Exception as error:  # noqa: BLE001 - parsers of damaged files raise anything
+        said = f"{type(error).__name__}: {error}".partition("\n")[0]
+        refuse(f"{directory}: cannot be read ({said})", "the results of an impact", error)
+
+
+class _Files:
+    """Files of a result directory, each compared with its checksum as it is read."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.checksums = read_manifest(folder)
+
+    def __contains__(self, name: str) -> bool:
+        """Return whether a file is part of the results."""
+        return bool(self.checksums.get(name)) if self.checksums else (self.folder / name).exists()
+
+    def read(self, name: str) -> str:
+        """Return the text of a file; raise InputError where the run has not written it."""
+        if Path(name).name != name:
+            refuse(f"{self.folder}: {name!r} is named as a file of it", "names without directories")
+        content = (self.folder / name).read_bytes()
+        if self.checksums and f"{zlib.crc32(content):08X}" != self.checksums.get(name):
+            refuse(
+                f"{self.folder / name} is not as the run has written it",
+                "results of one run; run the case again",
+            )
+        return content.decode()
+
+
+def _new_impact(files: _Files) -> Impact:
+    """Return the impact of a result directory."""
+    case = Case.from_namelist(f90nml.reads(files.read("effective.nml")))
+    numbers = f90nml.reads(files.read("summary.nml"))
+    history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
+    remarks = _texts(numbers.get("remarks", {}).get("remark", []))
+    if not files.checksums:
+        remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
+        warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
+        remarks += (remark,)
+    on_floor = None
+    if "floor_summary" in numbers:
+        scalars, facts = numbers["floor_summary"], numbers.get("floor_facts", {})
+        moving, columns = _read_history(files, "floor_", scalars, facts)
+        on_floor = FloorImpact(
+            case=case,
+            remarks=(),
+            blocked_force=columns.pop("blocked_force_N"),
+            floor_displacement=columns.pop("floor_displacement_m"),
+            floor_velocity=columns.pop("floor_velocity_m_per_s"),
+            floor_work=scalars["floor_work"],
+            point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
+            **moving,
+        )
+    return Impact(case=case, remarks=remarks, on_floor=on_floor, **history)
+
+
+def _read_history(
+    files: _Files, prefix: str, scalars: Mapping[str, float], facts: Mapping[str, float]
+) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    """Return what the files of a history hold, and further columns of its forces."""
+    force = _table(files.read(f"{prefix}force.csv"))
+    channels = f"{prefix}channels.csv"
+    found = _table(files.read(channels)) if channels in files else {}
+    # Parts of the force stand before the whole one, further columns behind.
+    columns = list(force)
+    last = columns.index("floor_force_N")
+    history = {
+        **{name: force[column] for name, column in _OWN.items()},
+        "parts": {name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]},
+        "channels": {name: values for name, values in found.items() if name != "time_s"},
+        "facts": dict(facts),
+        "motion": _read_motion(files, prefix) if f"{prefix}motion.pvd" in files else None,
+        **{name: scalars[name] for name in SCALARS},
+    }
+    return history, {name: force[name] for name in columns[last + 1 :]}
 
 
 def _texts(value: str | list[str]) -> tuple[str, ...]:
@@ -77,17 +152,21 @@ def _texts(value: str | list[str]) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(value)
 
 
-def _table(path: Path) -> dict[str, NDArray[np.float64]]:
+def _table(text: str) -> dict[str, NDArray[np.float64]]:
     """Return the columns of a CSV file by name."""
-    with path.open(encoding="utf-8") as file:
-        names = file.readline().strip().split(",")
-        return dict(zip(names, np.loadtxt(file, delimiter=",", ndmin=2).T, strict=True))
+    names, *lines = text.splitlines()
+    columns = np.loadtxt(lines, delimiter=",", ndmin=2).T
+    if not np.isfinite(columns).all():
+        message = "a value is not finite"
+        raise ValueError(message)
+    return dict(zip(names.split(","), columns, strict=True))
 
 
-def _read_motion(folder: Path) -> Motion:
+def _read_motion(files: _Files, prefix: str) -> Motion:
     """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
-    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', (folder / "motion.pvd").read_text())
-    shots = [_read_vtu(folder / name) for _, name in entries]
+    listed = files.read(f"{prefix}motion.pvd")
+    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', listed)
+    shots = [_read_vtu(files.read(name)) for _, name in entries]
     # The first element has its first two nodes on neighbouring rings.
     line = int(shots[0]["connectivity"][1])
     size = (len(shots[0]["cavity_pressure"]) // line, line)
@@ -107,14 +186,15 @@ def _read_motion(folder: Path) -> Motion:
         outer["contact_pressure"],
         outer["contact_shear"],
         np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
+        # Left out where the floor is rigid.
+        np.array([float(shot.get("floor_displacement", [0.0])[0]) for shot in shots]),
     )
 
 
-def _read_vtu(path: Path) -> dict[str, NDArray[Any]]:
+def _read_vtu(text: str) -> dict[str, NDArray[Any]]:
     """Return the arrays of a VTU file as thud writes it."""
     arrays = re.findall(
-        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>',
-        path.read_text(encoding="ascii"),
+        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>', text
     )
     # The first eight bytes are the length of the data.
     return {

@@ -15,6 +15,7 @@ from threading import Timer
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
+    from io import TextIOWrapper
     from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -120,6 +121,8 @@ def _open_screen() -> None:
         except OSError:
             os.open(os.devnull, os.O_WRONLY if number == 0 else os.O_RDONLY)
     sys.stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
+    # Names may hold letters that the encoding of the screen lacks.
+    cast("TextIOWrapper", sys.stdout).reconfigure(errors="backslashreplace")
     sys.stderr = cast("TextIO", _Lossy(sys.stderr or os.fdopen(2, "w", closefd=False)))
 
 

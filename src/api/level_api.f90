@@ -5,8 +5,8 @@ module thud_level_api
    use thud_error, only: error_type, get_status
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_kinds, only: wp
-   use thud_rating, only: correct_for_background, find_rated_bands, get_a_weighted_level, get_grade, get_legacy_rating, &
-      get_rounded, get_standardisation
+   use thud_rating, only: class_limits, correct_for_background, find_rated_bands, get_a_weighted_level, get_grade, &
+      get_legacy_rating, get_rounded, get_standardisation
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type, source_names
    use thud_system, only: begin_call, end_call
@@ -14,8 +14,8 @@ module thud_level_api
    implicit none (type, external)
    private
 
-   public :: count_bands, count_names, count_peaks, count_rated, force_exposure, get_bands, get_names, get_rated, judge
-   public :: rate, record_force, remove_background, standardise
+   public :: count_bands, count_names, count_peaks, count_rated, force_exposure, get_bands, get_class_limits, get_names
+   public :: get_rated, judge, rate, record_force, remove_background, standardise
 
 contains
 
@@ -207,6 +207,17 @@ contains
       call find_rated_bands(set, bands, error)
       nominal = bands%nominal
    end subroutine get_rated
+
+   !> Maximum A-weighted levels of the classes of KS F 2863-2.
+   subroutine get_class_limits(n_class, limits)
+      !f2py threadsafe
+      !> Number of classes.
+      integer, intent(in) :: n_class
+      !> The levels, dB: [n_class].
+      real(wp), intent(out) :: limits(n_class)
+
+      limits = class_limits(:n_class)
+   end subroutine get_class_limits
 
    !> Levels standardised to the reference room.
    subroutine standardise(level, n_band, reverberation_time, volume, standardised)

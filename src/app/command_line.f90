@@ -5,6 +5,8 @@ module thud_command_line
    use thud_compute, only: results_type
    use thud_constants, only: version
    use thud_error, only: bad_input, error_type, input_error
+   use thud_kinds, only: wp
+   use thud_memory, only: require_memory
    use thud_progress_line, only: begin_progress, end_progress
    use thud_run, only: outcome_type, run_case
    use thud_schema, only: get_schema
@@ -23,6 +25,9 @@ module thud_command_line
    !> Maximum number of threads, and the allowed range as text.
    integer, parameter :: max_threads = 1024
    character(len=*), parameter :: threads_allowed = '1 to 1024, whole'
+
+   !> Memory that OpenBLAS takes in each thread that uses it, and waits for for ever where there is none, bytes.
+   real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Options by their long names.
    character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--sets', '--threads', '--check', &
@@ -69,7 +74,11 @@ contains
          call write_line(standard_output, request%information, exit_code)
       else
          if (.not. request%quiet) call begin_progress()
-         if (request%sets == '') then
+         call require_memory(blas_memory*request%threads, 'buffers of OpenBLAS', 'more memory, or fewer threads', &
+            error, mostly_unused=.true.)
+         if (allocated(error)) then
+            continue
+         else if (request%sets == '') then
             call run_case(request%case_file, request%output, case, results, outcome, error)
          else
             call run_sets(request%case_file, request%sets, request%threads, request%output, outcome, error)

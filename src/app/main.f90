@@ -1,9 +1,11 @@
 !> The executable `thud`: arguments to library to exit code.
 program thud
+   use, intrinsic :: iso_c_binding, only: c_int
    use thud_command_line, only: execute
+   use thud_system, only: end_process
    implicit none (type, external)
    integer :: exit_code
 
    call execute(exit_code)
-   if (exit_code /= 0) stop exit_code, quiet=.true.
+   call end_process(int(exit_code, c_int))
 end program thud

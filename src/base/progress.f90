@@ -5,7 +5,7 @@ module thud_progress
    implicit none (type, external)
    private
 
-   public :: report_progress, set_progress_handler
+   public :: latest_progress, report_progress, set_progress_handler
 
    abstract interface
       !> Shows how far the work is.
@@ -19,6 +19,9 @@ module thud_progress
          character(len=*), intent(in) :: unit
       end subroutine handler
    end interface
+
+   !> Part of the latest report of this process that is done, 0 to 1; other threads may ask.
+   real(wp), volatile, protected :: latest_progress = 0.0_wp
 
    !> Procedure that shows it; none unless the executable or the driver sets one.
    procedure(handler), pointer :: show => null()
@@ -46,6 +49,8 @@ contains
 
       ! Drops that are computed in parallel do not report.
       !$ if (omp_in_parallel()) return
+      latest_progress = 0.0_wp
+      if (whole > 0.0_wp) latest_progress = min(1.0_wp, done/whole)
       ! Another thread may change it meanwhile.
       current => show
       if (associated(current)) call current(done, whole, unit)

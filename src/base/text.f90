@@ -8,7 +8,7 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, join_quoted, lower_case, newline, quoted, replaced, shortened, split, to_text
+   public :: fixed, is_utf8, join_quoted, lower_case, newline, quoted, replaced, shortened, split, to_text
 
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
@@ -151,6 +151,33 @@ contains
          if (text(i:i) >= 'A' .and. text(i:i) <= 'Z') lower(i:i) = achar(iachar(text(i:i)) + 32)
       end do
    end function lower_case
+
+   !> Whether the bytes of a text are UTF-8.
+   pure function is_utf8(text) result(valid)
+      character(len=*), intent(in) :: text
+      !> They are, short and legal forms only.
+      logical :: valid
+      integer :: i, first, second, more
+
+      valid = .true.
+      more = 0
+      do i = 1, len(text)
+         first = iachar(text(i:i))
+         if (more > 0) then
+            valid = valid .and. iand(first, 192) == 128
+            more = more - 1
+            cycle
+         end if
+         more = count(first >= [194, 224, 240])
+         valid = valid .and. (first < 128 .or. more > 0) .and. first < 245
+         if (more == 0 .or. i == len(text)) cycle
+         ! Longer forms than needed, halves of pairs, and what lies beyond the last character.
+         second = iachar(text(i + 1:i + 1))
+         valid = valid .and. .not. any([first == 224 .and. second < 160, first == 237 .and. second > 159, &
+            first == 240 .and. second < 144, first == 244 .and. second > 143])
+      end do
+      valid = valid .and. more == 0
+   end function is_utf8
 
    !> A text with all characters of a set replaced by another one.
    pure function replaced(text, set, new) result(changed)

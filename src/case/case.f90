@@ -1,24 +1,26 @@
 !> A case: everything that one run needs. Which keys there are, which of them a case uses, and what it refuses.
 module thud_case
    use thud_ball, only: ball_type, get_ball_fields
-   use thud_band, only: band_choices
+   use thud_band, only: band_choices, band_type
    use thud_compression, only: check_compression, compression_options_type, get_compression_fields
    use thud_drop, only: drop_type, get_drop_fields
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_force_exposure, only: level_methods
    use thud_free_modes, only: check_modes, get_modes_fields, modes_options_type
+   use thud_kinds, only: wp
    use thud_new_field, only: choice_field, in_group, owned_by, text_field
-   use thud_plate, only: get_plate_fields, plate_type
-   use thud_registry, only: model_names, model_slot_type, new_models
-   use thud_room, only: check_room, get_room_fields, room_type
+   use thud_plate, only: plate_type
+   use thud_registry, only: floor_names, floor_slot_type, model_names, model_slot_type, new_floors, new_models
+   use thud_room, only: check_room, get_room_bands, get_room_fields, room_type
    use thud_sampling, only: check_sampling, get_sampling_fields, sampling_type
    use thud_source_limits, only: source_names
-   use thud_text, only: quoted, to_text
+   use thud_text, only: is_utf8, quoted, to_text
    implicit none (type, external)
    private
 
-   public :: case_type, check_case, check_name, get_active_fields, get_fields, get_model_number, new_case
+   public :: case_type, check_case, check_name, get_active_fields, get_fields, get_floor_number, get_model_number
+   public :: new_case
 
    !> Input of one run.
    type :: case_type
@@ -30,7 +32,9 @@ module thud_case
       logical :: has_impact = .true.
       !> Free modes are asked for, by the group `&modes`.
       logical :: has_modes = .false.
-      !> The level in the room below is asked for, by the groups `&floor` and `&room`.
+      !> The drop on a floor that may move is asked for, by the group `&floor`.
+      logical :: has_floor = .false.
+      !> The level in the room below it is asked for, by the group `&room`.
       logical :: has_room = .false.
       !> Number of free modes, and their mesh.
       type(modes_options_type) :: modes
@@ -53,8 +57,11 @@ module thud_case
       character(len=name_length) :: level_force = 'floor'
       !> Source whose limits apply.
       character(len=name_length) :: source = 'rubber_ball'
-      !> Floor and room below.
-      type(plate_type) :: floor
+      !> Floor, one of `floor_names`.
+      character(len=name_length) :: floor = floor_names(1)
+      !> Every floor with its options; those of the chosen one count: [n_floor].
+      type(floor_slot_type), allocatable :: floors(:)
+      !> Room below.
       type(room_type) :: room
    end type case_type
 
@@ -65,6 +72,7 @@ contains
       type(case_type), intent(out) :: case
 
       call new_models(case%models)
+      call new_floors(case%floors)
    end subroutine new_case
 
    !> Number of the chosen model.
@@ -75,6 +83,15 @@ contains
 
       number = findloc(model_names == case%model, .true., dim=1)
    end function get_model_number
+
+   !> Number of the chosen floor.
+   pure function get_floor_number(case) result(number)
+      type(case_type), intent(in) :: case
+      !> Its place among the floors; 0 where there is no such floor.
+      integer :: number
+
+      number = findloc(floor_names == case%floor, .true., dim=1)
+   end function get_floor_number
 
    !> Every key of the input, in the order of the written file; keys of two owners occur twice.
    function get_fields(case) result(fields)
@@ -102,11 +119,14 @@ contains
          choice_field('force', case%level_force, 'force whose levels, peak and verdict count', &
          [character(len=8) :: 'floor', 'elastic'])]), &
          in_group('limits', [choice_field('source', case%source, 'source whose limits apply', source_names)]), &
-         owned_by('floor', in_group('floor', get_plate_fields(case%floor))), &
-         owned_by('room', in_group('room', get_room_fields(case%room)))]
+         owned_by('floor', in_group('floor', [choice_field('name', case%floor, 'floor under the source', floor_names)]))]
+      do i = 1, size(case%floors)
+         fields = [fields, owned_by(floor_names(i), in_group(floor_names(i), case%floors(i)%model%get_fields()))]
+      end do
+      fields = [fields, owned_by('room', in_group('room', get_room_fields(case%room)))]
    end function get_fields
 
-   !> Whether a key does something: for the impact, its model, the free modes, the slow compression, or the room below.
+   !> Whether a key does something: for the impact, its model, the free modes, the slow compression, floor or room.
    pure elemental function is_used(case, field) result(used)
       type(case_type), intent(in) :: case
       type(field_type), intent(in) :: field
@@ -114,8 +134,11 @@ contains
 
       if (field%owner == 'modes') then
          used = case%has_modes
-      else if (field%owner == 'floor' .or. field%owner == 'room') then
+      else if (field%owner == 'room') then
          used = case%has_impact .and. case%has_room
+      else if (field%owner == 'floor' .or. any(floor_names == field%owner)) then
+         used = case%has_impact .and. case%has_floor .and. any(field%owner == [character(len=name_length) :: 'floor', &
+            case%floor])
       else if (field%owner == 'compression') then
          used = case%has_compression .and. case%has_impact
       else if (case%has_impact) then
@@ -150,12 +173,32 @@ contains
       if (case%has_modes) call check_modes(case%modes, error)
       if (allocated(error) .or. .not. case%has_impact) return
       if (case%has_compression) call check_compression(case%compression, case%ball, error)
+      if (case%has_floor .and. .not. allocated(error)) call check_floor(case, error)
       if (case%has_room .and. .not. allocated(error)) call check_room(case%room, error)
       if (allocated(error)) return
       associate (model => case%models(get_model_number(case))%model)
          call model%check(case%ball, case%sampling, error)
       end associate
    end subroutine check_case
+
+   !> Refuses a floor whose options do not fit each other, or over a room into which it cannot radiate.
+   subroutine check_floor(case, error)
+      type(case_type), intent(in) :: case
+      !> Names group, key, value and what is allowed.
+      type(error_type), allocatable, intent(out) :: error
+      type(band_type), allocatable :: bands(:)
+      type(plate_type) :: plate
+      real(wp), allocatable :: conductance(:)
+
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%check(error)
+         if (.not. allocated(error)) call floor%check_points(error)
+         if (allocated(error) .or. .not. case%has_room) return
+         call get_room_bands(bands, error)
+         allocate (conductance(size(bands)))
+         call floor%get_radiator(bands%centre, plate, conductance, error)
+      end associate
+   end subroutine check_floor
 
    !> Refuses a name that cannot name a directory.
    subroutine check_name(name, error)
@@ -165,13 +208,13 @@ contains
       integer :: i
 
       usable = name(1:1) /= ' ' .and. name /= '.' .and. name /= '..' .and. scan(name, '/\') == 0 &
-         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))])
+         .and. all([(iachar(name(i:i)) >= 32, i=1, len(name))]) .and. is_utf8(name)
       if (name == '') then
          error = input_error('&case: name is empty; allowed: a name of 1 to '//to_text(name_length) &
             //' characters, without it the name of the file')
       else if (.not. usable) then
          error = input_error('&case: name = '//quoted(name)//' is not allowed; allowed: a name for a directory, ' &
-            //"without '/' and '\', of up to "//to_text(name_length)//' characters')
+            //"UTF-8 without '/' and '\', of up to "//to_text(name_length)//' characters')
       end if
    end subroutine check_name
 

@@ -1,22 +1,30 @@
 !> Computes a case: free modes, slow compression, the force history of its model, levels and verdict. It knows no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_case, only: case_type, get_model_number
+   use thud_case, only: case_type, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
+   use thud_floor_result, only: floor_result_type
    use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count, force_history_type, force_names
    use thud_free_modes, only: free_modes_type, get_free_modes
    use thud_kinds, only: wp
+   use thud_memory, only: require_memory
+   use thud_plate, only: plate_type
+   use thud_receiver, only: is_rigid, receiver_type
    use thud_remarks, only: get_remarks, remark_length
-   use thud_room, only: get_room_bands, get_room_level, room_level_type
+   use thud_room, only: check_below, get_room_bands, get_room_level, room_level_type
+   use thud_sampling, only: get_sample_count
    use thud_source_limits, only: conforms, criterion_count, criterion_type, get_criteria, get_peak_count, &
       get_source_limits, source_limits_type
    implicit none (type, external)
    private
 
-   public :: compress_case, compute_case, get_judged_force, is_conforming, judge_case, predict_room, results_type
-   public :: verdict_type
+   public :: compress_case, compute_case, drop_on_floor, get_judged_force, is_conforming, judge_case, predict_room
+   public :: predict_room_level, results_type, verdict_type
+
+   !> Memory that a sample of a record takes, its transforms and text included, bytes; measured.
+   real(wp), parameter :: sample_memory = 600.0_wp
 
    !> Levels and criteria of an impact.
    type :: verdict_type
@@ -36,6 +44,10 @@ module thud_compute
       type(force_history_type) :: history
       !> Its levels and verdict.
       type(verdict_type) :: verdict
+      !> The force on a floor that moves, where one is asked for and the model couples with it.
+      type(force_history_type), allocatable :: on_floor
+      !> What it makes of the floor.
+      type(floor_result_type) :: floor
       !> Free modes, where they are asked for.
       type(free_modes_type) :: modes
       !> Level in the room below, where it is asked for.
@@ -56,7 +68,10 @@ contains
       !> A computation failed.
       type(error_type), allocatable, intent(out) :: error
 
-      if (case%has_modes) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, results%modes, error)
+      if (case%has_impact) call require_memory(sample_memory*get_sample_count(case%sampling), &
+         '&sampling: so many samples', 'a lower sample_rate or duration', error)
+      if (case%has_modes .and. .not. allocated(error)) call get_free_modes(case%ball, case%modes%mesh, case%modes%count, &
+         results%modes, error)
       if (case%has_compression .and. .not. allocated(error)) call compress_case(case, results%compression, error)
       if (allocated(error)) return
       if (case%has_impact) then
@@ -64,8 +79,31 @@ contains
             call model%solve(case%ball, case%drop, case%sampling, results%history, error)
          end associate
       end if
-      if (.not. allocated(error)) call get_remarks(case, results%history, results%remark)
+      if (allocated(error)) return
+      if (case%has_impact .and. case%has_floor) call drop_on_floor(case, results%on_floor, error)
+      if (.not. allocated(error)) call get_remarks(case, results%history, allocated(results%on_floor), results%remark)
    end subroutine compute_case
+
+   !> The drop of a case on its floor.
+   subroutine drop_on_floor(case, on_floor, error)
+      type(case_type), intent(in) :: case
+      !> The history; not allocated where the floor is rigid, or the model's force is the blocked one.
+      type(force_history_type), allocatable, intent(out) :: on_floor
+      !> The computation failed.
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: receiver
+
+      associate (model => case%models(get_model_number(case))%model, floor => case%floors(get_floor_number(case))%model)
+         if (.not. model%couples()) return
+         call floor%get_receiver(receiver, error)
+         if (allocated(error)) return
+         if (is_rigid(receiver)) return
+         allocate (on_floor)
+         call model%solve(case%ball, case%drop, case%sampling, on_floor, error, receiver)
+      end associate
+      ! Models that leave the receiver alone have dropped on a rigid floor.
+      if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
+   end subroutine drop_on_floor
 
    !> Slow compression of the ball of a case by its model.
    subroutine compress_case(case, compression, error)
@@ -147,8 +185,28 @@ contains
       if (allocated(error)) return
       allocate (level(size(bands)))
       call get_force_exposure_levels(force, sample_rate, bands, trim(case%level_method), level, error)
-      if (.not. allocated(error)) call get_room_level(case%floor, case%room, bands, level, prediction)
+      if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
    end subroutine predict_room
+
+   !> Level that force exposure levels cause in the room below.
+   subroutine predict_room_level(case, bands, level, prediction, error)
+      !> The case, with floor and room.
+      type(case_type), intent(in) :: case
+      !> Thirds of `get_room_bands`, and levels of the force on the floor in them, dB: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      real(wp), intent(in) :: level(:)
+      type(room_level_type), intent(out) :: prediction
+      !> The floor radiates into no room.
+      type(error_type), allocatable, intent(out) :: error
+      type(plate_type) :: plate
+      real(wp) :: conductance(size(bands))
+
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_radiator(bands%centre, plate, conductance, error)
+      end associate
+      if (.not. allocated(error)) call check_below(plate, case%room, error)
+      if (.not. allocated(error)) call get_room_level(plate, conductance, case%room, bands, level, prediction)
+   end subroutine predict_room_level
 
    !> Number of the force that the verdict is on.
    pure function get_judged_force(case) result(number)

@@ -272,8 +272,8 @@ contains
          error = input_error('the case computes no impact; allowed: a case with &model')
          return
       end if
-      if (case%has_room) then
-         error = input_error('&floor and &room: many drops have no level in a room; allowed: a case without these groups')
+      if (case%has_floor) then
+         error = input_error('&floor: many drops have no floor of their own; allowed: a case without this group')
          return
       end if
       allocate (fields, source=get_active_fields(case))

@@ -1,10 +1,11 @@
 !> Remarks on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
 module thud_remarks
    use thud_ball, only: get_density
-   use thud_case, only: case_type
+   use thud_case, only: case_type, get_floor_number
+   use thud_floor_model, only: reason_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_registry, only: model_names
+   use thud_registry, only: floor_names, model_names
    use thud_text, only: fixed, quoted, to_text
    implicit none (type, external)
    private
@@ -30,17 +31,22 @@ module thud_remarks
    !> Distance from them of a force that is probably given in other units, dB.
    real(wp), parameter :: max_distance = 40.0_wp
 
+   !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].
+   real(wp), parameter :: standard_band(2) = [22.4_wp, 707.0_wp]
+
    !> The model that computes free modes.
    character(len=*), parameter :: modes_model = 'finite_element'
 
 contains
 
    !> Remarks on a case and its force.
-   subroutine get_remarks(case, history, remarks)
+   subroutine get_remarks(case, history, moved, remarks)
       !> The case, checked.
       type(case_type), intent(in) :: case
       !> Its force, of no samples without an impact.
       type(force_history_type), intent(in) :: history
+      !> The floor has moved under the source.
+      logical, intent(in) :: moved
       !> Sentences: [n].
       character(len=remark_length), allocatable, intent(out) :: remarks(:)
       real(wp) :: level
@@ -52,11 +58,31 @@ contains
          call add_ball_remarks(case, modes_model, remarks)
       end if
       if (.not. case%has_impact) return
+      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. moved) call add(remarks, '&floor: name = ' &
+         //quoted(case%floor)//' does not move under the model '//quoted(case%model)//': its force is that on a rigid floor')
+      if (case%has_floor) call add_floor_remark(case, remarks)
       level = 10*log10(max(sum(history%floor_force**2)/history%sample_rate, tiny(1.0_wp)))
       if (level < source_level(1) - max_distance .or. level > source_level(2) + max_distance) call add(remarks, &
          'the force exposure level over all frequencies is '//fixed(level, 1)//' dB, sources that conform have ' &
          //fixed(source_level(1), 0)//' to '//fixed(source_level(2), 0)//' dB; check the units of the input')
    end subroutine get_remarks
+
+   !> Adds a remark on octaves of the standard in which the floor is not what it claims to be.
+   subroutine add_floor_remark(case, remarks)
+      type(case_type), intent(in) :: case
+      !> Sentences: [n].
+      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      character(len=reason_length) :: reason
+      real(wp) :: lowest, highest
+
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_validity(lowest, highest, reason)
+      end associate
+      if (lowest > standard_band(1)) call add(remarks, '&'//trim(case%floor)//': below '//fixed(lowest, 0)//' Hz ' &
+         //trim(reason))
+      if (highest < standard_band(2)) call add(remarks, '&'//trim(case%floor)//': above '//fixed(highest, 0)//' Hz ' &
+         //trim(reason))
+   end subroutine add_floor_remark
 
    !> Adds remarks on wall and modulus of the ball, for models that use them.
    subroutine add_ball_remarks(case, model, remarks)

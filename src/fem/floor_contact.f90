@@ -92,7 +92,7 @@ contains
    end function new_floor_contact
 
    !> Forces of the floor that depend on where the nodes are: those of its layer and at the edge of the contact.
-   pure subroutine get_contact_forces(contact, position, force, energy)
+   pure subroutine get_contact_forces(contact, position, force, energy, stiffness)
       type(floor_contact_type), intent(in) :: contact
       !> Positions of the nodes of the outer surface over the floor, m: [0:n_polar, 2].
       real(wp), intent(in) :: position(0:, :)
@@ -100,11 +100,14 @@ contains
       real(wp), intent(out) :: force(0:, :)
       !> Energy that they hold, J.
       real(wp), intent(out) :: energy
+      !> What the forces upwards gain as the floor rises, N/m: [0:n_polar].
+      real(wp), intent(out), optional :: stiffness(0:)
       real(wp) :: part
       integer :: j, n
 
       force = 0.0_wp
       energy = 0.0_wp
+      if (present(stiffness)) stiffness = 0.0_wp
       if (minval(position(:, 2) - contact%edge_height) >= 0.0_wp) return
       n = ubound(force, 1)
       do j = 0, n - 1
@@ -114,9 +117,15 @@ contains
             if (z > 0.0_wp) part = 1 - z/begin
             force(j, 2) = edge_force*part**2
             energy = energy + edge_force*(begin*part**3/3 + max(-z, 0.0_wp))
+            if (present(stiffness) .and. z > 0.0_wp) stiffness(j) = 2*edge_force*part/begin
          end associate
       end do
-      if (contact%layer_stiffness > 0.0_wp) call add_layer_forces(contact%layer_stiffness, position(:, 1), &
+      if (.not. contact%layer_stiffness > 0.0_wp) return
+      if (present(stiffness)) then
+         where (position(:, 2) < 0.0_wp) stiffness = stiffness + contact%layer_stiffness &
+            *get_nodal_areas(position(:, 1), 0*position(:, 1))
+      end if
+      call add_layer_forces(contact%layer_stiffness, position(:, 1), &
          max(-position(:, 2), 0.0_wp), force(:, 1), force(:, 2), energy)
    end subroutine get_contact_forces
 

@@ -7,6 +7,8 @@ module thud_impact_record
    use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
    use thud_impact_run, only: get_mean_height, get_mean_velocity, impact_run_type
    use thud_kinds, only: wp
+   use thud_moving_floor, only: continue_freely
+   use thud_receiver, only: is_rigid, receiver_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_text, only: to_text
    use thud_transform, only: get_low_pass
@@ -22,15 +24,17 @@ module thud_impact_record
    real(wp), parameter :: max_impulse_residual = 1.0e-8_wp
 
    !> Columns of the channels.
-   integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6
+   integer, parameter :: at_radius = 1, at_pressure = 2, at_kinetic = 3, at_gravity = 6, at_floor = 11
 
 contains
 
    !> A record without force.
-   pure function new_impact_record(sampling, impact_velocity) result(history)
+   pure function new_impact_record(sampling, impact_velocity, receiver) result(history)
       type(sampling_type), intent(in) :: sampling
       !> Velocity towards the floor at first touch, m/s.
       real(wp), intent(in) :: impact_velocity
+      !> What the ball drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(force_history_type) :: history
 
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['contact_force'])
@@ -38,6 +42,12 @@ contains
       history%channel_name = [character(len=24) :: 'contact_radius_m', 'cavity_pressure_Pa', 'kinetic_energy_J', &
          'strain_energy_J', 'gas_energy_J', 'gravity_energy_J', 'contact_energy_J', 'friction_energy_J', &
          'dissipated_energy_J', 'minimum_volume_ratio']
+      if (present(receiver)) then
+         if (.not. is_rigid(receiver)) then
+            history%channel_name = [history%channel_name, [character(len=24) :: 'floor_energy_J']]
+            allocate (history%floor_displacement, history%floor_velocity, mold=history%floor_force)
+         end if
+      end if
       allocate (history%channel(size(history%floor_force), size(history%channel_name)), source=0.0_wp)
    end function new_impact_record
 
@@ -57,9 +67,14 @@ contains
          history%channel(i, at_radius) = maxval(r, mask=run%floor_force(:, 2) > 0.0_wp)
          if (.not. any(run%floor_force(:, 2) > 0.0_wp)) history%channel(i, at_radius) = 0.0_wp
       end associate
-      history%channel(i, at_pressure:) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
+      history%channel(i, at_pressure:at_floor - 1) = [run%state%gas_pressure, run%kinetic, run%state%strain_energy, &
          run%state%gas_energy, run%potential, run%spring + run%stopped, run%rubbed, run%dissipated, &
          run%state%min_jacobian]
+      if (.not. run%floor%moves) return
+      history%channel(i, at_floor) = run%floor%work
+      history%floor_displacement(i) = run%floor%displacement
+      ! That of the direct mobility follows from the sampled force, when it is known.
+      history%floor_velocity(i) = run%floor%velocity
    end subroutine record_sample
 
    !> Goes on after the computation as free flight without further vibration, up to the next touch.
@@ -89,6 +104,8 @@ contains
          history%deflection(i) = -rise
          history%channel(i, at_gravity) = mass*run%gravity*(start + rise)
       end do
+      if (run%floor%moves) call continue_freely(run%floor, run%time, history%sample_rate, last + 1, &
+         history%floor_displacement, history%floor_velocity)
    end subroutine continue_flight
 
    !> Peaks of the impact, and the checks of the balances.
@@ -105,6 +122,12 @@ contains
       real(wp) :: recorded(size(history%floor_force))
       real(wp) :: gain
 
+      if (run%floor%moves) then
+         history%floor_velocity = history%floor_velocity + run%floor%receiver%direct*history%floor_force
+         history%floor_work = run%floor%work_after
+         history%deflection = history%deflection - history%floor_displacement
+         history%velocity = history%velocity - history%floor_velocity
+      end if
       history%part(:, 1) = history%floor_force
       history%elastic_force = history%floor_force
       ! Nodes that touch one by one make spikes, the higher the shorter the steps.

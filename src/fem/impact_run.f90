@@ -9,6 +9,8 @@ module thud_impact_run
    use thud_kinds, only: wp
    use thud_material, only: material_type
    use thud_mesh, only: new_mesh
+   use thud_moving_floor, only: find_floor, look_ahead, moving_floor_type, new_moving_floor, push_floor
+   use thud_receiver, only: receiver_type
    use thud_stable_step, only: find_growth, get_first_direction, max_growth
    implicit none (type, external)
    private
@@ -26,9 +28,10 @@ module thud_impact_run
    type :: impact_run_type
       type(elastic_body_type) :: body
       type(floor_contact_type) :: contact
+      type(moving_floor_type) :: floor
       !> Gravity, m/s2.
       real(wp) :: gravity = 0.0_wp
-      !> Positions over the floor, m.
+      !> Positions over the floor's first place, m.
       real(wp), allocatable :: position(:, :, :)
       !> Velocities half a step before, m/s; at the very start, those of the start.
       real(wp), allocatable :: velocity(:, :, :)
@@ -63,17 +66,20 @@ module thud_impact_run
 contains
 
    !> A ball above the floor, falling.
-   pure function new_impact_run(ball, options, material, gravity, gap, speed) result(run)
+   pure function new_impact_run(ball, options, material, gravity, gap, speed, receiver) result(run)
       type(ball_type), intent(in) :: ball
       !> Mesh and contact.
       class(finite_element_options_type), intent(in) :: options
       type(material_type), intent(in) :: material
       !> Gravity, m/s2; height of the lowest point, m; velocity downwards, m/s.
       real(wp), intent(in) :: gravity, gap, speed
+      !> What the ball drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       type(impact_run_type) :: run
 
       run%body = new_elastic_body(ball, new_mesh(ball, options%mesh, 1), material)
       run%contact = new_floor_contact(options%contact, ball, run%body%mesh)
+      run%floor = new_moving_floor(receiver)
       run%gravity = gravity
       associate (mesh => run%body%mesh)
          allocate (run%position(0:mesh%n_polar, 0:mesh%n_radial, 2), run%velocity(0:mesh%n_polar, 0:mesh%n_radial, 2))
@@ -136,7 +142,7 @@ contains
       real(wp), intent(in) :: interval
       real(wp) :: force(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
       real(wp) :: before(0:run%body%mesh%n_polar, 0:run%body%mesh%n_radial, 2)
-      real(wp) :: impulse(0:run%body%mesh%n_polar, 2)
+      real(wp), dimension(0:run%body%mesh%n_polar, 2) :: surface, impulse
       real(wp) :: span
       logical :: starts
       integer :: last
@@ -145,28 +151,39 @@ contains
       span = (run%last_interval + interval)/2
       call get_internal_forces(run%body, run%position, run%velocity, interval, .true., force, run%state)
       if (run%state%failure /= no_failure) return
-      call get_contact_forces(run%contact, run%position(:, last, :), run%floor_force, run%spring)
-      force(:, last, :) = force(:, last, :) + run%floor_force
       before = run%velocity
+      surface = run%position(:, last, :)
+      if (run%floor%moves) then
+         call look_ahead(run%floor, run%last_interval, interval)
+         call find_floor(run%floor, run%contact, run%mass(:, last, 2), surface, &
+            before(:, last, 2) + span*(force(:, last, 2)/run%mass(:, last, 2) - run%gravity), sum(run%floor_force(:, 2)))
+      end if
+      surface(:, 2) = surface(:, 2) + run%floor%displacement
+      call get_contact_forces(run%contact, surface, run%floor_force, run%spring)
+      force(:, last, :) = force(:, last, :) + run%floor_force
       run%time = run%time + span
       run%velocity = before + span*force/run%mass
       run%velocity(:, :, 2) = run%velocity(:, :, 2) - span*run%gravity
-      call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2), interval, run%velocity(:, last, 2), &
-         impulse(:, 2))
+      call stop_at_floor(run%contact, run%mass(:, last, 2), run%position(:, last, 2) + run%floor%stop, interval, &
+         run%velocity(:, last, 2), impulse(:, 2))
       call slow_by_friction(run%contact, run%mass(:, last, 1), span*run%floor_force(:, 2) + impulse(:, 2), &
          run%velocity(:, last, 1), impulse(:, 1))
-      starts = .not. run%last_interval > 0.0_wp
-      call add_lost_work(impulse(:, 2), before(:, last, 2), run%velocity(:, last, 2), starts, run%stopped, run%half_stop)
-      call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%rubbed, run%half_rub)
       run%floor_force = run%floor_force + impulse/span
       run%impulse = span*sum(run%floor_force(:, 2))
       run%node_impulse = run%node_impulse + span*run%floor_force
+      if (run%floor%moves) call push_floor(run%floor, sum(run%floor_force(:, 2)))
+      starts = .not. run%last_interval > 0.0_wp
+      ! Of what a node loses, the floor that moves gets a part.
+      call add_lost_work(impulse(:, 2), before(:, last, 2) + run%floor%velocity_before, &
+         run%velocity(:, last, 2) + run%floor%velocity_after, starts, run%stopped, run%half_stop)
+      call add_lost_work(impulse(:, 1), before(:, last, 1), run%velocity(:, last, 1), starts, run%rubbed, run%half_rub)
       run%kinetic = sum(run%mass*before*run%velocity)/2
       ! The velocities of the start are not half a step late.
       if (starts) run%kinetic = sum(run%mass*before**2)/2
       run%potential = run%gravity*sum(run%mass(:, :, 2)*run%position(:, :, 2))
       run%dissipated = run%dissipated + span*run%state%dissipation
-      if (run%contact%layer_stiffness > 0.0_wp) run%sink = max(run%sink, -minval(run%position(:, last, 2)))
+      ! Nodes rest where they stopped; the force that comes anew moves a floor on.
+      if (run%floor%moves .or. run%contact%layer_stiffness > 0.0_wp) run%sink = max(run%sink, -minval(surface(:, 2)))
    end subroutine kick
 
    !> Adds the work that impulses of the floor take from nodes. Half of it comes with the velocities after them, in the
@@ -208,7 +225,7 @@ contains
       real(wp) :: energy
 
       energy = run%kinetic + run%state%strain_energy + run%state%gas_energy + run%potential + run%spring + run%dissipated &
-         + run%stopped + run%rubbed
+         + run%stopped + run%rubbed + run%floor%work
    end function get_energy
 
    !> Height of the centre of mass.

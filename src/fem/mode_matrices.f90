@@ -9,6 +9,7 @@ module thud_mode_matrices
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm, dpbtrf, dpbtrs, dpotf2, dsbmv, dsyrk, dtrsm
+   use thud_memory, only: require_memory
    use thud_mesh, only: mesh_type
    use thud_mixed_element, only: get_mixed_element, n_dilatation, n_node
    implicit none (type, external)
@@ -73,6 +74,9 @@ contains
       ! Below zero, where the rigid motion lies, and well below the first elastic mode.
       matrices%shift = -0.1_wp*ball%youngs_modulus/density/ball%outer_radius**2
       call number_unknowns(mesh, matrices)
+      call require_memory(16.0_wp*matrices%n*(matrices%n_band + 1.0_wp), '&mesh: the matrices of so many elements', &
+         'lower radial_elements or polar_elements', error)
+      if (allocated(error)) return
       call assemble(mesh, shear_modulus, density, matrices)
       call factorise(matrices%n, matrices%n_band, matrices%factor, info)
       call check_interrupt(error)

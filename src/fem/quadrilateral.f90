@@ -12,7 +12,7 @@ contains
    pure subroutine get_gauss_points(point, weight)
       !> Points: [2] or [3].
       real(wp), intent(out) :: point(:)
-      !> Weights: the same shape.
+      !> Their weights, of the same shape.
       real(wp), intent(out) :: weight(:)
 
       if (size(point) == 2) then
@@ -55,7 +55,7 @@ contains
       real(wp), intent(in) :: x
       !> Values: [2] or [3].
       real(wp), intent(out) :: value(:)
-      !> Derivatives: the same shape.
+      !> Their derivatives, of the same shape.
       real(wp), intent(out) :: slope(:)
 
       if (size(value) == 2) then

@@ -17,9 +17,8 @@ module thud_rubber
 
    public :: add_branch_stress, add_viscous_stress, get_elastic_stress, get_inverse_cube_root, get_volume_ratios
 
-   !> Range in which the polynomial starts the iteration for the cube root well enough: two iterations
-   !> give all digits.
-   real(wp), parameter :: start_from = 0.4_wp, start_to = 2.5_wp
+   !> Ranges, from 1 and from their middle, in which one iteration and two give all digits of the cube root.
+   real(wp), parameter :: near = 0.2_wp, middle = 1.45_wp, far = 1.05_wp
 
    !> Steps over the relaxation time beyond which a branch has lost its memory.
    real(wp), parameter :: max_steps_over_time = 100.0_wp
@@ -59,22 +58,37 @@ contains
       real(wp), intent(in) :: x(n)
       !> Their roots: [n].
       real(wp), intent(out) :: root(n)
-      real(wp) :: rest
+      real(wp) :: rest, n_not_near, n_not_far
       integer :: j, iteration
 
-      if (minval(x) < start_from .or. maxval(x) > start_to) then
-         root = x**(-1.0_wp/3.0_wp)
-         return
-      end if
-      ! Least squares over the range, off by 4 % at most; each iteration raises the error to its fourth power.
-      !$omp simd private(rest)
+      ! As sums: gfortran does not vectorise minimum and maximum.
+      n_not_near = 0.0_wp
+      n_not_far = 0.0_wp
+      !$omp simd reduction(+:n_not_near, n_not_far)
       do j = 1, n
-         root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
-         do iteration = 1, 2
+         n_not_near = n_not_near + merge(0.0_wp, 1.0_wp, abs(x(j) - 1) <= near)
+         n_not_far = n_not_far + merge(0.0_wp, 1.0_wp, abs(x(j) - middle) <= far)
+      end do
+      ! Polynomials of least error, 3e-5 and 4 %; each iteration raises it to its fourth power.
+      if (.not. n_not_near > 0.0_wp) then
+         !$omp simd private(rest)
+         do j = 1, n
+            root(j) = 1.74098956_wp + x(j)*(-1.32838497_wp + x(j)*(0.76697019_wp - x(j)*0.17960475_wp))
             rest = 1 - x(j)*root(j)**3
             root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
          end do
-      end do
+      else if (.not. n_not_far > 0.0_wp) then
+         !$omp simd private(rest)
+         do j = 1, n
+            root(j) = 1.53872574_wp + x(j)*(-0.64308593_wp + x(j)*0.13116605_wp)
+            do iteration = 1, 2
+               rest = 1 - x(j)*root(j)**3
+               root(j) = root(j)*(1 + rest*(1/3.0_wp + rest*(2/9.0_wp + rest*(14/81.0_wp))))
+            end do
+         end do
+      else
+         root = x**(-1.0_wp/3.0_wp)
+      end if
    end subroutine get_inverse_cube_root
 
    !> First Piola-Kirchhoff stresses of the elastic solid.
@@ -243,7 +257,7 @@ contains
       !> Gets the energy of the branches added, J; gets the power dissipated added, W.
       real(wp), intent(inout) :: energy, power
       real(wp) :: shrink(n)
-      real(wp), dimension(n, n_symmetric) :: c, inverse, pull
+      real(wp), dimension(n, n_symmetric) :: c, pull
       real(wp), dimension(size(time)) :: ratio, part, effective
       real(wp) :: stored
       integer :: b, g
@@ -256,12 +270,11 @@ contains
          call get_isochoric(n, f(:, :, g), jacobian(:, g), shrink, c)
          pull = 0.0_wp
          do b = 1, size(time)
-            call get_unimodular_inverse(n, part(b), c, flow(:, :, g, b), inverse)
             stored = 0.0_wp
-            call add_spring_pull(n, effective(b), time(b), weight(:, g), c, inverse, pull, stored, power)
+            call take_branch_step(n, effective(b), time(b), ratio(b), part(b), keep, weight(:, g), c, flow(:, :, g, b), &
+               pull, stored, power)
             ! Of the mean stress: so work, energy and loss of a linear branch add up over the steps.
             energy = energy + stored*(1 + part(b))*(1 + exp(-ratio(b)))/2
-            if (keep) call let_flow(n, min(ratio(b), max_steps_over_time), c, inverse, flow(:, :, g, b))
          end do
          call add_pull(n, shrink, c, pull, f(:, :, g), cofactor(:, :, g), jacobian(:, g), stress(:, :, g))
       end do
@@ -308,105 +321,109 @@ contains
       end do
    end subroutine get_isochoric
 
-   !> Inverse of the flow within a step, of determinant 1.
-   pure subroutine get_unimodular_inverse(n, part, c, flow, inverse)
+   !> Adds the pull of one Maxwell branch at one Gauss point, its energy and its loss, and takes its flow to the end of
+   !> the step.
+   pure subroutine take_branch_step(n, modulus, time, ratio, part, keep, weight, c, flow, pull, energy, power)
       !> Number of elements.
       integer, intent(in) :: n
-      !> Weight of the deformation beside the flow.
+      !> Shear modulus, Pa; relaxation time, s; length of the step over it.
+      real(wp), intent(in) :: modulus, time, ratio
+      !> Weight of the deformation beside the flow, for the flow within the step.
       real(wp), intent(in) :: part
-      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
-      real(wp), intent(in) :: c(n, n_symmetric)
-      !> Flow Cv at the beginning of the step: [n, symmetric].
-      real(wp), intent(in) :: flow(n, n_symmetric)
-      !> The inverse: [n, symmetric].
-      real(wp), intent(out) :: inverse(n, n_symmetric)
-      real(wp) :: determinant(n), root(n), tensor(n, n_symmetric)
-      real(wp) :: scale
-      integer :: j
-
-      tensor = flow + part*c
-      determinant = (tensor(:, 1)*tensor(:, 2) - tensor(:, 4)**2)*tensor(:, 3)
-      call get_inverse_cube_root(n, determinant, root)
-      ! Adjugate over determinant, with the norm of the tensor removed.
-      !$omp simd private(scale)
-      do j = 1, n
-         scale = 1/(root(j)*determinant(j))
-         inverse(j, 1) = scale*tensor(j, 2)*tensor(j, 3)
-         inverse(j, 2) = scale*tensor(j, 1)*tensor(j, 3)
-         inverse(j, 3) = scale*(tensor(j, 1)*tensor(j, 2) - tensor(j, 4)**2)
-         inverse(j, 4) = -scale*tensor(j, 4)*tensor(j, 3)
-      end do
-   end subroutine get_unimodular_inverse
-
-   !> Adds the pull of one Maxwell branch at one Gauss point, its energy and its loss.
-   pure subroutine add_spring_pull(n, modulus, time, weight, c, inverse, pull, energy, power)
-      !> Number of elements.
-      integer, intent(in) :: n
-      !> Shear modulus, Pa; relaxation time, s.
-      real(wp), intent(in) :: modulus, time
+      !> The flow is taken to the end of the step; otherwise it stays.
+      logical, intent(in) :: keep
       !> Volumes of the points, undeformed, m3: [n].
       real(wp), intent(in) :: weight(n)
       !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Inverse of the flow Cv: [n, symmetric].
-      real(wp), intent(in) :: inverse(n, n_symmetric)
-      !> Gets modulus times inverse added, Pa: [n, symmetric].
+      !> Flow Cv: [n, symmetric].
+      real(wp), intent(inout) :: flow(n, n_symmetric)
+      !> Gets the modulus times the inverse of the flow within the step added, Pa: [n, symmetric].
       real(wp), intent(inout) :: pull(n, n_symmetric)
       !> Gets the energy added, J; gets the power dissipated added, W.
       real(wp), intent(inout) :: energy, power
-      real(wp) :: trace, square
+      real(wp) :: determinant(n), root(n), share(n), trace(n), tensor(n, n_symmetric)
+      real(wp) :: scale, square, i1, i2, i3, i4
       integer :: j
 
-      !$omp simd private(trace, square) reduction(+:energy, power)
+      share = part
+      call mix(n, part, share, c, flow, tensor, determinant)
+      call get_inverse_cube_root(n, determinant, root)
+      !$omp simd private(scale, square, i1, i2, i3, i4) reduction(+:energy, power)
       do j = 1, n
-         associate (i1 => inverse(j, 1), i2 => inverse(j, 2), i3 => inverse(j, 3), i4 => inverse(j, 4))
-            trace = c(j, 1)*i1 + c(j, 2)*i2 + c(j, 3)*i3 + 2*c(j, 4)*i4
-            square = (c(j, 1)*i1 + c(j, 4)*i4)**2 + (c(j, 2)*i2 + c(j, 4)*i4)**2 + (c(j, 3)*i3)**2 &
-               + 2*(c(j, 1)*i4 + c(j, 4)*i2)*(c(j, 4)*i1 + c(j, 2)*i4)
-            pull(j, 1) = pull(j, 1) + modulus*i1
-            pull(j, 2) = pull(j, 2) + modulus*i2
-            pull(j, 3) = pull(j, 3) + modulus*i3
-            pull(j, 4) = pull(j, 4) + modulus*i4
-            energy = energy + weight(j)*modulus/2*(trace - 3)
-            power = power + weight(j)*modulus/(2*time)*(square - trace**2/3)
-         end associate
+         ! The inverse: adjugate over determinant, with the norm of the tensor removed.
+         scale = root(j)**2
+         i1 = scale*tensor(j, 2)*tensor(j, 3)
+         i2 = scale*tensor(j, 1)*tensor(j, 3)
+         i3 = scale*(tensor(j, 1)*tensor(j, 2) - tensor(j, 4)**2)
+         i4 = -scale*tensor(j, 4)*tensor(j, 3)
+         trace(j) = c(j, 1)*i1 + c(j, 2)*i2 + c(j, 3)*i3 + 2*c(j, 4)*i4
+         square = (c(j, 1)*i1 + c(j, 4)*i4)**2 + (c(j, 2)*i2 + c(j, 4)*i4)**2 + (c(j, 3)*i3)**2 &
+            + 2*(c(j, 1)*i4 + c(j, 4)*i2)*(c(j, 4)*i1 + c(j, 2)*i4)
+         pull(j, 1) = pull(j, 1) + modulus*i1
+         pull(j, 2) = pull(j, 2) + modulus*i2
+         pull(j, 3) = pull(j, 3) + modulus*i3
+         pull(j, 4) = pull(j, 4) + modulus*i4
+         energy = energy + weight(j)*modulus/2*(trace(j) - 3)
+         power = power + weight(j)*modulus/(2*time)*(square - trace(j)**2/3)
       end do
-   end subroutine add_spring_pull
+      if (keep) call let_flow(n, min(ratio, max_steps_over_time), c, trace, flow)
+   end subroutine take_branch_step
 
    !> Takes the flow of one Maxwell branch at one Gauss point to the end of a step.
-   pure subroutine let_flow(n, ratio, c, inverse, flow)
+   pure subroutine let_flow(n, ratio, c, trace, flow)
       !> Number of elements.
       integer, intent(in) :: n
       !> Length of the step over the relaxation time.
       real(wp), intent(in) :: ratio
       !> Isochoric right Cauchy-Green tensors: [n, symmetric].
       real(wp), intent(in) :: c(n, n_symmetric)
-      !> Inverse of the flow Cv within the step: [n, symmetric].
-      real(wp), intent(in) :: inverse(n, n_symmetric)
+      !> Traces of their products with the inverse of the flow Cv within the step: [n].
+      real(wp), intent(in) :: trace(n)
       !> Flow Cv: [n, symmetric].
       real(wp), intent(inout) :: flow(n, n_symmetric)
-      real(wp) :: determinant(n), root(n)
-      real(wp) :: growth, excess
+      real(wp) :: determinant(n), root(n), share(n), mixed(n, n_symmetric)
+      real(wp) :: growth
       integer :: j
 
       growth = exp(ratio) - 1
-      !$omp simd private(excess)
-      do j = 1, n
-         ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, counts too, in the second order of the step.
-         excess = (c(j, 1)*inverse(j, 1) + c(j, 2)*inverse(j, 2) + c(j, 3)*inverse(j, 3) &
-            + 2*c(j, 4)*inverse(j, 4))/3 - 1
-         excess = growth + excess*ratio**2/2
-         flow(j, 1) = flow(j, 1) + excess*c(j, 1)
-         flow(j, 2) = flow(j, 2) + excess*c(j, 2)
-         flow(j, 3) = flow(j, 3) + excess*c(j, 3)
-         flow(j, 4) = flow(j, 4) + excess*c(j, 4)
-         determinant(j) = (flow(j, 1)*flow(j, 2) - flow(j, 4)**2)*flow(j, 3)
-      end do
+      ! At large strain the rate of the norm, tr(Cbar Cv^-1)/3 - 1, counts too, in the second order of the step.
+      share = growth + (trace/3 - 1)*ratio**2/2
+      call mix(n, growth, share, c, flow, mixed, determinant)
       call get_inverse_cube_root(n, determinant, root)
       do j = 1, n_symmetric
-         flow(:, j) = flow(:, j)*root
+         flow(:, j) = mixed(:, j)*root
       end do
    end subroutine let_flow
+
+   !> Mixtures of flow and deformation at one Gauss point, and their determinants, which are near 1.
+   pure subroutine mix(n, usual_share, share, c, flow, tensor, determinant)
+      !> Number of elements.
+      integer, intent(in) :: n
+      !> Weight of the deformation beside the flow by which the norm is taken off.
+      real(wp), intent(in) :: usual_share
+      !> Weights of the deformation: [n].
+      real(wp), intent(in) :: share(n)
+      !> Isochoric right Cauchy-Green tensors: [n, symmetric].
+      real(wp), intent(in) :: c(n, n_symmetric)
+      !> Flow Cv: [n, symmetric].
+      real(wp), intent(in) :: flow(n, n_symmetric)
+      !> The mixtures: [n, symmetric].
+      real(wp), intent(out) :: tensor(n, n_symmetric)
+      !> Their determinants: [n].
+      real(wp), intent(out) :: determinant(n)
+      real(wp) :: scale
+      integer :: i, j
+
+      scale = 1/(1 + usual_share)
+      !$omp simd
+      do j = 1, n
+         do i = 1, n_symmetric
+            tensor(j, i) = scale*(flow(j, i) + share(j)*c(j, i))
+         end do
+         determinant(j) = (tensor(j, 1)*tensor(j, 2) - tensor(j, 4)**2)*tensor(j, 3)
+      end do
+   end subroutine mix
 
    !> Adds the stresses of all branches at one Gauss point.
    pure subroutine add_pull(n, shrink, c, pull, f, cofactor, jacobian, stress)

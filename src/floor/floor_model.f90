@@ -1,27 +1,38 @@
 !> The abstract floor: options from a namelist group, what a source feels of it, and the plate that radiates into the
 !> room below.
 !>
-!> A floor is a module `thud_<name>` with a type `<name>_type` that extends this one; the list `floor_models` in
-!> src/CMakeLists.txt makes it known. Its options belong to the group of its name.
+!> A floor `<name>` is a module `thud_<name>_floor` with a type `<name>_floor_type` that extends this one (a name that
+!> ends with `_floor` gets no second one); the list `floor_models` in src/CMakeLists.txt makes it known. Its options belong
+!> to the group of its name.
 module thud_floor_model
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type
+   use thud_field, only: field_type, list_type
    use thud_kinds, only: wp
+   use thud_new_field, only: list_field
    use thud_plate, only: plate_type
    use thud_receiver, only: receiver_type
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: floor_model_type
+   public :: floor_model_type, reason_length
+
+   !> Length of a reason.
+   integer, parameter :: reason_length = 112
 
    !> A floor with its options as components.
    type, abstract :: floor_model_type
+      !> Places of further points whose velocity is wanted, of floors with sides, m.
+      type(list_type) :: point_x, point_y
    contains
+      procedure, pass(options) :: get_point_fields
+      procedure, pass(options) :: check_points
       procedure(get_fields), deferred, pass(options) :: get_fields
       procedure(get_receiver), deferred, pass(options) :: get_receiver
       procedure, pass(options) :: check
       procedure, pass(options) :: get_transfer
       procedure, pass(options) :: get_radiator
+      procedure, pass(options) :: get_validity
    end type floor_model_type
 
    abstract interface
@@ -48,6 +59,36 @@ module thud_floor_model
    end interface
 
 contains
+
+   !> Keys of the points, which floors with sides add to their own.
+   function get_point_fields(options) result(fields)
+      class(floor_model_type), intent(in), target :: options
+      !> The keys: [2].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         list_field('point_x', options%point_x, 'm', 'places of further points along the length', '[0, 1000]'), &
+         list_field('point_y', options%point_y, 'm', 'their places along the width', '[0, 1000]')]
+   end function get_point_fields
+
+   !> Refuses points that are not there.
+   subroutine check_points(options, error)
+      class(floor_model_type), intent(in) :: options
+      !> Names the point.
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: transfer
+      integer :: i
+
+      if (options%point_x%count /= options%point_y%count) then
+         error = input_error('&floor: point_x has '//to_text(options%point_x%count)//' values and point_y ' &
+            //to_text(options%point_y%count)//'; allowed: as many of both')
+         return
+      end if
+      do i = 1, options%point_x%count
+         call options%get_transfer(options%point_x%values(i), options%point_y%values(i), transfer, error)
+         if (allocated(error)) return
+      end do
+   end subroutine check_points
 
    !> Refuses options that do not fit each other; by default all fit.
    subroutine check(options, error)
@@ -85,5 +126,18 @@ contains
       conductance = 0.0_wp
       error = input_error('&floor: name: this floor has no plate that radiates into a room; allowed: one that has')
    end subroutine get_radiator
+
+   !> Band in which the floor is what it claims to be; by default at all frequencies.
+   subroutine get_validity(options, lowest, highest, reason)
+      class(floor_model_type), intent(in) :: options
+      !> Ends of the band, Hz.
+      real(wp), intent(out) :: lowest, highest
+      !> What ends it, as the end of a sentence.
+      character(len=reason_length), intent(out) :: reason
+
+      lowest = 0.0_wp
+      highest = huge(highest)
+      reason = ''
+   end subroutine get_validity
 
 end module thud_floor_model

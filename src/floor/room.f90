@@ -1,24 +1,31 @@
 !> Level of an impact in the room below a floor, by transient statistical energy analysis in thirds: the force gives
-!> energy to the floor, the floor radiates into the room, both decay, and the Fast detector shows its maximum.
+!> energy to the floor, the floor radiates into the room, all of them decay, and the Fast detector shows its maximum.
 module thud_room
    use thud_band, only: band_type
+   use thud_ceiling, only: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
    use thud_constants, only: pi
+   use thud_energy_flow, only: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type, list_type
+   use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, real_field
-   use thud_plate, only: air_type, get_critical_frequency, get_mode_density, get_radiation_factor, get_resistance, &
-      get_surface_mass, get_total_loss, plate_type
-   use thud_rating, only: find_rated_bands, get_a_weighted_level
+   use thud_plate, only: air_type, get_critical_frequency, get_mode_density, get_radiation_factor, get_surface_mass, &
+      get_total_loss, plate_type
+   use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level
+   use thud_response_spread, only: get_band_variance, get_level_spread
    use thud_text, only: to_text
-   use thud_transient_energy, only: get_fast_maximum
+   use thud_transient_energy, only: get_fast_history, get_fast_maximum
    implicit none (type, external)
    private
 
-   public :: check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
+   public :: check_below, check_room, few_modes, get_room_bands, get_room_fields, get_room_level, room_level_type, room_type
 
-   !> Set of bands of a prediction.
-   character(len=*), parameter :: room_set = 'third'
+   !> Sets of bands of a prediction.
+   character(len=*), parameter :: third_set = 'third', octave_set = 'octave'
+
+   !> Thirds of an octave.
+   integer, parameter :: n_third = 3
 
    !> Reference of sound pressure, Pa.
    real(wp), parameter :: reference_pressure = 2.0e-5_wp
@@ -28,6 +35,9 @@ module thud_room
 
    !> Modes of a third below which its statistical answer is doubtful.
    real(wp), parameter :: few_modes = 5.0_wp
+
+   !> Step of a time history, s: the detector moves by 4 % of its time constant.
+   real(wp), parameter :: history_step = 5.0e-3_wp
 
    !> The room.
    type :: room_type
@@ -39,12 +49,20 @@ module thud_room
       type(list_type) :: reverberation_times
       !> Its air.
       type(air_type) :: air
+      !> Flanking walls.
+      type(walls_type) :: walls
+      !> Suspended ceiling.
+      type(ceiling_type) :: ceiling
    end type room_type
 
    !> A prediction, by thirds.
    type :: room_level_type
       !> The thirds: [n_band].
       type(band_type), allocatable :: bands(:)
+      !> Power that a force of unit mean square gives to the floor, m/(N s): [n_band].
+      real(wp), allocatable :: conductance(:)
+      !> Mass of the radiating plate over its area, kg/m2.
+      real(wp) :: surface_mass = 0.0_wp
       !> Energy that the impact gives to the floor, J: [n_band].
       real(wp), allocatable :: energy(:)
       !> Radiation factor and total loss factor of the floor: [n_band].
@@ -55,9 +73,24 @@ module thud_room
       real(wp), allocatable :: floor_modes(:), room_modes(:)
       !> Maximum Fast level in the room, dB re 20 uPa, and its time after the impact, s: [n_band].
       real(wp), allocatable :: level(:), time(:)
+      !> Expected standard deviation of that level for one position of the source and one of the microphone, dB: [n_band].
+      real(wp), allocatable :: spread(:)
       !> A-weighted maximum level, dB (ISO 717-2 annex D).
       real(wp) :: a_weighted = 0.0_wp
+      !> The same for octaves: bands, levels and times: [n_octave].
+      type(band_type), allocatable :: octaves(:)
+      real(wp), allocatable :: octave_level(:), octave_time(:)
+      !> Instants after the impact, s: [n_time], and what the Fast detector shows in each third then, dB: [n_time, n_band].
+      real(wp), allocatable :: history_time(:), history(:, :)
    end type room_level_type
+
+   !> The energies of one band, dE/dt = -A E, and what the detector sees of them.
+   type :: band_energies_type
+      !> A, 1/s: [n, n].
+      real(wp), allocatable :: loss(:, :)
+      !> Energies at the start, J, and the square of the sound pressure over energy, Pa2/J: [n].
+      real(wp), allocatable :: start(:), weight(:)
+   end type band_energies_type
 
 contains
 
@@ -65,7 +98,7 @@ contains
    function get_room_fields(room) result(fields)
       !> The room that the fields read and set.
       type(room_type), intent(in), target :: room
-      !> One field per component: [5].
+      !> One field per component: [16].
       type(field_type), allocatable :: fields(:)
 
       fields = [ &
@@ -74,7 +107,8 @@ contains
          list_field('reverberation_times', room%reverberation_times, 's', &
          'the same for each third from 50 to 630 Hz', '[0.05, 20]'), &
          real_field('air_density', room%air%density, 'kg/m3', 'density of the air', '[0.5, 2]'), &
-         real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]')]
+         real_field('sound_speed', room%air%sound_speed, 'm/s', 'speed of sound in the air', '[200, 500]'), &
+         get_wall_fields(room%walls), get_ceiling_fields(room%ceiling)]
    end function get_room_fields
 
    !> Refuses reverberation times of other bands.
@@ -90,6 +124,26 @@ contains
          //' values; allowed: '//to_text(size(bands))//', one for each third from 50 to 630 Hz')
    end subroutine check_room
 
+   !> Refuses walls and a ceiling that a floor cannot have below it.
+   subroutine check_below(plate, room, error)
+      !> The plate that radiates.
+      type(plate_type), intent(in) :: plate
+      type(room_type), intent(in) :: room
+      !> Names the lengths of the walls, or the depth of the air above the ceiling.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: walls, height
+
+      walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
+      height = room%volume/(plate%length*plate%width)
+      if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
+         error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the floor; ' &
+            //'allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
+      else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
+         error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than volume over area of ' &
+            //'the floor; allowed: up to '//to_text(height)//' m')
+      end if
+   end subroutine check_below
+
    !> Thirds of a prediction: those of the rating.
    subroutine get_room_bands(bands, error)
       !> The thirds: [n_band].
@@ -97,52 +151,174 @@ contains
       !> Never.
       type(error_type), allocatable, intent(out) :: error
 
-      call find_rated_bands(room_set, bands, error)
+      call find_rated_bands(third_set, bands, error)
    end subroutine get_room_bands
 
    !> Predicts the level in the room.
    !>
-   !> An infinite plate takes E = integral F**2 dt/Z per band, the mean over positions of a finite one. The energy is
-   !> given at once: a contact of 20 ms is short against the detector. The energies obey (physics of subsystems)
-   !> E1' = -a1 E1 + a21 E2, E2' = a12 E1 - (a2 + a21) E2 with a1 = omega eta, a12 = rho0 c0 sigma/m'',
-   !> a21 = a12 n1/n2 by reciprocity, a2 = 6 ln 10/T.
-   pure subroutine get_room_level(plate, room, bands, force_level, prediction)
+   !> The floor takes E = integral 2 |F|**2 Re Y df per band, the mean over positions. The energy is given at once: a
+   !> contact of 20 ms is short against the detector.
+   subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
+      !> The plate that radiates.
       type(plate_type), intent(in) :: plate
+      !> Real part of the mobility of the floor, the mean over positions, m/(N s): [n_band].
+      real(wp), intent(in) :: conductance(:)
       type(room_type), intent(in) :: room
       !> Thirds from `get_room_bands`: [n_band].
       type(band_type), intent(in) :: bands(:)
       !> Force exposure levels of the force on the floor, dB: [n_band].
       real(wp), intent(in) :: force_level(:)
       type(room_level_type), intent(out) :: prediction
-      real(wp) :: loss(2, 2)
-      real(wp) :: critical, radiated, back, maximum, flow
-      real(wp) :: width(size(bands))
+      type(band_energies_type) :: energies(size(bands))
+      real(wp), dimension(size(bands)) :: width, maximum, floor_decay
       integer :: i
 
-      critical = get_critical_frequency(plate, room%air)
       width = bands%upper - bands%lower
       prediction%bands = bands
-      prediction%energy = 10**(force_level/10)/get_resistance(plate)
-      prediction%radiation_factor = get_radiation_factor(bands%centre, critical, plate%length, plate%width, &
-         room%air%sound_speed)
+      prediction%conductance = conductance
+      prediction%surface_mass = get_surface_mass(plate)
+      prediction%energy = 10**(force_level/10)*conductance
+      prediction%radiation_factor = get_radiation_factor(bands%centre, get_critical_frequency(plate, room%air), &
+         plate%length, plate%width, room%air%sound_speed)
       prediction%loss_factor = get_total_loss(plate, room%air, bands%centre)
-      allocate (prediction%reverberation_time(size(bands)), source=room%reverberation_time)
-      if (room%reverberation_times%count > 0) prediction%reverberation_time = room%reverberation_times%values(:size(bands))
+      prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
-      prediction%room_modes = 4*pi*room%volume*bands%centre**2/room%air%sound_speed**3*width
-      allocate (prediction%level(size(bands)), prediction%time(size(bands)))
-      associate (rho_c => room%air%density*room%air%sound_speed)
-         do i = 1, size(bands)
-            radiated = rho_c*prediction%radiation_factor(i)/get_surface_mass(plate)
-            back = radiated*prediction%floor_modes(i)/prediction%room_modes(i)
-            loss(:, 1) = [2*pi*bands(i)%centre*prediction%loss_factor(i), -radiated]
-            loss(:, 2) = [-back, decay_of_60_db/prediction%reverberation_time(i) + back]
-            flow = rho_c*room%air%sound_speed/room%volume
-            call get_fast_maximum(loss, [prediction%energy(i), 0.0_wp], [0.0_wp, flow], maximum, prediction%time(i))
-            prediction%level(i) = 10*log10(maximum/reference_pressure**2)
-         end do
-      end associate
-      prediction%a_weighted = get_a_weighted_level(room_set, prediction%level)
+      prediction%room_modes = get_room_mode_density(room, bands%centre)*width
+      allocate (prediction%level(size(bands)), prediction%time(size(bands)), prediction%spread(size(bands)))
+      floor_decay = 2*pi*bands%centre*prediction%loss_factor
+      do i = 1, size(bands)
+         energies(i) = get_band_energies(plate, room, prediction, i)
+         call get_fast_maximum(energies(i)%loss, energies(i)%start, energies(i)%weight, maximum(i), prediction%time(i))
+         prediction%spread(i) = get_level_spread([ &
+            get_band_variance(2, get_mode_density(plate), floor_decay(i), width(i)), &
+            get_band_variance(3, get_room_mode_density(room, bands(i)%centre), &
+            decay_of_60_db/prediction%reverberation_time(i), width(i))])
+      end do
+      prediction%level = 10*log10(maximum/reference_pressure**2)
+      prediction%a_weighted = get_a_weighted_level(third_set, prediction%level)
+      call add_octaves(energies, prediction)
+      call add_history(energies, prediction)
    end subroutine get_room_level
+
+   !> Levels of the octaves: the detector is linear in the energies, those of an octave are the sums of its thirds', and
+   !> the maximum of the sum is at most the sum of the maxima.
+   subroutine add_octaves(energies, prediction)
+      !> Energies of the thirds, three for each octave: [n_band].
+      type(band_energies_type), intent(in) :: energies(:)
+      type(room_level_type), intent(inout) :: prediction
+      type(error_type), allocatable :: error
+      real(wp), allocatable :: loss(:, :), start(:), weight(:)
+      real(wp) :: maximum
+      integer :: i, j, n, at
+
+      call find_rated_bands(octave_set, prediction%octaves, error)
+      n = size(energies(1)%start)
+      allocate (prediction%octave_level(size(prediction%octaves)), prediction%octave_time(size(prediction%octaves)))
+      allocate (start(n_third*n), weight(n_third*n))
+      do i = 1, size(prediction%octaves)
+         allocate (loss(n_third*n, n_third*n), source=0.0_wp)
+         do j = 1, n_third
+            at = (j - 1)*n
+            associate (third => energies(n_third*(i - 1) + j))
+               loss(at + 1:at + n, at + 1:at + n) = third%loss
+               start(at + 1:at + n) = third%start
+               weight(at + 1:at + n) = third%weight
+            end associate
+         end do
+         call get_fast_maximum(loss, start, weight, maximum, prediction%octave_time(i))
+         prediction%octave_level(i) = 10*log10(maximum/reference_pressure**2)
+         deallocate (loss)
+      end do
+   end subroutine add_octaves
+
+   !> Level that the Fast detector shows against time, until the slowest third lies about 30 dB below its maximum.
+   pure subroutine add_history(energies, prediction)
+      !> Energies of the thirds: [n_band].
+      type(band_energies_type), intent(in) :: energies(:)
+      type(room_level_type), intent(inout) :: prediction
+      real(wp) :: duration
+      integer :: i, n
+
+      ! Half of the slower of both decays, that of the room and that of the detector.
+      duration = maxval(prediction%time) + max(maxval(prediction%reverberation_time), fast_reverberation)/2
+      n = nint(duration/history_step)
+      prediction%history_time = [(i*history_step, i=1, n)]
+      allocate (prediction%history(n, size(energies)))
+      do i = 1, size(energies)
+         associate (third => energies(i))
+            prediction%history(:, i) = 10*log10(get_fast_history(third%loss, third%start, third%weight, history_step, n) &
+               /reference_pressure**2)
+         end associate
+      end do
+   end subroutine add_history
+
+   !> Energies of a third: floor, walls, room and the air above a ceiling, with what flows between them.
+   !>
+   !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
+   !> loses 6 ln 10/T besides what goes back into them. Below a floor with a ceiling the air above this takes the sound,
+   !> which the ceiling lets through by its mass (Craik and Smith 2000), and the stiffness of that air drives the ceiling.
+   pure function get_band_energies(plate, room, prediction, band) result(energies)
+      type(plate_type), intent(in) :: plate
+      type(room_type), intent(in) :: room
+      !> Reverberation times and energies: [n_band].
+      type(room_level_type), intent(in) :: prediction
+      !> Number of the third.
+      integer, intent(in) :: band
+      type(band_energies_type) :: energies
+      type(energy_flow_type) :: flow
+      type(plate_type) :: plates(1 + room%walls%lengths%count)
+      real(wp), dimension(size(plates)) :: radiated
+      integer :: i, at_room, at_cavity
+
+      plates = [plate, get_walls(room%walls)]
+      at_room = size(plates) + 1
+      at_cavity = at_room + 1
+      associate (f => prediction%bands(band)%centre, third => prediction%bands(band), air => room%air, &
+         ceiling => room%ceiling, area => plate%length*plate%width)
+         radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_radiation_factor(f, &
+            get_critical_frequency(plates, air), plates%length, plates%width, air%sound_speed)
+         flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
+            2*pi*f*get_total_loss(plates, air, f), &
+            [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
+         if (ceiling%mass > 0.0_wp) then
+            call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
+            call connect(flow, 1, at_cavity, radiated(1))
+            call connect(flow, at_room, at_cavity, air%sound_speed*area*get_mass_law(ceiling, air, f)/(4*room%volume))
+            call connect(flow, 1, at_room, radiated(1)*get_forced_share(ceiling, air, third%lower, third%upper))
+         else
+            call connect(flow, 1, at_room, radiated(1))
+         end if
+         do i = 2, size(plates)
+            call connect(flow, i, at_room, radiated(i))
+            call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
+               get_vibration_reduction(room%walls, plate, plates(i)), f))
+         end do
+         energies%loss = get_loss(flow)
+         allocate (energies%start(size(flow%own)), energies%weight(size(flow%own)), source=0.0_wp)
+         energies%start(1) = prediction%energy(band)
+         energies%weight(at_room) = air%density*air%sound_speed**2/room%volume
+      end associate
+   end function get_band_energies
+
+   !> Modes of a room per hertz, s.
+   elemental function get_room_mode_density(room, frequency) result(density)
+      type(room_type), intent(in) :: room
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      real(wp) :: density
+
+      density = 4*pi*room%volume*frequency**2/room%air%sound_speed**3
+   end function get_room_mode_density
+
+   !> Reverberation times of the thirds, s.
+   pure function get_reverberation_times(room, n_band) result(times)
+      type(room_type), intent(in) :: room
+      integer, intent(in) :: n_band
+      !> The times: [n_band].
+      real(wp) :: times(n_band)
+
+      times = room%reverberation_time
+      if (room%reverberation_times%count > 0) times = room%reverberation_times%values(:n_band)
+   end function get_reverberation_times
 
 end module thud_room

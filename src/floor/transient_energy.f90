@@ -17,8 +17,9 @@ module thud_transient_energy
    !> Duration of the search, s. A later maximum would need energy that is held back for longer than any room's decay.
    real(wp), parameter :: search_time = 20.0_wp
 
-   !> Bisections of a step: they leave 1e-15 s.
-   integer, parameter :: n_bisection = 43
+   !> Error of the time of a maximum, s: that of the maximum goes with its square. Newton's steps; halvings alone would do.
+   real(wp), parameter :: time_error = 1.0e-13_wp
+   integer, parameter :: max_refine = 60
 
 contains
 
@@ -51,19 +52,22 @@ contains
       end do
    end subroutine get_fast_maximum
 
-   !> Detector on a weighted sum of energies at some instants.
-   pure function get_fast_history(loss, start, weight, time) result(detector)
+   !> Detector on a weighted sum of energies, at equal steps.
+   pure function get_fast_history(loss, start, weight, interval, n_step) result(detector)
       !> As in `get_fast_maximum`: [n, n], [n], [n].
       real(wp), intent(in) :: loss(:, :), start(:), weight(:)
-      !> Instants after the impact, s: [n_time].
-      real(wp), intent(in) :: time(:)
-      !> The detector's y: [n_time].
-      real(wp) :: detector(size(time))
-      real(wp) :: state(size(start) + 1)
+      !> Length of a step, s.
+      real(wp), intent(in) :: interval
+      integer, intent(in) :: n_step
+      !> The detector's y at the end of each step: [n_step].
+      real(wp) :: detector(n_step)
+      real(wp) :: step(size(start) + 1, size(start) + 1), state(size(start) + 1)
       integer :: i
 
-      do i = 1, size(time)
-         state = matmul(get_exponential(time(i)*get_detector(loss, weight)), [start, 0.0_wp])
+      step = get_exponential(interval*get_detector(loss, weight))
+      state = [start, 0.0_wp]
+      do i = 1, n_step
+         state = matmul(step, state)
          detector(i) = state(size(state))
       end do
    end function get_fast_history
@@ -106,20 +110,27 @@ contains
       real(wp), intent(in) :: begin
       !> Maximum so far and its time, s; replaced by a larger one.
       real(wp), intent(inout) :: maximum, time
-      real(wp) :: middle(size(state))
-      real(wp) :: low, high, offset
+      real(wp) :: matrix(size(state), size(state)), middle(size(state))
+      real(wp) :: low, high, offset, change
       integer :: i
 
+      matrix = get_detector(loss, weight)
       low = 0.0_wp
       high = search_step
-      do i = 1, n_bisection
-         offset = (low + high)/2
-         middle = matmul(get_exponential(offset*get_detector(loss, weight)), state)
-         if (get_rise(weight, middle) > 0.0_wp) then
+      offset = search_step/2
+      ! Newton's steps on the change, halved brackets where they lead astray.
+      do i = 1, max_refine
+         middle = matmul(get_exponential(offset*matrix), state)
+         change = get_rise(weight, middle)
+         if (change > 0.0_wp) then
             low = offset
          else
             high = offset
          end if
+         change = offset - change/get_rise(weight, matmul(matrix, middle))
+         if (abs(change - offset) < time_error) exit
+         offset = change
+         if (.not. (change > low .and. change < high)) offset = (low + high)/2
       end do
       if (middle(size(middle)) <= maximum) return
       maximum = middle(size(middle))

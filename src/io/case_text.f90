@@ -4,6 +4,7 @@ module thud_case_text
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: group_type, parse_groups
+   use thud_registry, only: floor_names
    use thud_suggestion, only: get_suggestion
    use thud_text, only: join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
@@ -36,14 +37,13 @@ contains
       if (allocated(error)) return
       allocate (fields, source=get_fields(case))
       case%has_modes = any([(groups(i)%name == 'modes', i=1, size(groups))])
+      case%has_floor = any([(groups(i)%name == 'floor', i=1, size(groups))])
       case%has_room = any([(groups(i)%name == 'room', i=1, size(groups))])
       case%has_compression = any([(groups(i)%name == 'compression', i=1, size(groups))])
       case%has_impact = any([(groups(i)%name == 'model', i=1, size(groups))]) .or. .not. case%has_modes
       call check_groups(groups, fields, error)
-      if (.not. allocated(error) .and. (case%has_room .neqv. any([(groups(i)%name == 'floor', i=1, size(groups))]))) then
-        error = input_error('&floor and &room: one of them is given without the other; allowed: both, for the level in ' &
-         //'the room below')
-      end if
+      if (case%has_room .and. .not. (case%has_floor .or. allocated(error))) error = input_error( &
+         '&room is given without &floor; allowed: both, for the level in the room below')
       do i = 1, merge(size(main_groups), 1, case%has_impact)
          if (any([(groups(j)%name == main_groups(i), j=1, size(groups))])) cycle
          case%left_out = trim(case%left_out)//' &'//main_groups(i)
@@ -54,7 +54,7 @@ contains
       end do
       if (allocated(error)) return
       ! What is done with an unchecked case hangs on these.
-      call check_fields(pack(fields, fields%group == 'model'), error)
+      call check_fields(pack(fields, fields%group == 'model' .or. fields%group == 'floor' .and. fields%key == 'name'), error)
       if (.not. allocated(error)) call check_name(case%name, error)
       if (.not. allocated(error)) call check_use(groups, case, error)
       if (present(unchecked)) then
@@ -77,9 +77,13 @@ contains
       allocate (fields, source=get_active_fields(case))
       do i = 1, size(groups)
          if (any(fields%group == groups(i)%name)) cycle
-         where = '&modes alone'
-         if (case%has_impact) where = '&model: name = '//quoted(case%model)
-         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing with '//where &
+         where = 'with &modes alone'
+         if (case%has_impact) where = 'with &model: name = '//quoted(case%model)
+         if (case%has_impact .and. any(floor_names == groups(i)%name)) then
+            where = 'without &floor'
+            if (case%has_floor) where = 'with &floor: name = '//quoted(case%floor)
+         end if
+         error = input_error('&'//groups(i)%name//' in line '//to_text(groups(i)%line)//' does nothing '//where &
             //'; allowed: '//join_quoted(distinct(fields%group)))
          return
       end do

@@ -2,7 +2,7 @@
 module thud_file
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
-   use thud_system, only: directory_exists
+   use thud_system, only: close_descriptor, directory_exists, get_file_size, open_descriptor, read_bytes
    use thud_text, only: to_text
    implicit none (type, external)
    private
@@ -28,37 +28,31 @@ contains
       character(len=:), allocatable, intent(out) :: text
       !> The file is missing, unreadable, empty or too large.
       type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message
-      integer :: status, unit
       integer(int64) :: bytes
-      logical :: there
+      integer :: descriptor, count, done
 
-      message = ''
-      inquire (file=path, exist=there)
-      if (path == '' .or. .not. there) then
-         error = input_error('there is no such file; allowed: the path of a namelist file')
-      else if (directory_exists(path)) then
+      ! The run-time library would drop the blanks at the end of a path.
+      call get_file_size(path, bytes)
+      if (directory_exists(path)) then
          error = input_error('this is a directory; allowed: the path of a namelist file')
-      else
-         inquire (file=path, size=bytes)
-         if (bytes > max_input_size .or. bytes < 1) then
-            ! Pipes and devices have no size; opening one could block.
-            error = input_error('the file is '//trim(merge('empty or not a regular file', 'too large                  ', &
-               bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(max_input_size))//' bytes')
-            return
-         end if
-         open (newunit=unit, file=path, status='old', action='read', access='stream', form='unformatted', &
-            iostat=status, iomsg=message)
-         if (status /= 0) then
-            error = input_error('the file cannot be read ('//trim(message)//'); allowed: a readable namelist file')
-            return
-         end if
-         allocate (character(len=bytes) :: text)
-         read (unit, iostat=status, iomsg=message) text
-         if (status /= 0) error = input_error('the file cannot be read ('//trim(message) &
-            //'); allowed: a readable namelist file')
-         close (unit)
+      else if (bytes < 0) then
+         error = input_error('there is no such file; allowed: the path of a namelist file')
+      else if (bytes > max_input_size .or. bytes < 1) then
+         ! Pipes and devices have no size; opening one could block.
+         error = input_error('the file is '//trim(merge('empty or not a regular file', 'too large                  ', &
+            bytes < 1))//'; allowed: a namelist file of 1 to '//to_text(int(max_input_size))//' bytes')
       end if
+      if (allocated(error)) return
+      descriptor = open_descriptor(path)
+      allocate (character(len=bytes) :: text)
+      done = 0
+      do while (descriptor >= 0 .and. done < len(text))
+         call read_bytes(descriptor, text(done + 1:), count)
+         if (count <= 0) exit
+         done = done + count
+      end do
+      call close_descriptor(descriptor)
+      if (done < len(text)) error = input_error('the file cannot be read; allowed: a readable namelist file')
    end subroutine read_text_file
 
    !> Name of a file without directory and ending.

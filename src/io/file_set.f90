@@ -1,66 +1,99 @@
 !> Sets of files: which files of a directory belong together, and how another set replaces them.
 !>
-!> A manifest lists the files of the set; all others in the directory are the user's and stay. A workspace is a directory
-!> with the next set and its manifest.
+!> A manifest lists the files of the set, those that a run has written with the checksum of their content; all others in
+!> the directory are the user's and stay. A workspace is a directory with the next set and its manifest.
 module thud_file_set
+   use, intrinsic :: iso_fortran_env, only: int32
    use thud_error, only: error_type, input_error
-   use thud_system, only: exchange_directories, link_file, list_directory, name_length, remove_file, rename_file
+   use thud_interrupt, only: check_interrupt
+   use thud_system, only: close_descriptor, exchange_directories, get_system_message, link_file, list_directory, &
+      name_length, open_end, remove_file, rename_file, write_text
+   use thud_text, only: newline
    implicit none (type, external)
    private
 
-   public :: add_names, clear_workspace, manifest, read_names, replace_set
+   public :: add_names, clear_workspace, get_kept, is_workspace, read_names, replace_set
 
    !> Name of the manifest.
    character(len=*), parameter :: manifest = '.thud'
 
+   !> Before the name of a file that is set aside in the workspace.
+   character(len=*), parameter :: aside = manifest//'~'
+
+   !> Between a name and its checksum.
+   character(len=*), parameter :: tab = achar(9)
+
 contains
 
+   !> Whether the names in a directory are those of a workspace.
+   pure function is_workspace(names) result(yes)
+      !> The names: [n_name].
+      character(len=*), intent(in) :: names(:)
+      !> They are, or there are none.
+      logical :: yes
+
+      yes = size(names) == 0 .or. any(index(names, manifest) == 1)
+   end function is_workspace
+
+   !> Names of the files of a directory that stay beside the next set: figures of the same input.
+   subroutine get_kept(place, names, same, kept)
+      !> The directory, under its lock.
+      character(len=*), intent(in) :: place
+      !> Names of the next set: [n_file].
+      character(len=*), intent(in) :: names(:)
+      !> It is of the same input.
+      logical, intent(in) :: same
+      !> The names: [n_kept].
+      character(len=name_length), allocatable, intent(out) :: kept(:)
+      character(len=name_length), allocatable :: found(:), listed(:)
+      integer :: i
+
+      call read_names(place, listed)
+      call list_directory(place, found)
+      kept = pack(listed, [(same .and. any(found == listed(i)) .and. .not. any(names == listed(i)), i=1, size(listed))])
+   end subroutine get_kept
+
    !> Puts the set of a workspace in the place of the one before.
-   subroutine replace_set(workspace, place, names, same, exchangeable, error)
+   subroutine replace_set(workspace, place, names, kept, exchangeable, error)
       !> The workspace; its remaining files are to be cleared.
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
       character(len=*), intent(in) :: place
       !> Names of the files, the last of which says whose they are: [n_file].
       character(len=*), intent(in) :: names(:)
-      !> The one before is of the same input, which figures of it still show.
-      logical, intent(in) :: same
+      !> Names of files that stay beside them: [n_kept].
+      character(len=*), intent(in) :: kept(:)
       !> The two directories may be exchanged.
       logical, intent(in) :: exchangeable
-      !> A file cannot be written or moved.
+      !> A file cannot be written or moved; the directory is as it was.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: found(:), listed(:), kept(:)
+      character(len=name_length), allocatable :: listed(:), replaced(:)
       integer :: i
       logical :: done
 
       call read_names(place, listed)
-      call list_directory(place, found)
-      kept = pack(listed, [(same .and. any(found == listed(i)) .and. .not. any(names == listed(i)), i=1, size(listed))])
-      call add_names(workspace, kept, error)
-      if (allocated(error)) return
+      replaced = [character(len=name_length) :: names, pack(listed, [(.not. any(kept == listed(i)), i=1, size(listed))])]
       done = exchangeable
-      if (done) call exchange(workspace, place, found, [character(len=name_length) :: names, &
-         pack(listed, [(.not. any(kept == listed(i)), i=1, size(listed))])], names, done)
-      if (.not. done) call move_files(workspace, place, names, listed, same, error)
+      if (done) call exchange(workspace, place, replaced, names, done)
+      if (.not. done) call move_files(workspace, place, replaced, names, error)
    end subroutine replace_set
 
    !> Exchanges workspace and directory; nothing has changed where that is impossible.
-   subroutine exchange(workspace, place, found, replaced, names, done)
+   subroutine exchange(workspace, place, replaced, names, done)
       character(len=*), intent(in) :: workspace, place
-      !> Names in it: [n_found].
-      character(len=*), intent(in) :: found(:)
       !> Names of files that are not carried over: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
       !> Names of the new files: [n_file].
       character(len=*), intent(in) :: names(:)
       !> They are exchanged.
       logical, intent(out) :: done
-      character(len=name_length), allocatable :: left(:)
+      character(len=name_length), allocatable :: found(:), left(:)
       type(error_type), allocatable :: error
       logical :: changed
       integer :: i
 
       done = .true.
+      call list_directory(place, found)
       do i = 1, size(found)
          if (found(i) == manifest .or. any(replaced == found(i))) cycle
          call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
@@ -79,36 +112,47 @@ contains
       end do
    end subroutine exchange
 
-   !> Moves the files of the workspace into the directory, so that those of two inputs are never mixed.
-   subroutine move_files(workspace, place, names, listed, same, error)
+   !> Moves files one by one: those before are set aside in the workspace, so that two inputs are never mixed.
+   subroutine move_files(workspace, place, replaced, names, error)
       character(len=*), intent(in) :: workspace, place
-      !> Names of the files, the last of which says whose they are: [n_file].
+      !> Names that the files before may have: [n_replaced].
+      character(len=*), intent(in) :: replaced(:)
+      !> Names of the new files, the last of which says whose they are: [n_file].
       character(len=*), intent(in) :: names(:)
-      !> Names of the files before: [n_listed].
-      character(len=*), intent(in) :: listed(:)
-      !> They are of the same input.
-      logical, intent(in) :: same
-      !> A file cannot be moved.
+      !> A file cannot be moved; the directory is as it was.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: order(:)
-      integer :: i
+      character(len=name_length), allocatable :: found(:)
+      character(len=name_length) :: marker
+      character(len=:), allocatable :: from(:), to(:)
+      integer :: n, i
       logical :: done
 
+      marker = names(size(names))
+      call list_directory(place, found)
+      found = [pack(found, found == marker), pack(found, [(found(i) /= marker .and. any(replaced == found(i)), &
+         i=1, size(found))])]
       ! A writer killed from here on leaves files that are listed, but no marker.
       call add_names(place, names, error)
       if (allocated(error)) return
-      allocate (order, source=[character(len=name_length) :: names(size(names)), listed, names])
-      do i = 1, merge(0, size(order), same)
-         call remove_file(place//'/'//trim(order(i)))
+      n = size(found)
+      allocate (character(len=len(workspace) + name_length + 8) :: from(n + size(names)), to(n + size(names)))
+      do i = 1, n
+         from(i) = place//'/'//found(i)
+         to(i) = workspace//'/'//aside//found(i)
       end do
-      deallocate (order)
-      allocate (order, source=[character(len=name_length) :: names, manifest])
-      do i = 1, size(order)
-         call rename_file(workspace//'/'//trim(order(i)), place//'/'//trim(order(i)), done)
-         if (done) cycle
-         error = input_error('--output '//place//': '//trim(order(i))//' cannot be replaced; allowed: a directory ' &
-            //'that you may write to')
-         return
+      do i = 1, size(names)
+         from(n + i) = workspace//'/'//names(i)
+         to(n + i) = place//'/'//names(i)
+      end do
+      do i = 1, size(from)
+         call rename_file(trim(from(i)), trim(to(i)), done)
+         if (.not. done) exit
+      end do
+      if (done) call rename_file(workspace//'/'//manifest, place//'/'//manifest, done)
+      if (done) return
+      error = input_error('--output '//place//': files cannot be replaced; allowed: a directory that you may write to')
+      do i = i - 1, 1, -1
+         call rename_file(trim(to(i)), trim(from(i)), done)
       end do
    end subroutine move_files
 
@@ -124,10 +168,14 @@ contains
       call list_directory(workspace, found)
       do i = 1, size(found)
          if (found(i) == manifest) cycle
-         if (.not. any(listed == found(i))) call link_file(workspace//'/'//trim(found(i)), place//'/'//trim(found(i)), done)
+         if (.not. any([listed == found(i), index(found(i), aside) == 1])) then
+            call link_file(workspace//'/'//trim(found(i)), place//'/'//trim(found(i)), done)
+         end if
          call remove_file(workspace//'/'//trim(found(i)))
       end do
-      call remove_file(workspace//'/'//manifest)
+      ! The manifest tells the next writer what it may remove.
+      call list_directory(workspace, found)
+      if (all(found == manifest)) call remove_file(workspace//'/'//manifest)
    end subroutine clear_workspace
 
    !> Names in the manifest of a directory.
@@ -135,7 +183,7 @@ contains
       character(len=*), intent(in) :: path
       !> The names, none without a manifest: [n_name].
       character(len=name_length), allocatable, intent(out) :: names(:)
-      character(len=name_length) :: name
+      character(len=name_length + 16) :: line
       character(len=256) :: message
       integer :: unit, status, n
 
@@ -144,34 +192,46 @@ contains
       open (newunit=unit, file=path//'/'//manifest, status='old', action='read', iostat=status, iomsg=message)
       if (status == 0) then
          do
-            read (unit, '(a)', iostat=status, iomsg=message) name
+            read (unit, '(a)', iostat=status, iomsg=message) line
             if (status /= 0) exit
             if (n == size(names)) names = [names, names]
             n = n + 1
-            names(n) = name
+            names(n) = line(:index(line//tab, tab) - 1)
          end do
          close (unit)
       end if
       names = names(:n)
    end subroutine read_names
 
-   !> Adds names to the manifest of a directory.
-   subroutine add_names(path, names, error)
+   !> Adds names to the manifest of a directory; the last checksum of a name holds.
+   subroutine add_names(path, names, error, sums)
       character(len=*), intent(in) :: path
       !> The names: [n_name].
       character(len=*), intent(in) :: names(:)
       !> They cannot be written.
       type(error_type), allocatable, intent(out) :: error
-      character(len=256) :: message
-      integer :: unit, status, i
+      !> Checksums of the contents (default: not known): [n_name].
+      integer(int32), intent(in), optional :: sums(:)
+      character(len=:), allocatable :: text
+      character(len=8) :: digits
+      integer :: descriptor, status, closed, i
 
-      open (newunit=unit, file=path//'/'//manifest, position='append', action='write', iostat=status, iomsg=message)
+      text = ''
       do i = 1, size(names)
-         if (status == 0) write (unit, '(a)', iostat=status, iomsg=message) trim(names(i))
+         text = text//trim(names(i))
+         if (present(sums)) then
+            write (digits, '(z8.8)') sums(i)
+            text = text//tab//digits
+         end if
+         text = text//newline
       end do
-      if (status == 0) close (unit, iostat=status, iomsg=message)
-      if (status /= 0) error = input_error('--output '//path//': '//manifest//' cannot be written ('//trim(message) &
-         //'); allowed: a directory that you may write to, with space on its disk')
+      call open_end(path//'/'//manifest, descriptor, status)
+      if (status == 0) call write_text(descriptor, text, status)
+      call close_descriptor(descriptor, closed)
+      if (status == 0) status = closed
+      if (status < 0) call check_interrupt(error)
+      if (status > 0) error = input_error('--output '//path//': '//manifest//' cannot be written (' &
+         //get_system_message(status)//'); allowed: a directory that you may write to, with space on its disk')
    end subroutine add_names
 
 end module thud_file_set

@@ -17,6 +17,10 @@ module thud_mesh_files
    !> Files of an impact beside its snapshots.
    character(len=12), parameter :: motion_names(2) = [character(len=12) :: 'motion.pvd', 'pressure.csv']
 
+   !> Scalars of a snapshot; the last one on floors that move.
+   character(len=18), parameter :: motion_scalars(4) = [character(len=18) :: 'contact_pressure', 'contact_shear', &
+      'cavity_pressure', 'floor_displacement']
+
 contains
 
    !> Table and shapes of free modes.
@@ -58,36 +62,43 @@ contains
       integer, intent(in) :: extents(3)
       real(wp) :: bytes
 
-      ! Three vectors and three scalars a node; four corners, an offset and a type an element; in base 64.
+      ! Three vectors and up to four scalars a node; four corners, an offset and a type an element; in base 64.
       associate (n => real(extents, wp))
-         bytes = n(3)*(2000 + 4*(96*n(1)*n(2) + 41*(n(1) - 1)*(n(2) - 1))/3)
+         bytes = n(3)*(2000 + 4*(104*n(1)*n(2) + 41*(n(1) - 1)*(n(2) - 1))/3)
       end associate
    end function estimate_motion_bytes
 
    !> Snapshots, their list, and the pressures on the floor.
-   subroutine get_motion_files(motion, files)
+   subroutine get_motion_files(motion, prefix, files)
       type(motion_type), intent(in) :: motion
+      !> What the names of the files begin with.
+      character(len=*), intent(in) :: prefix
       !> The files: [n_frame + 2].
       type(text_file_type), intent(out) :: files(:)
-      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), stress(size(vector, 2), 3)
-      integer :: i, n_polar, n_radial
+      real(wp) :: vector(2, size(motion%start, 1)*size(motion%start, 2), 2), scalar(size(vector, 2), size(motion_scalars))
+      integer :: i, n_polar, n_radial, n_scalar
 
       n_polar = ubound(motion%start, 1)
       n_radial = ubound(motion%start, 2)
+      n_scalar = size(motion_scalars)
+      if (.not. any(abs(motion%floor_displacement(:motion%n_frame)) > 0.0_wp)) n_scalar = n_scalar - 1
       do i = 1, motion%n_frame
-         files(i)%name = get_frame_name(i)
+         files(i)%name = prefix//get_frame_name(i)
          vector(:, :, 1) = get_points(motion%position(:, :, 1, i) - motion%start(:, :, 1), &
             motion%position(:, :, 2, i) - motion%start(:, :, 2))
          vector(:, :, 2) = get_points(motion%velocity(:, :, 1, i), motion%velocity(:, :, 2, i))
-         stress = 0.0_wp
-         stress(size(stress, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
-         stress(size(stress, 1) - n_polar:, 2) = motion%contact_shear(:, i)
-         stress(:n_polar + 1, 3) = motion%cavity_pressure(i)
+         scalar = 0.0_wp
+         scalar(size(scalar, 1) - n_polar:, 1) = motion%contact_pressure(:, i)
+         scalar(size(scalar, 1) - n_polar:, 2) = motion%contact_shear(:, i)
+         scalar(:n_polar + 1, 3) = motion%cavity_pressure(i)
+         scalar(:, 4) = motion%floor_displacement(i)
          call get_vtu(get_points(motion%position(:, :, 1, i), motion%position(:, :, 2, i)), &
             get_cells(n_polar, n_radial, 1), quadrilateral, [character(len=12) :: 'displacement', 'velocity'], vector, &
-            [character(len=16) :: 'contact_pressure', 'contact_shear', 'cavity_pressure'], stress, files(i)%content)
+            motion_scalars(:n_scalar), scalar(:, :n_scalar), files(i)%content)
       end do
-      files(motion%n_frame + 1:)%name = motion_names
+      do i = 1, size(motion_names)
+         files(motion%n_frame + i)%name = prefix//trim(motion_names(i))
+      end do
       call get_pvd(files(:motion%n_frame)%name, motion%time(:motion%n_frame), files(motion%n_frame + 1)%content)
       call get_pressure_csv(motion, files(motion%n_frame + 2)%content)
    end subroutine get_motion_files

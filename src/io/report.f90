@@ -12,7 +12,8 @@ module thud_report
    implicit none (type, external)
    private
 
-   public :: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary, get_word
+   public :: get_channels_csv, get_compression_csv, get_fact_group, get_force_csv, get_levels_csv, get_scalar_lines
+   public :: get_summary, get_word, line
 
    !> Format of a row of numbers: every bit of them, 25 characters each with its comma.
    character(len=*), parameter :: csv_form = '(*(es24.16e3,:,","))'
@@ -20,13 +21,16 @@ module thud_report
 contains
 
    !> Force and motion against time, one line per sample, 17 digits.
-   function get_force_csv(history) result(text)
+   function get_force_csv(history, names, columns) result(text)
       type(force_history_type), intent(in) :: history
+      !> Names, with units, of further columns: [n_column].
+      character(len=*), intent(in), optional :: names(:)
+      !> The columns: [n_sample, n_column].
+      real(wp), intent(in), optional :: columns(:, :)
       !> Text of `force.csv`.
       character(len=:), allocatable :: text
-      character(len=:), allocatable :: header
-      character(len=25*(size(history%part, 2) + 5)) :: row, rest
-      real(wp) :: values(size(history%part, 2) + 4)
+      character(len=:), allocatable :: header, row, rest
+      real(wp), allocatable :: values(:)
       logical :: at_rest
       integer :: i, at
 
@@ -34,15 +38,26 @@ contains
       do i = 1, size(history%part_name)
          header = header//','//trim(history%part_name(i))//'_N'
       end do
-      header = header//',elastic_force_N,floor_force_N'//newline
+      header = header//',elastic_force_N,floor_force_N'
+      if (present(names)) then
+         do i = 1, size(names)
+            header = header//','//trim(names(i))
+         end do
+         allocate (values(size(history%part, 2) + 4 + size(names)))
+      else
+         allocate (values(size(history%part, 2) + 4))
+      end if
+      header = header//newline
+      allocate (character(len=25*(size(values) + 1)) :: row, rest)
       at_rest = .false.
       allocate (character(len=len(header) + size(history%part, 1)*len(row)) :: text)
       text(:len(header)) = header
       at = len(header)
       do i = 1, size(history%part, 1)
          write (row, csv_form) real(i - 1, wp)/history%sample_rate
-         values = [history%deflection(i), history%velocity(i), history%part(i, :), history%elastic_force(i), &
-            history%floor_force(i)]
+         values(:size(history%part, 2) + 4) = [history%deflection(i), history%velocity(i), history%part(i, :), &
+            history%elastic_force(i), history%floor_force(i)]
+         if (present(columns)) values(size(history%part, 2) + 5:) = columns(i, :)
          ! Formatting takes most of a run's time, and most rows are after the release.
          if (i == 1 .or. any(abs(values) > 0.0_wp) .or. .not. at_rest) write (rest, csv_form) values
          at_rest = .not. any(abs(values) > 0.0_wp)
@@ -139,16 +154,11 @@ contains
       character(len=*), intent(in) :: remark(:)
       !> Text of `summary.nml`.
       character(len=:), allocatable :: text
-      real(wp) :: scalars(size(scalar_fields))
-      integer :: i
 
-      scalars = get_scalars(history)
       text = '! thud '//version//': results of case '//trim(case%name)//', SI units, levels in dB re 1 N'//newline &
-         //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '')
-      do i = 1, size(scalars)
-         text = text//line(trim(scalar_fields(i)%name), to_text(scalars(i)), trim(scalar_fields(i)%unit))
-      end do
-      text = text//'/'//newline//newline//fact_group(history)//remark_group(remark)//'&verdict'//newline &
+         //newline//'&summary'//newline//line('case', quoted(case%name), '')//line('model', quoted(case%model), '') &
+         //get_scalar_lines(history)//'/'//newline//newline//get_fact_group('facts', history)//remark_group(remark) &
+         //'&verdict'//newline &
          //line('source', quoted(case%source), '') &
          //line('level_method', quoted(case%level_method), '') &
          //line('level_force', quoted(case%level_force), '') &
@@ -163,8 +173,24 @@ contains
       end associate
    end function get_summary
 
+   !> The numbers that describe an impact as lines of a namelist.
+   function get_scalar_lines(history) result(text)
+      type(force_history_type), intent(in) :: history
+      character(len=:), allocatable :: text
+      real(wp) :: scalars(size(scalar_fields))
+      integer :: i
+
+      scalars = get_scalars(history)
+      text = ''
+      do i = 1, size(scalars)
+         text = text//line(trim(scalar_fields(i)%name), to_text(scalars(i)), trim(scalar_fields(i)%unit))
+      end do
+   end function get_scalar_lines
+
    !> Numbers that the model chose or found as a namelist group.
-   function fact_group(history) result(text)
+   function get_fact_group(name, history) result(text)
+      !> Name of the group.
+      character(len=*), intent(in) :: name
       type(force_history_type), intent(in) :: history
       !> The group; empty where there are none.
       character(len=:), allocatable :: text
@@ -172,12 +198,12 @@ contains
 
       text = ''
       if (size(history%fact) == 0) return
-      text = '&facts'//newline
+      text = '&'//name//newline
       do i = 1, size(history%fact_name)
          text = text//line(trim(history%fact_name(i)), to_text(history%fact(i)), trim(history%fact_unit(i)))
       end do
       text = text//'/'//newline//newline
-   end function fact_group
+   end function get_fact_group
 
    !> Remarks as a namelist group.
    function remark_group(remark) result(text)

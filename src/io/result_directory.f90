@@ -5,11 +5,12 @@
 !> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
+   use, intrinsic :: iso_fortran_env, only: int32
    use thud_error, only: error_type, input_error
    use thud_file, only: read_text_file, text_file_type
-   use thud_file_set, only: add_names, clear_workspace, manifest, read_names, replace_set
+   use thud_file_set, only: add_names, clear_workspace, get_kept, is_workspace, read_names, replace_set
    use thud_interrupt, only: check_interrupt
-   use thud_system, only: can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
+   use thud_system, only: add_to_checksum, can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
       get_system_message, keep_interrupts, list_directory, lock_directory, name_length, pass_interrupts, remove_file, &
       rename_file, resolve_path, write_text
    use thud_text, only: newline
@@ -33,8 +34,12 @@ module thud_result_directory
       type(text_file_type) :: marker
       !> Names of all files of the set: [n_file].
       character(len=name_length), allocatable :: names(:)
+      !> Checksums of their contents: [n_file].
+      integer(int32), allocatable :: sums(:)
       !> Name of the file that is being written.
       character(len=name_length) :: name = ''
+      !> Checksum of what was written to it.
+      integer(int32) :: sum = 0_int32
       !> Descriptors of that file, and of the locks on workspace and directory; negative where there is none.
       integer :: file = -1, workspace_lock = -1, lock = -1
       !> The directory was missing and is made already.
@@ -97,6 +102,7 @@ contains
       directory%path = path
       directory%marker = marker
       directory%names = [character(len=name_length) :: names, marker%name]
+      allocate (directory%sums(size(directory%names)), source=0_int32)
       call take_workspace(directory, error)
       if (.not. allocated(error)) call lock_place(directory, owner, error)
       call close_descriptor(directory%lock)
@@ -132,7 +138,7 @@ contains
       if (directory%is_new .and. allocated(error)) call remove_file(directory%place)
       call close_descriptor(directory%lock)
       call close_descriptor(directory%workspace_lock)
-      call pass_interrupts()
+      call pass_interrupts(merge(0, 1, allocated(error)))
    end subroutine close_results
 
    !> Begins a file.
@@ -147,19 +153,21 @@ contains
       call end_file(directory, error)
       if (allocated(error)) return
       directory%name = name
+      directory%sum = 0_int32
       call create_file(directory%workspace//'/'//trim(name), directory%file, status)
       call require_written(directory, status, error)
    end subroutine begin_file
 
    !> Adds to the file that was begun last.
    subroutine add_text(directory, text, error)
-      type(result_directory_type), intent(in) :: directory
+      type(result_directory_type), intent(inout) :: directory
       character(len=*), intent(in) :: text
       !> What went wrong before, or now.
       type(error_type), allocatable, intent(inout) :: error
       integer :: status
 
       if (allocated(error)) return
+      call add_to_checksum(text, directory%sum)
       call write_text(directory%file, text, status)
       call require_written(directory, status, error)
    end subroutine add_text
@@ -172,6 +180,7 @@ contains
       integer :: status
 
       if (directory%file < 0) return
+      where (directory%names == directory%name) directory%sums = directory%sum
       call close_descriptor(directory%file, status)
       call require_written(directory, status, error)
    end subroutine end_file
@@ -251,6 +260,7 @@ contains
       integer :: slash, made
       logical :: done
 
+      call keep_interrupts()
       call resolve_path(directory%path, directory%place, done)
       if (done) then
          slash = index(directory%place, '/', back=.true.)
@@ -261,6 +271,8 @@ contains
             if (.not. done) call remove_file(directory%workspace)
             if (.not. done) call close_descriptor(directory%workspace_lock)
          end if
+         call check_interrupt(error)
+         if (allocated(error)) return
          if (directory%workspace_lock < 0) then
             directory%is_new = .not. directory_exists(directory%place)
             call lock_directory(directory%place, .true., made)
@@ -268,12 +280,12 @@ contains
             directory%workspace = directory%place//'/'//inner_workspace
             call lock_directory(directory%workspace, .true., directory%workspace_lock)
          end if
-         call keep_interrupts()
       end if
-      if (directory%workspace_lock < 0) error = making_error(directory%path)
+      call check_interrupt(error)
+      if (directory%workspace_lock < 0 .and. .not. allocated(error)) error = making_error(directory%path)
       if (allocated(error)) return
       call list_directory(directory%workspace, found)
-      if (size(found) == 0 .or. any(found == manifest)) return
+      if (is_workspace(found)) return
       error = input_error('--output '//directory%path//': '//directory%workspace//' is in the way; allowed: another ' &
          //'directory, or remove it first')
       call close_descriptor(directory%workspace_lock)
@@ -289,6 +301,7 @@ contains
 
       call lock_directory(directory%place, .false., directory%lock)
       call find_owner(directory%path, directory%marker, owner, error)
+      if (directory%lock < 0) call check_interrupt(error)
       if (allocated(error) .or. directory%lock >= 0) return
       if (directory_exists(directory%place)) error = making_error(directory%path)
    end subroutine lock_place
@@ -302,11 +315,16 @@ contains
       logical, intent(out) :: moved
       !> The directory belongs to something else by now, or its files cannot be replaced.
       type(error_type), allocatable, intent(out) :: error
+      character(len=name_length), allocatable :: kept(:)
       integer :: owner, status
 
       moved = .false.
       call lock_place(directory, owner, error)
       differs = owner == other_input
+      if (allocated(error)) return
+      call add_names(directory%workspace, directory%names, error, directory%sums)
+      call get_kept(directory%place, directory%names, owner == same_input, kept)
+      if (.not. allocated(error)) call add_names(directory%workspace, kept, error)
       if (allocated(error)) return
       call flush_directory(directory%workspace, status)
       call require_written(directory, status, error)
@@ -315,7 +333,7 @@ contains
          call rename_file(directory%workspace, directory%place, moved)
          if (.not. moved) error = making_error(directory%path)
       else
-         call replace_set(directory%workspace, directory%place, directory%names, owner == same_input, &
+         call replace_set(directory%workspace, directory%place, directory%names, kept, &
             directory%workspace /= directory%place//'/'//inner_workspace, error)
       end if
    end subroutine publish

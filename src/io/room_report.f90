@@ -2,15 +2,19 @@
 module thud_room_report
    use thud_band, only: get_band_name
    use thud_case, only: case_type
+   use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_plate, only: get_resistance
    use thud_rating, only: get_rounded
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
    private
 
-   public :: get_room_csv, get_room_table
+   public :: get_room_files, get_room_table, room_file_names
+
+   !> Files of a prediction.
+   character(len=*), parameter :: room_file_names(*) = [character(len=16) :: 'room_levels.csv', 'room_octaves.csv', &
+      'room_history.csv']
 
    !> Width of a column of the table.
    integer, parameter :: column = 13
@@ -21,53 +25,88 @@ module thud_room_report
 
 contains
 
-   !> Level and what it is made of, per third.
-   subroutine get_room_csv(prediction, text)
+   !> The files: levels and what they are made of per third, levels of octaves, what the detector shows against time.
+   subroutine get_room_files(prediction, files)
       type(room_level_type), intent(in) :: prediction
-      !> Text of `room_levels.csv`.
+      !> The files: [size(room_file_names)].
+      type(text_file_type), intent(out) :: files(:)
+      character(len=:), allocatable :: header
+      integer :: i
+
+      files%name = room_file_names
+      call get_table_csv('nominal_Hz,level_dB,time_of_maximum_s,spread_dB,energy_J,radiation_factor,loss_factor,' &
+         //'reverberation_time_s,floor_modes,room_modes', reshape([prediction%bands%nominal, prediction%level, &
+         prediction%time, prediction%spread, prediction%energy, prediction%radiation_factor, prediction%loss_factor, &
+         prediction%reverberation_time, prediction%floor_modes, prediction%room_modes], [size(prediction%level), 10]), &
+         files(1)%content)
+      call get_table_csv('nominal_Hz,level_dB,time_of_maximum_s', reshape([prediction%octaves%nominal, &
+         prediction%octave_level, prediction%octave_time], [size(prediction%octave_level), 3]), files(2)%content)
+      header = 'time_s'
+      do i = 1, size(prediction%bands)
+         header = header//',level_'//trim(get_band_name(prediction%bands(i)))//'_Hz_dB'
+      end do
+      call get_table_csv(header, reshape([prediction%history_time, prediction%history], &
+         [size(prediction%history_time), size(prediction%bands) + 1]), files(3)%content)
+   end subroutine get_room_files
+
+   !> Columns of numbers with titles.
+   subroutine get_table_csv(header, columns, text)
+      !> Titles of the columns.
+      character(len=*), intent(in) :: header
+      !> The columns: [n_row, n_column].
+      real(wp), intent(in) :: columns(:, :)
       character(len=:), allocatable, intent(out) :: text
       integer :: i, j
 
-      text = 'nominal_Hz,level_dB,time_of_maximum_s,energy_J,radiation_factor,loss_factor,reverberation_time_s,' &
-         //'floor_modes,room_modes'//newline
-      do i = 1, size(prediction%bands)
-         associate (numbers => [prediction%bands(i)%nominal, prediction%level(i), prediction%time(i), prediction%energy(i), &
-            prediction%radiation_factor(i), prediction%loss_factor(i), prediction%reverberation_time(i), &
-            prediction%floor_modes(i), prediction%room_modes(i)])
-            do j = 1, size(numbers)
-               if (j > 1) text = text//','
-               text = text//to_text(numbers(j))
-            end do
-         end associate
+      text = header//newline
+      do i = 1, size(columns, 1)
+         do j = 1, size(columns, 2)
+            if (j > 1) text = text//','
+            text = text//to_text(columns(i, j))
+         end do
          text = text//newline
       end do
-   end subroutine get_room_csv
+   end subroutine get_table_csv
 
    !> The levels for the screen; thirds of few modes are marked.
-   subroutine get_room_table(case, prediction, contact_time, text)
+   subroutine get_room_table(case, prediction, contact_time, coupled, text)
       type(case_type), intent(in) :: case
       type(room_level_type), intent(in) :: prediction
-      !> Contact time of the impact, s.
+      !> Contact time of the impact on a rigid floor, s.
       real(wp), intent(in) :: contact_time
+      !> The prediction is made of the force on the floor that moves, not of the blocked one.
+      logical, intent(in) :: coupled
       !> The table.
       character(len=:), allocatable, intent(out) :: text
       character(len=1) :: mark
+      real(wp) :: resistance
       integer :: i
 
-      text = '  '//padded('room below')//padded('L_i,Fmax')//padded('floor modes')//'room modes'//newline
+      text = '  '//padded('room below')//padded('L_i,Fmax')//padded('spread')//padded('floor modes') &
+         //'room modes'//newline
       do i = 1, size(prediction%bands)
          mark = merge('*', ' ', min(prediction%floor_modes(i), prediction%room_modes(i)) < few_modes)
          text = text//'  '//padded(get_band_name(prediction%bands(i))//' Hz') &
-            //padded(fixed(prediction%level(i), 1)//' dB '//mark)//padded(fixed(prediction%floor_modes(i), 1)) &
-            //fixed(prediction%room_modes(i), 1)//newline
+            //padded(fixed(prediction%level(i), 1)//' dB '//mark)//padded(fixed(prediction%spread(i), 1)//' dB') &
+            //padded(fixed(prediction%floor_modes(i), 1))//fixed(prediction%room_modes(i), 1)//newline
+      end do
+      text = text//newline//'  Octaves:'
+      do i = 1, size(prediction%octaves)
+         text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(prediction%octave_level(i), 1)//' dB'
       end do
       text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
-         //fixed(prediction%a_weighted, 2)//'), ISO 717-2 annex D: blocked force, statistical mean over positions.'//newline
-      text = text//'  Resistance of the floor '//fixed(get_resistance(case%floor)/1.0e3_wp, 1)//' kN s/m.'
+         //fixed(prediction%a_weighted, 2)//') of thirds, ISO 717-2 annex D: ' &
+         //trim(merge('contact force', 'blocked force', coupled))//', statistical mean over positions.'//newline
+      resistance = 1/maxval(prediction%conductance)
+      text = text//'  Room of '//fixed(case%room%volume, 1)//' m3, reverberation time ' &
+         //fixed(minval(prediction%reverberation_time), 2)
+      if (case%room%reverberation_times%count > 0) text = text//' to '//fixed(maxval(prediction%reverberation_time), 2)
+      text = text//' s.'//newline
+      text = text//'  Resistance of the floor '//fixed(resistance/1.0e3_wp, 1)//' kN s/m.'
       if (any(min(prediction%floor_modes, prediction%room_modes) < few_modes)) text = text//' *: fewer than ' &
-         //fixed(few_modes, 0)//' modes, where single rooms and positions differ by several dB.'
-      text = text//newline
-      if (contact_time*get_resistance(case%floor) < firm*case%ball%mass) text = text &
+         //fixed(few_modes, 0)//' modes, where the statistical mean is doubtful.'
+      text = text//newline//'  Spread: expected standard deviation of one position of source and microphone.'//newline
+      if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor gives way under the source, and the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
 

@@ -6,12 +6,15 @@ module thud_run
    use thud_constants, only: version
    use thud_error, only: error_type, input_error
    use thud_file, only: get_file_stem, read_text_file, text_file_type
+   use thud_floor_report, only: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
+   use thud_floor_result, only: get_floor_result
+   use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_mesh_files, only: estimate_motion_bytes, get_modes_files, get_motion_files, modes_names, &
       motion_names
    use thud_report, only: get_channels_csv, get_compression_csv, get_force_csv, get_levels_csv, get_summary
    use thud_result_directory, only: check_owner, write_results
-   use thud_room_report, only: get_room_csv, get_room_table
+   use thud_room_report, only: get_room_files, get_room_table, room_file_names
    use thud_system, only: get_free_bytes
    use thud_table, only: get_compression_table, get_defaults_line, get_modes_table, get_table
    use thud_text, only: fixed, newline
@@ -26,8 +29,9 @@ module thud_run
    !> File of models with channels.
    character(len=*), parameter :: channel_file = 'channels.csv'
 
-   !> File of cases with a room below.
-   character(len=*), parameter :: room_file = 'room_levels.csv'
+   !> Files of a floor that moves.
+   character(len=16), parameter :: floor_names(2) = [character(len=16) :: 'floor_force.csv', 'floor_levels.csv']
+
    !> File of a slow compression.
    character(len=*), parameter :: compression_file = 'compression.csv'
 
@@ -120,8 +124,15 @@ contains
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
-      if (case%has_room .and. .not. allocated(error)) call predict_room(case, results%history%floor_force, &
-         results%history%sample_rate, results%room, error)
+      if (allocated(results%on_floor) .and. .not. allocated(error)) call get_floor_result(case, results%history, &
+         results%on_floor, results%floor, error)
+      if (case%has_room .and. .not. allocated(error)) then
+         if (allocated(results%on_floor)) then
+            call predict_room(case, results%on_floor%floor_force, results%on_floor%sample_rate, results%room, error)
+         else
+            call predict_room(case, results%history%floor_force, results%history%sample_rate, results%room, error)
+         end if
+      end if
       if (allocated(error)) return
       call describe(case, results, files, outcome)
       call write_results(outcome%directory, input, files, differs, error)
@@ -142,7 +153,7 @@ contains
 
       if (.not. case%has_impact) return
       associate (model => case%models(get_model_number(case))%model)
-         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%sampling))
+         wanted = estimate_motion_bytes(model%get_snapshot_shape(case%sampling))*merge(2, 1, case%has_floor)
       end associate
       free = get_free_bytes(directory)
       if (wanted <= free) return
@@ -158,69 +169,91 @@ contains
       type(text_file_type), allocatable, intent(out) :: files(:)
       !> Gets table and verdict.
       type(outcome_type), intent(inout) :: outcome
-      character(len=:), allocatable :: room_table
-      integer :: at
+      character(len=:), allocatable :: text, summary
 
-      allocate (files(count_files(case, results)))
-      at = 0
       outcome%table = 'thud '//version//'   case '//trim(case%name)
       if (case%has_impact) outcome%table = outcome%table//'   model '//trim(case%model)
       outcome%table = outcome%table//newline
+      allocate (files(0))
       if (case%has_modes) then
-         call get_modes_files(results%modes, files(at + 1:at + size(modes_names)))
-         at = at + size(modes_names)
+         call extend(files, size(modes_names))
+         call get_modes_files(results%modes, files)
          outcome%table = outcome%table//newline//get_modes_table(results%modes)
       end if
       if (.not. case%has_impact) outcome%table = outcome%table//get_defaults_line(case)
       if (.not. case%has_impact) return
-      associate (history => results%history, verdict => results%verdict)
-         outcome%conforms = is_conforming(case, verdict)
-         outcome%table = outcome%table//newline//get_table(case, history, verdict)
-         if (case%has_room) then
-            call get_room_table(case, results%room, history%contact_time, room_table)
-            outcome%table = outcome%table//newline//room_table
-         end if
-         outcome%table = outcome%table//get_defaults_line(case)
-         files(at + 1:at + size(file_names))%name = file_names
-         files(at + 1)%content = get_force_csv(history)
-         files(at + 2)%content = get_levels_csv(case, verdict)
-         files(at + 3)%content = get_summary(case, history, verdict, results%remark)
-         at = at + size(file_names)
-         if (allocated(history%channel)) then
-            at = at + 1
-            files(at)%name = channel_file
-            files(at)%content = get_channels_csv(history)
-         end if
-      end associate
+      outcome%conforms = is_conforming(case, results%verdict)
+      outcome%table = outcome%table//newline//get_table(case, results%history, results%verdict)
+      call add_file(files, file_names(1), get_force_csv(results%history))
+      call add_file(files, file_names(2), get_levels_csv(case, results%verdict))
+      summary = get_summary(case, results%history, results%verdict, results%remark)
+      call add_history_files(results%history, '', files)
+      if (allocated(results%on_floor)) then
+         call get_floor_table(case, results%history, results%on_floor, results%floor, text)
+         outcome%table = outcome%table//newline//text
+         call get_floor_force_csv(results%history, results%on_floor, results%floor, text)
+         call add_file(files, floor_names(1), text)
+         call get_floor_levels_csv(results%floor, text)
+         call add_file(files, floor_names(2), text)
+         call get_floor_summary(results%on_floor, text)
+         summary = summary//text
+         call add_history_files(results%on_floor, 'floor_', files)
+      end if
+      call add_file(files, file_names(3), summary)
       if (case%has_room) then
-         at = at + 1
-         files(at)%name = room_file
-         call get_room_csv(results%room, files(at)%content)
+         call get_room_table(case, results%room, results%history%contact_time, allocated(results%on_floor), text)
+         outcome%table = outcome%table//newline//text
+         call extend(files, size(room_file_names))
+         call get_room_files(results%room, files(size(files) - size(room_file_names) + 1:))
       end if
-      if (case%has_compression) then
-         at = at + 1
-         files(at)%name = compression_file
-         files(at)%content = get_compression_csv(results%compression)
-         outcome%table = outcome%table//newline//get_compression_table(results%compression)
-      end if
-      if (results%history%motion%n_frame > 0) call get_motion_files(results%history%motion, files(at + 1:))
+      outcome%table = outcome%table//get_defaults_line(case)
+      if (.not. case%has_compression) return
+      call add_file(files, compression_file, get_compression_csv(results%compression))
+      outcome%table = outcome%table//newline//get_compression_table(results%compression)
    end subroutine describe
 
-   !> Number of files of results.
-   pure function count_files(case, results) result(n_file)
-      type(case_type), intent(in) :: case
-      type(results_type), intent(in) :: results
-      integer :: n_file
+   !> Adds the files of a history of models that have channels or snapshots.
+   subroutine add_history_files(history, prefix, files)
+      type(force_history_type), intent(in) :: history
+      !> What their names begin with.
+      character(len=*), intent(in) :: prefix
+      !> The files: [n_file].
+      type(text_file_type), allocatable, intent(inout) :: files(:)
+      integer :: n
 
-      n_file = 0
-      if (case%has_modes) n_file = size(modes_names)
-      if (.not. case%has_impact) return
-      n_file = n_file + size(file_names)
-      if (allocated(results%history%channel)) n_file = n_file + 1
-      if (case%has_room) n_file = n_file + 1
-      if (case%has_compression) n_file = n_file + 1
-      if (results%history%motion%n_frame > 0) n_file = n_file + results%history%motion%n_frame + size(motion_names)
-   end function count_files
+      if (allocated(history%channel)) call add_file(files, prefix//channel_file, get_channels_csv(history))
+      n = size(files)
+      if (history%motion%n_frame == 0) return
+      call extend(files, history%motion%n_frame + size(motion_names))
+      call get_motion_files(history%motion, prefix, files(n + 1:))
+   end subroutine add_history_files
+
+   !> Adds a file.
+   subroutine add_file(files, name, content)
+      !> The files: [n_file].
+      type(text_file_type), allocatable, intent(inout) :: files(:)
+      character(len=*), intent(in) :: name, content
+
+      call extend(files, 1)
+      files(size(files))%name = name
+      files(size(files))%content = content
+   end subroutine add_file
+
+   !> Makes room for further files.
+   subroutine extend(files, count)
+      !> The files: [n_file].
+      type(text_file_type), allocatable, intent(inout) :: files(:)
+      integer, intent(in) :: count
+      type(text_file_type), allocatable :: more(:)
+      integer :: i
+
+      allocate (more(size(files) + count))
+      do i = 1, size(files)
+         more(i)%name = files(i)%name
+         call move_alloc(files(i)%content, more(i)%content)
+      end do
+      call move_alloc(more, files)
+   end subroutine extend
 
    !> Reads a case from a namelist file.
    subroutine load_case(path, case, error, unchecked)

@@ -8,7 +8,7 @@ module thud_schema
    use thud_force_history, only: outcome_count, scalar_fields
    use thud_interval, only: interval_type, new_interval
    use thud_kinds, only: wp
-   use thud_registry, only: model_names
+   use thud_registry, only: floor_names, model_names
    use thud_source_limits, only: source_names
    use thud_text, only: newline, to_text
    implicit none (type, external)
@@ -30,7 +30,8 @@ contains
       call new_case(case)
       allocate (fields, source=get_fields(case))
       text = '{"version": '//text_value(version)//','//newline//'"models": '//list_of(model_names)//','//newline &
-         //'"sources": '//list_of(source_names)//','//newline//'"band_sets": '//list_of(band_set_names)//','//newline &
+         //'"floors": '//list_of(floor_names)//','//newline//'"sources": '//list_of(source_names)//','//newline &
+         //'"band_sets": '//list_of(band_set_names)//','//newline &
          //'"scalars": ['
       do i = 1, size(scalar_fields)
          associate (field => scalar_fields(i))

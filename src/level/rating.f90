@@ -8,8 +8,8 @@ module thud_rating
    implicit none (type, external)
    private
 
-   public :: correct_for_background, find_rated_bands, get_a_weighted_level, get_grade, get_legacy_rating, get_rounded
-   public :: get_standardisation, rated_set_names
+   public :: class_limits, correct_for_background, fast_reverberation, find_rated_bands, get_a_weighted_level, get_grade
+   public :: get_legacy_rating, get_rounded, get_standardisation, rated_set_names
 
    !> Maximum number of bands of a rating.
    integer, parameter :: max_rated = 12

@@ -4,9 +4,21 @@ module thud_lapack
    implicit none (type, external)
    private
 
-   public :: dgbsv, dgels, dgemm, dgemv, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr, dsygv, dsyrk, dtrsm, dtrsv
+   public :: dgbsv, dgeev, dgels, dgemm, dgemv, dgetf2, dgetrs, dpbtrf, dpbtrs, dposv, dpotf2, dpotrf, dsbmv, dstevr
+   public :: dsygv, dsyrk, dtrsm, dtrsv
 
    interface
+      !> Eigenvalues of a general matrix.
+      pure subroutine dgeev(jobvl, jobvr, n, a, lda, wr, wi, vl, ldvl, vr, ldvr, work, lwork, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: jobvl, jobvr
+         integer, intent(in) :: n, lda, ldvl, ldvr, lwork
+         real(wp), intent(inout) :: a(lda, *)
+         real(wp), intent(out) :: wr(*), wi(*), vl(ldvl, *), vr(ldvr, *), work(*)
+         integer, intent(out) :: info
+      end subroutine dgeev
+
       !> Generalised symmetric eigenproblem.
       pure subroutine dsygv(itype, jobz, uplo, n, a, lda, b, ldb, w, work, lwork, info)
          import :: wp
@@ -115,6 +127,28 @@ module thud_lapack
          integer, intent(out) :: info
          real(wp), intent(inout) :: ab(ldab, *), b(ldb, *)
       end subroutine dgbsv
+
+      !> Factors of a small matrix, by partial pivoting.
+      pure subroutine dgetf2(m, n, a, lda, ipiv, info)
+         import :: wp
+         implicit none (type, external)
+         integer, intent(in) :: m, n, lda
+         real(wp), intent(inout) :: a(lda, *)
+         integer, intent(out) :: ipiv(*)
+         integer, intent(out) :: info
+      end subroutine dgetf2
+
+      !> Solution with these factors.
+      pure subroutine dgetrs(trans, n, nrhs, a, lda, ipiv, b, ldb, info)
+         import :: wp
+         implicit none (type, external)
+         character(len=1), intent(in) :: trans
+         integer, intent(in) :: n, nrhs, lda, ldb
+         real(wp), intent(in) :: a(lda, *)
+         integer, intent(in) :: ipiv(*)
+         real(wp), intent(inout) :: b(ldb, *)
+         integer, intent(out) :: info
+      end subroutine dgetrs
 
       !> Cholesky factor of a small matrix.
       pure subroutine dpotf2(uplo, n, a, lda, info)

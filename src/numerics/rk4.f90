@@ -2,6 +2,7 @@
 !> and the location of events inside a step.
 module thud_rk4
    use thud_kinds, only: wp
+   use thud_zero_search, only: advance_search, is_found, narrow, new_zero_search, zero_search_type
    implicit none (type, external)
    private
 
@@ -63,8 +64,7 @@ contains
    !> Length of the step at whose end one component of the state falls to zero, to rounding.
    !>
    !> The component is positive at (or just after) the beginning and not positive after the full
-   !> step. Root of the dense output by the Illinois form of regula falsi, safeguarded by
-   !> bisection.
+   !> step.
    pure function locate_zero(ode, time, state, step, component) result(length)
       class(ode_type), intent(in) :: ode
       !> Time at the beginning of the step.
@@ -75,36 +75,14 @@ contains
       !> Component that becomes zero.
       integer, intent(in) :: component
       real(wp) :: length
-      integer, parameter :: max_iterations = 200
-      real(wp) :: left, right, left_value, right_value, value
-      logical :: left_moved_last, right_moved_last
-      integer :: iteration
+      type(zero_search_type) :: search
 
-      left = 0.0_wp
-      left_value = state(component)
-      right = step
-      right_value = component_after(step)
-      left_moved_last = .false.
-      right_moved_last = .false.
-      do iteration = 1, max_iterations
-         if (right - left <= 2*spacing(right)) exit
-         length = right - right_value*(right - left)/(right_value - left_value)
-         if (mod(iteration, 8) == 0 .or. .not. (length > left .and. length < right)) length = (left + right)/2
-         value = component_after(length)
-         ! An end that stays twice has its value halved, or regula falsi would creep.
-         if (value > 0.0_wp) then
-            left = length
-            left_value = value
-            if (left_moved_last) right_value = right_value/2
-         else
-            right = length
-            right_value = value
-            if (right_moved_last) left_value = left_value/2
-         end if
-         left_moved_last = value > 0.0_wp
-         right_moved_last = .not. left_moved_last
+      search = new_zero_search(state(component), step, component_after(step))
+      do while (.not. is_found(search))
+         call advance_search(search)
+         call narrow(search, component_after(search%trial))
       end do
-      length = right
+      length = search%right
 
    contains
 

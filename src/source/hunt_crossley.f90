@@ -9,8 +9,8 @@ module thud_hunt_crossley
    use thud_kinds, only: wp
    use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
    use thud_new_field, only: real_field
-   use thud_rk4, only: locate_zero, rk4_step
    use thud_receiver, only: receiver_type
+   use thud_rk4, only: locate_zero, rk4_step
    use thud_sampling, only: sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
@@ -268,7 +268,8 @@ contains
             return
          end if
       end if
-      call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error)
+      call solve_lumped(spring, drop, sampling, [character(len=13) :: 'spring_force', 'damping_force'], history, error, &
+         receiver)
    end subroutine solve
 
 end module thud_hunt_crossley

@@ -1,32 +1,32 @@
 !> Impact of a source with one degree of freedom: marches from first touch over the turning point
 !> to release, samples the forces, and checks the balances of impulse and energy.
 module thud_lumped
+   use thud_contact_source, only: coarse_error, contact_source_type
+   use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
-   use thud_error, only: error_type, input_error, numerical_error
+   use thud_error, only: error_type, input_error
    use thud_force_history, only: force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_rk4, only: locate_zero, longest_valid, ode_type, rk4_step
+   use thud_receiver, only: is_rigid, receiver_type
+   use thud_rk4, only: locate_zero, longest_valid, rk4_step
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_text, only: fixed, to_text
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: at_deflection, at_impulse, at_loss, at_velocity, coarse_error, lumped_type, solve_lumped
+   public :: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
 
    !> Places of the quantities in the state: deflection (m), velocity (m/s), impulse given to the
    !> floor (N s), energy lost (J).
    integer, parameter :: at_deflection = 1, at_velocity = 2, at_impulse = 3, at_loss = 4, n_state = 4
 
    !> Equation of motion of the source; its state is laid out as above.
-   type, abstract, extends(ode_type) :: lumped_type
-      !> Mass that moves before and after the contact, kg.
-      real(wp) :: mass = 0.0_wp
-      !> The turning point is still to come; some equations change there.
-      logical :: compressing = .true.
+   type, abstract, extends(contact_source_type) :: lumped_type
    contains
       procedure(get_parts_interface), deferred :: get_parts
-      procedure :: get_failure
+      procedure :: record_sample
+      procedure :: record_peaks
    end type lumped_type
 
    abstract interface
@@ -47,24 +47,8 @@ module thud_lumped
 
 contains
 
-   !> Error of a state outside the domain of the equation; sources that have such states override
-   !> it.
-   function get_failure(self, drop, time, state) result(error)
-      class(lumped_type), intent(in) :: self
-      type(drop_type), intent(in) :: drop
-      !> Time since first touch, s.
-      real(wp), intent(in) :: time
-      !> Last valid state: [4].
-      real(wp), intent(in) :: state(:)
-      type(error_type) :: error
-
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m leads out of the model of a source of ' &
-         //to_text(self%mass)//' kg: '//fixed(1.0e3_wp*time, 3)//' ms after first touch the deflection is ' &
-         //to_text(state(at_deflection))//' m; allowed: lower drops')
-   end function get_failure
-
    !> Force history of one drop.
-   subroutine solve_lumped(source, drop, sampling, part_name, history, error)
+   subroutine solve_lumped(source, drop, sampling, part_name, history, error, receiver)
       !> The source in its compression phase.
       class(lumped_type), intent(inout) :: source
       type(drop_type), intent(in) :: drop
@@ -76,39 +60,65 @@ contains
       type(force_history_type), intent(out) :: history
       !> The equation fails, the contact outlasts the record, or the steps are too coarse.
       type(error_type), allocatable, intent(out) :: error
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       real(wp) :: state(n_state)
+      logical :: moves
+
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), part_name)
+      history%impact_velocity = get_impact_velocity(drop)
+      moves = present(receiver)
+      if (moves) moves = .not. is_rigid(receiver)
+      if (moves) then
+         call solve_coupled(source, drop, sampling, sampling%substeps, receiver, history, state, error)
+      else
+         call march(source, drop, sampling, history, state, error)
+      end if
+      if (allocated(error)) return
+      call check_contact_samples(sampling, history%contact_time, error)
+      if (.not. allocated(error)) call finish(source%mass, state, history, error)
+   end subroutine solve_lumped
+
+   !> Marches from first touch to release on a rigid floor.
+   subroutine march(source, drop, sampling, history, state, error)
+      class(lumped_type), intent(inout) :: source
+      type(drop_type), intent(in) :: drop
+      type(sampling_type), intent(in) :: sampling
+      !> Gets samples, maxima and contact time.
+      type(force_history_type), intent(inout) :: history
+      !> State at release: [4].
+      real(wp), intent(out) :: state(:)
+      !> The equation fails, or the contact outlasts the record.
+      type(error_type), allocatable, intent(out) :: error
       real(wp) :: time, step
-      integer :: i, j, n_sample
+      integer :: i, j
       logical :: released
 
-      n_sample = get_sample_count(sampling)
-      history = new_force_history(sampling%sample_rate, n_sample, part_name)
-      history%impact_velocity = get_impact_velocity(drop)
       state = [0.0_wp, history%impact_velocity, 0.0_wp, 0.0_wp]
       step = 1/(sampling%sample_rate*real(sampling%substeps, wp))
       source%compressing = .true.
       released = .false.
-      call record_sample(source, state, 1, history)
-      march: do i = 2, n_sample
+      call source%record_sample(state, 1, history)
+      samples: do i = 2, size(history%floor_force)
          do j = 1, sampling%substeps
             time = real((i - 2)*sampling%substeps + j - 1, wp)*step
             call advance(source, drop, time + step, time, state, history, released, error)
             if (allocated(error)) return
-            if (released) exit march
+            if (released) exit samples
          end do
-         call record_sample(source, state, i, history)
+         call source%record_sample(state, i, history)
          call check_interrupt(error)
          if (allocated(error)) return
-      end do march
+      end do samples
       if (.not. released) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration) &
             //' s ends while the source is still in contact; allowed: longer than the contact')
          return
       end if
       history%contact_time = time
-      call check_contact_samples(sampling, time, error)
-      if (.not. allocated(error)) call finish(source%mass, state, history, error)
-   end subroutine solve_lumped
+      history%peak_elastic_force = max(history%peak_elastic_force, maxval(history%elastic_force))
+      history%peak_force = max(history%peak_elastic_force, history%peak_force)
+   end subroutine march
 
    !> Moves time and state on to the given time; stops short at release.
    subroutine advance(source, drop, end_time, time, state, history, released, error)
@@ -127,7 +137,7 @@ contains
       logical, intent(out) :: released
       !> The state leaves the domain of the equation.
       type(error_type), allocatable, intent(out) :: error
-      real(wp) :: new_state(n_state), parts(size(history%part, 2))
+      real(wp) :: new_state(n_state)
       real(wp) :: length
       logical :: valid
       integer :: component
@@ -157,15 +167,14 @@ contains
          released = .not. source%compressing
          if (released) return
          source%compressing = .false.
-         history%max_deflection = state(at_deflection)
-         call source%get_parts(state, parts, history%peak_elastic_force)
+         call source%record_peaks(state, history)
       end do
    end subroutine advance
 
    !> Writes motion and forces of one instant into the history.
-   pure subroutine record_sample(source, state, i, history)
+   pure subroutine record_sample(self, state, i, history)
       !> The source in its present phase.
-      class(lumped_type), intent(in) :: source
+      class(lumped_type), intent(in) :: self
       !> State at the sample: [4].
       real(wp), intent(in) :: state(:)
       !> Number of the sample.
@@ -174,12 +183,28 @@ contains
 
       history%deflection(i) = state(at_deflection)
       history%velocity(i) = state(at_velocity)
-      call source%get_parts(state, history%part(i, :), history%elastic_force(i))
+      if (.not. self%touching) return
+      call self%get_parts(state, history%part(i, :), history%elastic_force(i))
       history%peak_force = max(history%peak_force, sum(history%part(i, :)))
       ! A part that starts with a jump at first touch: a sample of a jump is the mean of its two sides.
       if (i == 1) history%part(i, :) = history%part(i, :)/2
       history%floor_force(i) = sum(history%part(i, :))
    end subroutine record_sample
+
+   !> Raises the maxima of deflection and elastic force.
+   pure subroutine record_peaks(self, state, history)
+      !> The source in its present phase.
+      class(lumped_type), intent(in) :: self
+      !> State: [4].
+      real(wp), intent(in) :: state(:)
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: parts(size(history%part, 2))
+      real(wp) :: elastic_force
+
+      call self%get_parts(state, parts, elastic_force)
+      history%max_deflection = max(history%max_deflection, state(at_deflection))
+      history%peak_elastic_force = max(history%peak_elastic_force, elastic_force)
+   end subroutine record_peaks
 
    !> Scalars of the impact from the state at release, and the check of the balances.
    subroutine finish(mass, state, history, error)
@@ -199,25 +224,13 @@ contains
          energy = mass/2*v0**2
          history%impulse = state(at_impulse)
          history%impulse_residual = abs(history%impulse - momentum)/momentum
-         history%energy_residual = abs(mass/2*velocity**2 + state(at_loss) - energy)/energy
+         history%energy_residual = abs(mass/2*velocity**2 + state(at_loss) + history%floor_work - energy)/energy
       end associate
-      history%peak_elastic_force = max(history%peak_elastic_force, maxval(history%elastic_force))
-      history%peak_force = max(history%peak_elastic_force, history%peak_force)
       ! Written so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then
          error = coarse_error('the balance of impulse misses by '//to_text(history%impulse_residual) &
             //' and that of energy by '//to_text(history%energy_residual)//', more than '//to_text(max_residual))
       end if
    end subroutine finish
-
-   !> Error of steps that are too long for the source.
-   pure function coarse_error(finding) result(error)
-      !> What shows it.
-      character(len=*), intent(in) :: finding
-      type(error_type) :: error
-
-      error = numerical_error('&sampling: substeps is too low for this source: '//finding &
-         //'; allowed: more substeps, or a source of lower stiffness over mass')
-   end function coarse_error
 
 end module thud_lumped

@@ -14,7 +14,7 @@ module thud_motion
       real(wp), allocatable :: time(:)
       !> Positions of the nodes before the impact, m: [0:n_polar, 0:n_radial, 2].
       real(wp), allocatable :: start(:, :, :)
-      !> Positions, the floor at height 0, m: [0:n_polar, 0:n_radial, 2, capacity].
+      !> Positions, the floor at rest at height 0, m: [0:n_polar, 0:n_radial, 2, capacity].
       real(wp), allocatable :: position(:, :, :, :)
       !> Velocities, m/s: the same shape.
       real(wp), allocatable :: velocity(:, :, :, :)
@@ -24,6 +24,8 @@ module thud_motion
       real(wp), allocatable :: contact_shear(:, :)
       !> Overpressure of the gas, Pa: [capacity].
       real(wp), allocatable :: cavity_pressure(:)
+      !> Displacement of the floor under the ball, downwards, m: [capacity].
+      real(wp), allocatable :: floor_displacement(:)
    end type motion_type
 
 contains
@@ -40,14 +42,15 @@ contains
 
       n_polar = ubound(start, 1)
       n_radial = ubound(start, 2)
-      allocate (motion%time(capacity), motion%cavity_pressure(capacity))
+      allocate (motion%time(capacity), motion%cavity_pressure(capacity), motion%floor_displacement(capacity))
       allocate (motion%contact_pressure(0:n_polar, capacity), motion%contact_shear(0:n_polar, capacity))
       allocate (motion%start(0:n_polar, 0:n_radial, 2), source=start)
       allocate (motion%position(0:n_polar, 0:n_radial, 2, capacity), motion%velocity(0:n_polar, 0:n_radial, 2, capacity))
    end function new_motion
 
    !> Adds a snapshot where there is space for one.
-   pure subroutine take_snapshot(motion, time, position, velocity, contact_stress, cavity_pressure)
+   pure subroutine take_snapshot(motion, time, position, velocity, contact_stress, cavity_pressure, &
+      floor_displacement)
       type(motion_type), intent(inout) :: motion
       !> Time since the record began, s.
       real(wp), intent(in) :: time
@@ -59,6 +62,8 @@ contains
       real(wp), intent(in) :: contact_stress(0:, :)
       !> Overpressure of the gas, Pa.
       real(wp), intent(in) :: cavity_pressure
+      !> Displacement of the floor downwards, m.
+      real(wp), intent(in) :: floor_displacement
 
       if (motion%n_frame == size(motion%time)) return
       motion%n_frame = motion%n_frame + 1
@@ -69,6 +74,7 @@ contains
          motion%contact_shear(:, i) = contact_stress(:, 1)
          motion%contact_pressure(:, i) = contact_stress(:, 2)
          motion%cavity_pressure(i) = cavity_pressure
+         motion%floor_displacement(i) = floor_displacement
       end associate
    end subroutine take_snapshot
 

@@ -9,8 +9,9 @@ module thud_receiver
    implicit none (type, external)
    private
 
-   public :: advance_receiver, get_conductance, get_mobility, get_receiver_velocity, is_rigid, new_receiver_motion
-   public :: new_receiver_step, receiver_motion_type, receiver_step_type, receiver_type, strike_receiver
+   public :: add_impulse, advance_receiver, can_strike, get_conductance, get_impulse_response, get_mobility
+   public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
+   public :: receiver_step_type, receiver_type
 
    !> Products of pole and step below which series replace the closed forms.
    real(wp), parameter :: small = 0.05_wp
@@ -136,16 +137,28 @@ contains
       motion%amplitude = step%decay*motion%amplitude + step%gain*force
    end subroutine advance_receiver
 
-   !> Motion after an impulse.
-   pure subroutine strike_receiver(receiver, impulse, motion)
+   !> Adds to the motion at the end of a step that of an impulse at its beginning.
+   pure subroutine add_impulse(receiver, step, impulse, motion)
       type(receiver_type), intent(in) :: receiver
+      type(receiver_step_type), intent(in) :: step
       !> The impulse downwards, N s.
       real(wp), intent(in) :: impulse
       type(receiver_motion_type), intent(inout) :: motion
 
-      motion%displacement = motion%displacement + receiver%direct*impulse
-      motion%amplitude = motion%amplitude + impulse
-   end subroutine strike_receiver
+      motion%displacement = motion%displacement + get_impulse_response(receiver, step)*impulse
+      motion%amplitude = motion%amplitude + step%decay*impulse
+   end subroutine add_impulse
+
+   !> Displacement at the end of a step by unit impulse at its beginning.
+   pure function get_impulse_response(receiver, step) result(response)
+      type(receiver_type), intent(in) :: receiver
+      type(receiver_step_type), intent(in) :: step
+      !> The displacement downwards, m/(N s).
+      real(wp) :: response
+
+      response = receiver%direct
+      if (size(step%gain) > 0) response = response + sum(real(receiver%residue*step%gain, wp))
+   end function get_impulse_response
 
    !> Velocity under the source.
    pure function get_receiver_velocity(receiver, force, motion) result(velocity)
@@ -159,5 +172,36 @@ contains
       velocity = receiver%direct*force
       if (size(motion%amplitude) > 0) velocity = velocity + sum(real(receiver%residue*motion%amplitude, wp))
    end function get_receiver_velocity
+
+   !> Whether free motion may bring a receiver to a line that leaves it: each pole moves it by at most
+   !> |r x| min(t, 2/|p|) in the time t.
+   pure function can_strike(receiver, motion, gap, speed) result(yes)
+      type(receiver_type), intent(in) :: receiver
+      type(receiver_motion_type), intent(in) :: motion
+      !> Gap between both, m; velocity of the line upwards, m/s.
+      real(wp), intent(in) :: gap, speed
+      logical :: yes
+      real(wp), dimension(size(motion%amplitude)) :: rate, time
+      real(wp) :: away
+      integer :: k
+
+      away = speed
+      rate = 0.0_wp
+      time = 0.0_wp
+      do k = 1, size(rate)
+         if (abs(receiver%pole(k)) > 0.0_wp) then
+            rate(k) = abs(receiver%residue(k)*motion%amplitude(k))
+            time(k) = 2/abs(receiver%pole(k))
+         else
+            ! A free mass goes on downwards.
+            away = away + real(receiver%residue(k)*motion%amplitude(k), wp)
+         end if
+      end do
+      ! The gap that is left is convex in time: it is least at one of the times, or never ends to shrink.
+      yes = gap < 0.0_wp .or. away < 0.0_wp
+      do k = 1, size(rate)
+         yes = yes .or. gap + away*time(k) < sum(rate*min(time, time(k)))
+      end do
+   end function can_strike
 
 end module thud_receiver

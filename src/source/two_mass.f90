@@ -4,16 +4,17 @@
 module thud_two_mass
    use thud_ball, only: ball_type
    use thud_constants, only: pi
+   use thud_contact_source, only: coarse_error, contact_source_type
+   use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_lumped, only: coarse_error
    use thud_new_field, only: real_field
-   use thud_rk4, only: locate_zero, ode_type, rk4_step
-   use thud_receiver, only: receiver_type
+   use thud_receiver, only: is_rigid, receiver_type
+   use thud_rk4, only: locate_zero, rk4_step
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_source_model, only: source_model_type
    use thud_text, only: to_text
@@ -61,7 +62,7 @@ module thud_two_mass
    end type two_mass_type
 
    !> Equations of motion of belt and rim.
-   type, extends(ode_type) :: tyre_type
+   type, extends(contact_source_type) :: tyre_type
       !> Masses of belt and rim, kg.
       real(wp) :: belt_mass, rim_mass
       !> Stiffness of the inflated patch p w, N/m.
@@ -72,10 +73,11 @@ module thud_two_mass
       real(wp) :: contact_damping
       !> Stiffness, N/m, and damping, N s/m, of the sidewall.
       real(wp) :: sidewall_stiffness, sidewall_damping
-      !> The belt touches the floor.
-      logical :: touching = .true.
    contains
       procedure :: get_derivative
+      procedure :: record_sample
+      procedure :: record_peaks
+      procedure :: get_reach
    end type tyre_type
 
 contains
@@ -138,9 +140,8 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(tyre_type) :: tyre
       real(wp) :: state(n_state)
-      real(wp) :: step
-      integer :: i, j, n_sample, n_step
-      logical :: left
+      integer :: n_sample, n_step
+      logical :: moves
 
       tyre = new_tyre(ball%mass, options)
       n_sample = get_sample_count(sampling)
@@ -151,28 +152,59 @@ contains
       history%impact_velocity = get_impact_velocity(drop)
       call choose_steps(tyre, history%impact_velocity, sampling, n_step, error)
       if (allocated(error)) return
+      moves = present(receiver)
+      if (moves) moves = .not. is_rigid(receiver)
+      if (moves) then
+         call solve_coupled(tyre, drop, sampling, n_step, receiver, history, state, error)
+      else
+         call march(tyre, sampling, n_step, history, state, error)
+      end if
+      if (allocated(error)) return
+      call check_contact_samples(sampling, history%contact_time, error)
+      if (.not. allocated(error)) call finish(tyre, state, history, error)
+   end subroutine solve
+
+   !> Marches from first touch until the source has left a rigid floor for good.
+   subroutine march(tyre, sampling, n_step, history, state, error)
+      type(tyre_type), intent(inout) :: tyre
+      type(sampling_type), intent(in) :: sampling
+      !> Steps in each sampling interval.
+      integer, intent(in) :: n_step
+      !> Gets samples, maxima and contact time.
+      type(force_history_type), intent(inout) :: history
+      !> State after the last release: [7].
+      real(wp), intent(out) :: state(:)
+      !> The contact outlasts the record.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: step
+      integer :: i, j, last
+      logical :: left
+
       step = 1/(sampling%sample_rate*n_step)
       state = 0.0_wp
       state([at_belt_velocity, at_rim_velocity]) = history%impact_velocity
       left = .false.
-      march: do i = 1, n_sample
-         call record_sample(tyre, state, i, history)
+      samples: do i = 1, size(history%floor_force)
+         call tyre%record_sample(state, i, history)
          do j = 0, n_step - 1
             call advance(tyre, ((i - 1)*real(n_step, wp) + j)*step, step, state, history)
             left = has_left(tyre, state)
-            if (left) exit march
+            if (left) exit samples
          end do
          call check_interrupt(error)
          if (allocated(error)) return
-      end do march
+      end do samples
       if (.not. left) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration) &
             //' s ends while the source is still in contact or may touch the floor again; allowed: longer')
          return
       end if
-      call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(tyre, state, history, error)
-   end subroutine solve
+      ! Like every model, the record ends with the last contact.
+      last = floor(history%contact_time*history%sample_rate) + 1
+      history%deflection(last + 1:) = 0.0_wp
+      history%velocity(last + 1:) = 0.0_wp
+      history%channel(last + 1:, :) = 0.0_wp
+   end subroutine march
 
    !> The equations of motion in contact.
    pure function new_tyre(mass, options) result(tyre)
@@ -183,7 +215,8 @@ contains
       real(wp) :: omega
 
       omega = 2*pi*options%belt_frequency
-      tyre = tyre_type(belt_mass=options%belt_mass, rim_mass=mass - options%belt_mass, &
+      tyre = tyre_type(mass=mass, n_mass=2, n_state=n_state, belt_mass=options%belt_mass, &
+         rim_mass=mass - options%belt_mass, &
          patch_stiffness=options%inflation_pressure*options%area_growth, &
          carcass_factor=options%carcass_stiffness/carcass_deflection**(options%carcass_exponent - 1), &
          carcass_exponent=options%carcass_exponent, contact_damping=options%contact_damping, &
@@ -265,7 +298,7 @@ contains
 
    !> Parts of the force on the floor; they go on smoothly past the end of a contact, where its event is sought.
    pure subroutine get_parts(tyre, state, parts)
-      type(tyre_type), intent(in) :: tyre
+      class(tyre_type), intent(in) :: tyre
       !> State: [7].
       real(wp), intent(in) :: state(:)
       !> Pressure times area, carcass, damping, N: [3].
@@ -291,7 +324,7 @@ contains
       real(wp), intent(inout) :: state(:)
       !> Gets maxima, and the time of each release.
       type(force_history_type), intent(inout) :: history
-      real(wp) :: new_state(n_state), parts(3)
+      real(wp) :: new_state(n_state)
       real(wp) :: time, length
       integer :: component
       logical :: valid
@@ -312,14 +345,26 @@ contains
          tyre%touching = .not. tyre%touching
       end do
       state = new_state
-      call get_parts(tyre, state, parts)
-      history%peak_force = max(history%peak_force, sum(parts))
-      history%max_deflection = max(history%max_deflection, get_mean(tyre, state, at_belt, at_rim))
+      call tyre%record_peaks(state, history)
    end subroutine advance
+
+   !> Raises the maxima of force and deflection.
+   pure subroutine record_peaks(self, state, history)
+      !> The tyre.
+      class(tyre_type), intent(in) :: self
+      !> State: [7].
+      real(wp), intent(in) :: state(:)
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: parts(3)
+
+      call get_parts(self, state, parts)
+      history%peak_force = max(history%peak_force, sum(parts))
+      history%max_deflection = max(history%max_deflection, get_mean(self, state, at_belt, at_rim))
+   end subroutine record_peaks
 
    !> Mean of belt and rim by their masses: deflection (m) or velocity (m/s) of the centre of mass.
    pure function get_mean(tyre, state, belt, rim) result(mean)
-      type(tyre_type), intent(in) :: tyre
+      class(tyre_type), intent(in) :: tyre
       !> State: [7].
       real(wp), intent(in) :: state(:)
       !> Places of the quantity in the state.
@@ -331,7 +376,7 @@ contains
 
    !> Energy of the motion of belt and rim against each other, and of the sidewall, J.
    pure function get_inner_energy(tyre, state) result(energy)
-      type(tyre_type), intent(in) :: tyre
+      class(tyre_type), intent(in) :: tyre
       !> State: [7].
       real(wp), intent(in) :: state(:)
       !> The energy, J.
@@ -342,33 +387,51 @@ contains
          + tyre%sidewall_stiffness/2*(state(at_rim) - state(at_belt))**2
    end function get_inner_energy
 
-   !> The source has left the floor for good: it rises, and all of its inner energy cannot bring the belt back.
+   !> Line that no part of the tyre in flight crosses: all of its inner energy lets the belt sink so far.
+   pure subroutine get_reach(self, state, displacement, velocity)
+      !> The tyre.
+      class(tyre_type), intent(in) :: self
+      !> State: [7].
+      real(wp), intent(in) :: state(:)
+      !> Displacement of the line towards the floor, m, and its constant velocity, m/s.
+      real(wp), intent(out) :: displacement, velocity
+
+      displacement = get_mean(self, state, at_belt, at_rim) + self%rim_mass/(self%belt_mass + self%rim_mass) &
+         *sqrt(2*get_inner_energy(self, state)/self%sidewall_stiffness)
+      velocity = get_mean(self, state, at_belt_velocity, at_rim_velocity)
+   end subroutine get_reach
+
+   !> The source has left a rigid floor for good.
    pure function has_left(tyre, state) result(left)
       type(tyre_type), intent(in) :: tyre
       !> State: [7].
       real(wp), intent(in) :: state(:)
       logical :: left
-      real(wp) :: reach
+      real(wp) :: displacement, velocity
 
       left = .false.
-      if (tyre%touching .or. get_mean(tyre, state, at_belt_velocity, at_rim_velocity) >= 0.0_wp) return
-      reach = tyre%rim_mass/(tyre%belt_mass + tyre%rim_mass)*sqrt(2*get_inner_energy(tyre, state)/tyre%sidewall_stiffness)
-      left = get_mean(tyre, state, at_belt, at_rim) + reach < 0.0_wp
+      if (tyre%touching) return
+      call tyre%get_reach(state, displacement, velocity)
+      left = displacement < 0.0_wp .and. velocity < 0.0_wp
    end function has_left
 
    !> Writes motion and forces of one instant into the history.
-   pure subroutine record_sample(tyre, state, i, history)
-      type(tyre_type), intent(in) :: tyre
+   pure subroutine record_sample(self, state, i, history)
+      !> The tyre in its present phase.
+      class(tyre_type), intent(in) :: self
       !> State at the sample: [7].
       real(wp), intent(in) :: state(:)
       !> Number of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
 
-      history%deflection(i) = get_mean(tyre, state, at_belt, at_rim)
-      history%velocity(i) = get_mean(tyre, state, at_belt_velocity, at_rim_velocity)
+      history%deflection(i) = get_mean(self, state, at_belt, at_rim)
+      history%velocity(i) = get_mean(self, state, at_belt_velocity, at_rim_velocity)
       history%channel(i, :) = state([at_belt, at_rim])
-      call get_parts(tyre, state, history%part(i, :))
+      if (allocated(history%floor_displacement)) then
+         history%channel(i, :) = history%channel(i, :) + history%floor_displacement(i)
+      end if
+      call get_parts(self, state, history%part(i, :))
       history%elastic_force(i) = sum(history%part(i, :))
       history%floor_force(i) = history%elastic_force(i)
    end subroutine record_sample
@@ -383,15 +446,9 @@ contains
       !> A balance does not close.
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: mass, velocity, energy, momentum
-      integer :: last
 
       mass = tyre%belt_mass + tyre%rim_mass
       velocity = get_mean(tyre, state, at_belt_velocity, at_rim_velocity)
-      ! Like every model, the record ends with the last contact.
-      last = floor(history%contact_time*history%sample_rate) + 1
-      history%deflection(last + 1:) = 0.0_wp
-      history%velocity(last + 1:) = 0.0_wp
-      history%channel(last + 1:, :) = 0.0_wp
       history%peak_elastic_force = history%peak_force
       associate (v0 => history%impact_velocity)
          history%restitution = -velocity/v0
@@ -399,7 +456,8 @@ contains
          energy = mass/2*v0**2
          history%impulse = state(at_impulse)
          history%impulse_residual = abs(history%impulse - momentum)/momentum
-         history%energy_residual = abs(mass/2*velocity**2 + get_inner_energy(tyre, state) + state(at_loss) - energy)/energy
+         history%energy_residual = abs(mass/2*velocity**2 + get_inner_energy(tyre, state) + state(at_loss) &
+            + history%floor_work - energy)/energy
       end associate
       ! Written so that NaN fails too.
       if (.not. max(history%impulse_residual, history%energy_residual) <= max_residual) then

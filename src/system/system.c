@@ -7,10 +7,12 @@
 #include <limits.h>
 #include <pthread.h>
 #include <signal.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <time.h>
@@ -20,7 +22,7 @@
 extern volatile sig_atomic_t thud_latest_signal;
 
 static volatile sig_atomic_t deferred = 0;
-static const char interruption[] = "\nthud: interrupted; nothing was written\n";
+static const char *volatile interruption = "\nthud: interrupted; nothing was written\n";
 static const int ending_signals[] = {SIGINT, SIGTERM};
 
 static void interrupt(int number)
@@ -53,10 +55,40 @@ void thud_prepare_process(void)
    sigaction(SIGPIPE, &action, NULL);
    sigaction(SIGXFSZ, &action, NULL);
    action.sa_handler = interrupt;
-   action.sa_flags = SA_RESTART;
+   // Without SA_RESTART, so that a kept one ends the wait for a lock.
    for (int i = 0; i < 2; i++)
       if (sigaction(ending_signals[i], NULL, &before) == 0 && before.sa_handler != SIG_IGN)
          sigaction(ending_signals[i], &action, NULL);
+}
+
+// Ends the process at once. Threads of OpenBLAS that wait for memory would hold up the usual end.
+void thud_end_process(int code)
+{
+   _exit(code);
+}
+
+// 1 where addresses for that many bytes can be had now, and where asked for the memory behind them, as far as the
+// system tells.
+int thud_has_memory(double bytes, int behind)
+{
+   size_t wanted = bytes < 1e18 ? (size_t)bytes : (size_t)1e18;
+   void *place = mmap(NULL, wanted, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+   char line[128];
+   double kilobytes, free = -1.0;
+   FILE *file;
+
+   if (place == MAP_FAILED) return 0;
+   munmap(place, wanted);
+   if (!behind) return 1;
+   // Linux promises more than it has, and then ends a process that writes to it.
+   file = fopen("/proc/meminfo", "re");
+   if (!file) return 1;
+   while (fgets(line, sizeof line, file)) {
+      if (sscanf(line, "MemAvailable: %lf", &kilobytes) == 1) free = (free < 0.0 ? 0.0 : free) + 1024.0*kilobytes;
+      if (sscanf(line, "SwapFree: %lf", &kilobytes) == 1 && free >= 0.0) free += 1024.0*kilobytes;
+   }
+   fclose(file);
+   return free < 0.0 || bytes <= free;
 }
 
 // Handlers of the process that `note` calls first, and the library's calls that are running.
@@ -131,9 +163,10 @@ void thud_keep_interrupts(void)
    deferred = 1;
 }
 
-// From now on an interrupt ends the process.
-void thud_pass_interrupts(void)
+// From now on an interrupt ends the process; what it says then depends on whether there are results.
+void thud_pass_interrupts(int written)
 {
+   if (written) interruption = "\nthud: interrupted; the results are written\n";
    deferred = 0;
 }
 
@@ -165,6 +198,31 @@ int thud_create(const char *path)
    int descriptor = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 
    return descriptor < 0 ? -errno : descriptor;
+}
+
+// The same to write at the end of a file, which is made where it is missing.
+int thud_open_end(const char *path)
+{
+   int descriptor = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+
+   return descriptor < 0 ? -errno : descriptor;
+}
+
+// CRC-32 of bytes that follow those with the checksum `before`, as in zlib.
+uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t length)
+{
+   // Remainders of four bits each.
+   static const uint32_t remainder[16] = {
+      0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4, 0x4db26158, 0x5005713c,
+      0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c, 0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c};
+   uint32_t rest = ~before;
+
+   for (size_t i = 0; i < length; i++) {
+      rest ^= bytes[i];
+      rest = remainder[rest & 15] ^ (rest >> 4);
+      rest = remainder[rest & 15] ^ (rest >> 4);
+   }
+   return ~rest;
 }
 
 // Writes all of a text; -1 after an interrupt that was kept.
@@ -300,6 +358,15 @@ size_t thud_next_name(DIR *directory, char *name, size_t length)
    if (!entry) return 0;
    snprintf(name, length, "%s", entry->d_name);
    return strlen(name);
+}
+
+// Bytes of a file, 0 where it is not a regular one; negative where there is none.
+int64_t thud_get_file_size(const char *path)
+{
+   struct stat found;
+
+   if (stat(path, &found) != 0) return -1;
+   return S_ISREG(found.st_mode) ? (int64_t)found.st_size : 0;
 }
 
 // Bytes that this user may write to the disk of a directory, or of the next one above that is there; negative where

@@ -1,15 +1,17 @@
 !> The calls of the operating system that Fortran lacks; `system.c` holds them.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_intptr_t, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_int, c_int32_t, c_int64_t, c_intptr_t, &
+      c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
    public :: standard_error, standard_output
-   public :: can_exchange, close_descriptor, create_file, directory_exists, exchange_directories, flush_directory
-   public :: get_free_bytes, get_system_message, is_terminal, keep_interrupts, link_file, list_directory, lock_directory
-   public :: begin_call, end_call, end_calls, open_descriptor, pass_interrupts, prepare_process, read_bytes, remove_file
-   public :: rename_file, resolve_path, write_text
+   public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
+   public :: end_calls, end_process, exchange_directories, flush_directory, get_file_size, get_free_bytes, get_system_message
+   public :: is_terminal, keep_interrupts, link_file, list_directory, lock_directory, open_descriptor, open_end
+   public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
    !> Descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
@@ -42,6 +44,7 @@ module thud_system
 
    procedure(path_call), bind(c, name='thud_open') :: c_open
    procedure(path_call), bind(c, name='thud_create') :: c_create
+   procedure(path_call), bind(c, name='thud_open_end') :: c_open_end
    procedure(path_call), bind(c, name='remove') :: c_remove
    procedure(two_path_call), bind(c, name='rename') :: c_rename
    procedure(two_path_call), bind(c, name='link') :: c_link
@@ -52,6 +55,14 @@ module thud_system
    procedure(number_call), bind(c, name='isatty') :: c_isatty
 
    interface
+      !> Ends the process at once; nothing must be left to be written.
+      subroutine end_process(code) bind(c, name='thud_end_process')
+         import :: c_int
+         implicit none (type, external)
+         !> Exit code.
+         integer(c_int), value :: code
+      end subroutine end_process
+
       !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a sentence.
       subroutine prepare_process() bind(c, name='thud_prepare_process')
          implicit none (type, external)
@@ -63,8 +74,11 @@ module thud_system
       end subroutine keep_interrupts
 
       !> Lets an interrupt end the process from now on.
-      subroutine pass_interrupts() bind(c, name='thud_pass_interrupts')
+      subroutine pass_interrupts(written) bind(c, name='thud_pass_interrupts')
+         import :: c_int
          implicit none (type, external)
+         !> 1 where there are results by now, else 0.
+         integer(c_int), value :: written
       end subroutine pass_interrupts
 
       !> Lets signals that the process handles set `latest_signal`, too. Every call of the library begins with it.
@@ -108,6 +122,15 @@ module thud_system
          integer(c_int) :: status
       end function c_write
 
+      function c_checksum(before, bytes, length) bind(c, name='thud_checksum') result(checksum)
+         import :: c_char, c_int32_t, c_size_t
+         implicit none (type, external)
+         integer(c_int32_t), value :: before
+         character(kind=c_char), intent(in) :: bytes(*)
+         integer(c_size_t), value :: length
+         integer(c_int32_t) :: checksum
+      end function c_checksum
+
       function c_lock_directory(path, make) bind(c, name='thud_lock_directory') result(descriptor)
          import :: c_char, c_int
          implicit none (type, external)
@@ -147,6 +170,13 @@ module thud_system
          type(c_ptr), value :: directory
          integer(c_int) :: status
       end function c_closedir
+
+      function c_get_file_size(path) bind(c, name='thud_get_file_size') result(bytes)
+         import :: c_char, c_int64_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int64_t) :: bytes
+      end function c_get_file_size
 
       function c_get_free_bytes(path) bind(c, name='thud_get_free_bytes') result(bytes)
          import :: c_char, c_double
@@ -222,6 +252,26 @@ contains
       descriptor = int(c_create(path//c_null_char))
       status = max(-descriptor, 0)
    end subroutine create_file
+
+   !> Opens a file at its end, or makes it.
+   subroutine open_end(path, descriptor, status)
+      character(len=*), intent(in) :: path
+      integer, intent(out) :: descriptor
+      !> 0, or the number of the error.
+      integer, intent(out) :: status
+
+      descriptor = int(c_open_end(path//c_null_char))
+      status = max(-descriptor, 0)
+   end subroutine open_end
+
+   !> Goes on with the checksum of a text, CRC-32 as in zlib.
+   subroutine add_to_checksum(text, checksum)
+      character(len=*), intent(in) :: text
+      !> That of what stands before the text, 0 at its beginning.
+      integer(int32), intent(inout) :: checksum
+
+      checksum = int(c_checksum(int(checksum, c_int32_t), text, len(text, c_size_t)), int32)
+   end subroutine add_to_checksum
 
    !> Writes all of a text to a file or to the screen.
    subroutine write_text(descriptor, text, status)
@@ -360,6 +410,15 @@ contains
       status = c_remove(path//c_null_char)
       if (present(done)) done = status == 0
    end subroutine remove_file
+
+   !> Size of a file.
+   subroutine get_file_size(path, bytes)
+      character(len=*), intent(in) :: path
+      !> Its bytes, 0 where it is not a regular file; negative where there is none.
+      integer(int64), intent(out) :: bytes
+
+      bytes = int(c_get_file_size(path//c_null_char), int64)
+   end subroutine get_file_size
 
    !> Free space on the disk of a directory, or of the next one above that is there.
    function get_free_bytes(path) result(bytes)

@@ -256,3 +256,19 @@ def test_interrupted_fit_does_not_say_that_it_is_kept(
     sentence = "thud-driver: interrupted; nothing is written\n"
     assert capsys.readouterr().err == sentence
     assert not list((tmp_path / "outputs/study").iterdir())
+
+
+def test_screen_without_the_letters_of_a_name_shows_their_codes(
+    case_file: CaseFile, tmp_path: Path
+) -> None:
+    case_file(MINIMAL, "é.nml")
+    done = subprocess.run(
+        [sys.executable, "-m", "thud", "run", "é.nml", "--no-figures"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stderr.count("Traceback")) == (0, 0)
+    assert "Results: outputs/\\xe9" in done.stdout

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import resource
 import signal
 import subprocess
 import time
@@ -275,3 +277,49 @@ def test_characters_that_no_screen_shows_are_replaced(run: Run, case_file: CaseF
     assert "&model: name = 'a?b?' is not allowed; allowed: 'hollow_sphere'" in result.stderr
     with pytest.raises(thud.InputError, match=r"'a\?b\?' is not allowed; allowed: "):
         thud.read_case(path)
+
+
+def test_blanks_at_the_end_of_a_path_belong_to_it(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    case_file(MINIMAL, "ball.nml ")
+    assert run("ball.nml ", "-o", "out ").returncode == 0
+    assert (tmp_path / "out " / "effective.nml").exists()
+    assert "there is no such file" in run("ball.nml").stderr
+
+
+def test_name_that_is_no_text_is_refused(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    odd = os.fsdecode(b"\xff.nml")
+    case_file(MINIMAL, odd)
+    result = run(odd, errors="surrogateescape")
+    assert result.returncode == 1
+    assert "&case: name = '\udcff' is not allowed; allowed: a name for a directory, UTF-8" in (
+        result.stderr
+    )
+    assert not (tmp_path / "outputs").exists()
+    # A name in the file is enough.
+    case_file(f"&case name = 'ball' / {MINIMAL}", odd)
+    assert run(odd, errors="surrogateescape").returncode == 0
+
+
+@pytest.mark.parametrize("megabytes", [100, 250, 350, 500])
+def test_memory_that_is_short_is_told_in_one_sentence(
+    run: Run, case_file: CaseFile, tmp_path: Path, megabytes: int
+) -> None:
+    def limit_memory() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+
+    case_file(MINIMAL)
+    (tmp_path / "table.csv").write_text("height\n1\n0.5\n")
+    case_file("&ball / &mesh radial_elements = 64 polar_elements = 1024 / &modes /", "modes.nml")
+    case_file("&ball / &drop / &model / &sampling sample_rate = 4e6, duration = 1 /", "long.nml")
+    for arguments in (
+        ("case.nml",),
+        ("case.nml", "--sets", "table.csv", "--threads", "2"),
+        ("modes.nml",),
+        ("long.nml",),
+    ):
+        done = run(*arguments, preexec_fn=limit_memory)
+        if done.returncode != 0:
+            assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+            assert re.match(r"thud: .*\d bytes.*; allowed: ", done.stderr)

@@ -110,6 +110,33 @@ def test_animation_has_a_picture_for_each_snapshot(deformed: thud.Impact, tmp_pa
         assert pictures.n_frames == len(deformed.motion.time)
 
 
+def test_floor_is_drawn_where_it_moves() -> None:
+    floor = thud.InfinitePlate(resistance=500.0)
+    impact = thud.solve(model="finite_element", floor=floor, **COARSE)
+    moved = impact.on_floor
+    assert moved
+    assert moved.motion
+    assert impact.motion
+    assert not impact.motion.floor_displacement.any()
+    sampled = np.interp(moved.motion.time, moved.time, moved.floor_displacement)
+    np.testing.assert_allclose(moved.motion.floor_displacement, sampled, atol=1e-12)
+    assert moved.motion.floor_displacement.max() > 0.02
+    tops = []
+    for axes in thud.plot.motion(moved).axes:
+        if not axes.get_title():
+            continue
+        shown = float(axes.get_title().removesuffix(" ms"))
+        i = np.argmin(abs(1e3 * moved.motion.time - shown))
+        # The floor is drawn last.
+        tops += [np.asarray(axes.collections[-1].get_paths()[0].vertices)[:, 1].max()]
+        assert tops[-1] == pytest.approx(-moved.motion.floor_displacement[i], abs=1e-12)
+        # A jump of the force by 1 kN moves the floor by 1e-5 m in a step.
+        assert moved.motion.position[i][..., 1].min() > tops[-1] - 1e-5
+        assert axes.get_ylim()[0] < -moved.motion.floor_displacement.max()
+    assert len(tops) == 9
+    assert min(tops) < -0.02
+
+
 def test_mode_shapes_are_named() -> None:
     modes = thud.free_modes(count=4, **COARSE)
     figure = thud.plot.mode_shapes(modes)

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 import time
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import f90nml
@@ -16,7 +17,8 @@ import pytest
 from conftest import MINIMAL
 
 import thud
-from thud.files import add_files
+from thud.errors import PlausibilityWarning
+from thud.files import add_files, locked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -346,3 +348,52 @@ def test_results_of_an_older_version_keep_their_case(
     assert result.returncode == 0
     assert read_bytes(out) == {**two_inputs["b"], "force.png": b"figure"}
     assert f90nml.read(out / "effective.nml")["ball"]["mass"] == 2.4
+
+
+def test_files_of_two_inputs_are_not_read_as_one(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    for name in ("force.csv", "summary.nml", "effective.nml"):
+        run("a/case.nml")
+        assert thud.read_results(out).case.ball.mass == 2.5
+        (out / name).write_bytes(two_inputs["b"][name])
+        with pytest.raises(thud.InputError, match=f"{name} is not as the run has written it"):
+            thud.read_results(out)
+        run("a/case.nml")
+    add_files(out, {"force.png": b"figure"})
+    thud.read_results(out)
+
+
+def test_results_without_their_manifest_are_read_with_a_remark(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    run(case_file(MINIMAL))
+    out = tmp_path / "outputs/case"
+    whole = thud.read_results(out)
+    (out / ".thud").unlink()
+    with pytest.warns(PlausibilityWarning, match="nothing shows that the files belong together"):
+        found = thud.read_results(out)
+    assert len(found.remarks) == len(whole.remarks) + 1
+
+
+def test_snapshots_outside_the_directory_are_not_read(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    run(case_file(MINIMAL))
+    out = tmp_path / "outputs/case"
+    (out / ".thud").unlink()
+    (out / "motion.pvd").write_text('timestep="0.0" file="../secret.vtu"')
+    with pytest.raises(thud.InputError, match=r"'../secret.vtu' is named .* names without"):
+        thud.read_results(out)
+
+
+def test_reader_waits_for_a_writer(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
+    run(case_file(MINIMAL))
+    out = tmp_path / "outputs/case"
+    with ThreadPoolExecutor(1) as reader:
+        with locked(out):
+            reading = reader.submit(thud.read_results, out)
+            time.sleep(0.1)
+            assert not reading.done()
+        assert reading.result(20).contact_time > 0

@@ -60,8 +60,19 @@ tables = (
     flagship.to_xarray().sizes,
     many.to_xarray().sizes,
 )
-floor, room = thud.Floor(thickness=0.2), thud.Room(volume=40.0)
+floors: list[thud.FloorOptions] = [thud.Rigid(), thud.InfinitePlate(1600.0), thud.Oscillator()]
+floors += [thud.FloatingFloor(), thud.JoistFloor(), thud.MeasuredMobility()]
+light: thud.Impact = thud.solve(ball, floor=floors[1])
+moved: thud.FloorImpact | None = light.on_floor
+assert moved is not None
+portions: thud.FloorEnergy = moved.injected_energy("third")
+print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]), moved.difference())
+name: thud.FloorName = chosen
+floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
 below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
+places: thud.ModalRoom = thud.modal_room(flagship, floor, room, balls=1, microphones=2)
+tapping: thud.TappingLevel = thud.tapping_level(floor)
+several: thud.FloorComparison = thud.compare_floors({"thin": below})
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
 site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
 rating: thud.Rating = thud.rating(thud.standardised_level(site.level, 0.6, 40.0))
@@ -97,6 +108,9 @@ results = [
     spread,
     shares,
     below,
+    places,
+    several,
+    tapping,
     site,
     rating,
     learned,

@@ -13,8 +13,11 @@ from thud._api import version
 from thud.checks import suggestion
 from thud.cli.calibrate import CALIBRATE
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.examples import EXAMPLES
+from thud.cli.explore import EXPLORE
 from thud.cli.export import EXPORT
 from thud.cli.figures import compare_cases, draw_figures
+from thud.cli.floor import FLOOR
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
 from thud.cli.rate import RATE
@@ -74,6 +77,7 @@ COMMANDS = {
         compare_cases,
         "nothing is written",
     ),
+    "explore": EXPLORE,
     "measure": MEASURE,
     "calibrate": CALIBRATE,
     "export": EXPORT,
@@ -95,7 +99,9 @@ COMMANDS = {
         run_history,
     ),
     "rate": RATE,
+    "floor": FLOOR,
     **study_commands(),
+    "examples": EXAMPLES,
     "figures": Command(
         "draw the figures of the paper and of the documentation",
         (output("the figures (default: outputs/figures)", default="outputs/figures"), QUIET),

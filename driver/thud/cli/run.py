@@ -87,6 +87,8 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
         folder = Path(name)
         if figures:
             plot.save_all(plot.case_figures(impact, modes, curve), folder)
-        if animation and impact is not None and impact.motion:
-            plot.animate(impact, folder / "motion.gif")
+        shown = {} if impact is None else {"motion": impact, "floor_motion": impact.on_floor}
+        for file, moving in shown.items():
+            if animation and moving is not None and moving.motion:
+                plot.animate(moving, folder / f"{file}.gif")
         return {path.name: path.read_bytes() for path in folder.iterdir()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
 from thud.floors.rating import Rating, rated_bands, rating, standardised_level
 from thud.floors.survey import RoomLevels
-from thud.impact import Impact
+from thud.impact import FloorImpact, Impact, new_floor_impact
 from thud.levels import BANDWIDTHS, get_bands
 from thud.recordings.recording import Recording
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud._schema import Floor, Room
+    from thud._schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
 # Modes of a third below which a statistical answer is doubtful.
@@ -37,7 +37,7 @@ class RoomPrediction(Displayed):
 
     Attributes
     ----------
-    floor, room : Floor and Room
+    floor, room : Plate and Room
         What it was predicted for.
     frequency : ndarray, shape (12,)
         Rounded mid frequencies of the thirds 50 to 630 Hz.
@@ -53,15 +53,29 @@ class RoomPrediction(Displayed):
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
         Expected number of modes in each third.
-    resistance : float
-        Resistance of the infinite plate, N s/m.
+    surface_mass : float
+        Mass of the radiating plate over its area, kg/m2.
+    spread : ndarray, shape (12,)
+        Expected standard deviation of the level for one position of the source and one of the
+        microphone, dB: theory of the variance by modal overlap (Langley and Cotoni 2004).
+    octave_level, octave_time : ndarray, shape (4,)
+        Maximum Fast levels of the octaves 63 to 500 Hz, dB, and their times, s: maxima of the sums
+        of their thirds.
+    history_time : ndarray, shape (n_time,)
+        Instants after the impact, s.
+    history : ndarray, shape (n_time, 12)
+        What the Fast detector shows in each third then, dB.
+    conductance : ndarray, shape (12,)
+        Power that a force of unit mean square gives to the floor, m/(N s).
+    force : str
+        ``"contact"``: the prediction is of the force on the floor, which moves under the source;
+        ``"blocked"``: of the force on a rigid floor, as recordings and measured modes have it.
     force_change : float
-        What the peak of the force would change by if the floor gave way, dB: of a linear source
-        with the mass and the contact time of the impact. The prediction uses the force on a rigid
-        floor.
+        Change of the peak of the force by the floor, dB; of a blocked force that which a linear
+        source with the mass and the contact time of the impact would have.
     """
 
-    floor: Floor
+    floor: FloorOptions
     room: Room
     frequency: NDArray[np.float64]
     level: NDArray[np.float64]
@@ -72,13 +86,32 @@ class RoomPrediction(Displayed):
     reverberation_time: NDArray[np.float64]
     floor_modes: NDArray[np.float64]
     room_modes: NDArray[np.float64]
-    resistance: float
+    conductance: NDArray[np.float64]
+    surface_mass: float
+    spread: NDArray[np.float64]
+    octave_level: NDArray[np.float64]
+    octave_time: NDArray[np.float64]
+    history_time: NDArray[np.float64]
+    history: NDArray[np.float64]
+    force: Literal["contact", "blocked"]
     force_change: float
 
     @property
     def rating(self) -> Rating:
         """Single numbers of the levels in the room."""
         return rating(self.level, THIRDS)
+
+    @property
+    def radiated_share(self) -> NDArray[np.float64]:
+        """Share of the floor's losses that it radiates into the room, shape (12,)."""
+        air = self.room.air_density * self.room.sound_speed
+        omega = 2 * np.pi * self.frequency
+        return air * self.radiation_factor / (self.surface_mass * omega * self.loss_factor)
+
+    @property
+    def octave_rating(self) -> Rating:
+        """Single numbers of the octaves in the room, with the Korean class."""
+        return rating(self.octave_level, BANDWIDTHS[0])
 
     @property
     def standardised(self) -> NDArray[np.float64]:
@@ -104,9 +137,11 @@ class RoomPrediction(Displayed):
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             found.append(
                 f"fewer than {FEW_MODES} modes of floor or room at {bands} Hz: levels there are "
-                "means over many floors and rooms, single ones differ by several dB"
+                "means over many floors and rooms; single positions are expected to differ with a "
+                f"standard deviation of {self.spread[few].max():.1f} to "
+                f"{self.spread[few].min():.1f} dB"
             )
-        if abs(self.force_change) > NOTICED:
+        if self.force == "blocked" and abs(self.force_change) > NOTICED:
             found.append(
                 f"the floor gives way: the peak of the force would change by about "
                 f"{self.force_change:.1f} dB, and the force on a rigid floor is used"
@@ -126,9 +161,12 @@ class RoomPrediction(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
-        head = ("third, Hz", "L_i,Fmax, dB", "standardised, dB", "energy, mJ", "floor modes")
-        columns = (self.level, self.standardised, 1e3 * self.energy, self.floor_modes)
-        forms = (".1f", ".1f", ".3g", ".1f")
+        head = (
+            "third, Hz", "L_i,Fmax, dB", "standardised, dB", "spread, dB", "energy, mJ",
+            "floor modes",
+        )  # fmt: skip
+        columns = (self.level, self.standardised, self.spread, 1e3 * self.energy, self.floor_modes)
+        forms = (".1f", ".1f", ".1f", ".3g", ".1f")
         cells = [
             [f"{value:{form}}" for value in column]
             for column, form in zip(columns, forms, strict=True)
@@ -149,13 +187,14 @@ class RoomPrediction(Displayed):
 
 
 def predict_level(
-    source: Impact | Recording, floor: Floor | None = None, room: Room | None = None
+    source: Impact | Recording, floor: FloorOptions | None = None, room: Room | None = None
 ) -> RoomPrediction:
     """Predict the level that an impact causes in the room below.
 
     Transient statistical energy analysis in thirds: the floor takes the energy of an infinite
     plate, loses and radiates it after ISO 12354-1, the room decays with its reverberation time, and
-    the Fast detector shows its maximum. The force is that on a rigid floor.
+    the Fast detector shows its maximum. The force is that on the floor, where the model knows it:
+    on floors that the impact has not seen, the source is dropped once more.
 
     Parameters
     ----------
@@ -174,26 +213,44 @@ def predict_level(
     floor, room = floor or case.floor, room or case.room
     if floor is None or room is None:
         refuse(
-            f"{'floor' if floor is None else 'room'} is not given", "an object of Floor and of Room"
+            f"{'floor' if floor is None else 'room'} is not given", "an object of Plate and of Room"
         )
+    asked = replace(case, modes=None, floor=floor, room=room)
+    moved = _on_floor(source, asked) if isinstance(source, Impact) else None
     levels = (
-        source.levels(THIRDS, force="floor")
+        (moved or source).levels(THIRDS, force="floor")
         if isinstance(source, Impact)
         else source.levels(THIRDS)
     )
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    asked = replace(case, modes=None, floor=floor, room=room)
     found = call(api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
     bands = found["bands"]
-    mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+    if moved and isinstance(source, Impact):
+        change = 20 * math.log10(moved.peak("floor") / source.peak("floor"))
+    else:
+        mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+        change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
     return RoomPrediction(
         floor=floor,
         room=room,
-        resistance=found["resistance"],
-        force_change=_force_change(mass, source.contact_time, found["resistance"]),
+        force="contact" if moved else "blocked",
+        force_change=change,
         time_of_maximum=bands.pop("time"),
+        surface_mass=found["surface_mass"],
+        octave_level=found["octaves"]["level"],
+        octave_time=found["octaves"]["time"],
+        history_time=found["history"]["time"],
+        history=found["history"]["level"],
         **bands,
     )
+
+
+def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
+    """Return the impact on the floor of a case; None where its force is the blocked one."""
+    if source.case.floor == case.floor:
+        return source.on_floor
+    plain = replace(case, compression=None)
+    return new_floor_impact(case, call(api.drop_on_floor, case_text(plain)), source.floor_force)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

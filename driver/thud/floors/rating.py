@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
 # Levels beyond it, dB, are none of sound.
 LARGEST_LEVEL = 1000.0
-# Words of the Korean classes.
+# Words of the Korean classes, and their maximum levels, dB.
 CLASSES = ("none", "1", "2", "3", "4")
+CLASS_LIMITS: tuple[float, ...] = tuple(level_api.get_class_limits(len(CLASSES) - 1))
 
 
 @dataclass(frozen=True, repr=False)

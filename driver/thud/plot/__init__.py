@@ -19,6 +19,7 @@ from thud.plot.comparison import comparison_page as comparison_page
 from thud.plot.compression import compression as compression
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
+from thud.plot.floor import draw_floor as draw_floor
 from thud.plot.force_history import force_history as force_history
 from thud.plot.history import draw_history as draw_history
 from thud.plot.level_changes import level_changes as level_changes
@@ -40,6 +41,8 @@ from thud.plot.loss_factor import loss_factor as loss_factor
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion
+from thud.plot.plate_modes import plate_modes as plate_modes
+from thud.plot.prediction import draw_decay as draw_decay
 from thud.plot.prediction import draw_prediction as draw_prediction
 from thud.plot.recording import recording_forces as recording_forces
 from thud.plot.recording import recording_levels as recording_levels

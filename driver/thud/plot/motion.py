@@ -19,7 +19,7 @@ from thud.errors import InputError
 from thud.files import replace_file
 from thud.impact import Impact
 from thud.motion import Motion
-from thud.plot.examples import solve_published
+from thud.plot.examples import solve_chipboard, solve_published
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure
 
@@ -44,7 +44,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     Returns
     -------
     Figure
-        Half sections on the floor; displacement since first touch in mm, time in ms.
+        Half sections on the floor where it is; displacement since first touch in mm, time in ms.
 
     Raises
     ------
@@ -60,8 +60,9 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     figure = new_figure(0.6 + 1.6 * rows)
     panels = figure.subplots(rows, 3, squeeze=False).ravel()
     scale = _scale(shown, chosen)
+    depth = shown.floor_displacement[chosen].max()
     for axes, i in zip(panels, chosen, strict=False):
-        arrows = _draw_instant(axes, impact, shown, i, scale)
+        arrows = _draw_instant(axes, impact, i, scale, depth)
     for axes in panels:
         axes.set_axis_off()
     add_colour_bar(figure, panels, scale, LABEL)
@@ -98,7 +99,8 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
 
     def draw(i: int) -> list[Any]:
         axes.clear()
-        _add_key(axes, _draw_instant(axes, impact, shown, i, scale), impact)
+        depth = shown.floor_displacement.max()
+        _add_key(axes, _draw_instant(axes, impact, i, scale, depth), impact)
         axes.set_axis_off()
         return []
 
@@ -132,16 +134,21 @@ def _displacement(shown: Motion, i: int) -> NDArray[np.float64]:
     return length
 
 
-def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Normalize) -> Quiver:
-    """Draw the ball at one instant, its velocities and the floor; return the arrows."""
+def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> Quiver:
+    """Draw the ball, its velocities and the floor at one instant; return the arrows.
+
+    The floor is shown down to a depth in m, and a little further.
+    """
     radius = impact.case.ball.outer_radius
+    shown = _snapshots(impact)
     place = shown.position[i]
+    floor = -shown.floor_displacement[i]
     draw_section(axes, place, 1e3 * _displacement(shown, i), scale)
     some = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
     start, velocity = (field[some].reshape(-1, 2) for field in (place, shown.velocity[i]))
     # At first touch an arrow is as long as a third of the radius.
     unit = 3 * impact.impact_velocity / radius
-    above = start[:, 1] + velocity[:, 1] / unit >= 0
+    above = start[:, 1] + velocity[:, 1] / unit >= floor
     arrows = axes.quiver(
         *start[above].T,
         *velocity[above].T,
@@ -153,11 +160,12 @@ def _draw_instant(axes: Axes, impact: Impact, shown: Motion, i: int, scale: Norm
         # A light edge shows arrows on dark colours.
         path_effects=[withStroke(linewidth=1, foreground="white")],
     )
-    axes.fill_between([-0.05 * radius, 1.4 * radius], -0.12 * radius, 0, color="0.6", linewidth=0)
+    lowest = -depth - 0.12 * radius
+    axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
     since = 1e3 * (shown.time[i] - impact.touch_time)
     axes.set_title(f"{since:.1f} ms", fontsize=SIZE, pad=2)
     axes.set_xlim(-0.05 * radius, 1.4 * radius)
-    axes.set_ylim(-0.15 * radius, 2.4 * radius)
+    axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
     axes.set_aspect("equal")
     return arrows
 
@@ -172,5 +180,13 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
     axes.add_artist(key)
 
 
-IMPACT_FIGURES = {"motion": lambda impact: motion(impact) if impact.motion else None}
-DOCUMENTATION_FIGURES = {"figure5_motion": lambda: motion(solve_published())}
+def _draw(impact: Impact | None) -> Figure | None:
+    """Draw the motion of an impact that has snapshots."""
+    return motion(impact) if impact and impact.motion else None
+
+
+IMPACT_FIGURES = {"motion": _draw, "floor_motion": lambda impact: _draw(impact.on_floor)}
+DOCUMENTATION_FIGURES = {
+    "figure5_motion": lambda: motion(solve_published()),
+    "floor_motion": lambda: _draw(solve_chipboard().on_floor),
+}

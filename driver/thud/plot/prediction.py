@@ -7,7 +7,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.floors.prediction import RoomPrediction, predict_level
-from thud.plot.look import COLOURS, SIZE, WIDTH, band_axis, dress, legend_above, new_figure
+from thud.plot.look import (
+    COLOURS,
+    GREY,
+    SIZE,
+    WIDTH,
+    band_axis,
+    dress,
+    empty_axes,
+    legend_above,
+    line_style,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,6 +26,10 @@ if TYPE_CHECKING:
 
     from thud.floors.survey import RoomLevels
     from thud.impact import Impact
+
+
+# How far below the lowest maximum a decay is drawn, dB.
+DECAY = 30
 
 
 def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
@@ -39,6 +54,8 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
     middle.set_ylim(bottom=0)
     middle.set_ylabel("Floor", fontsize=SIZE)
     dress(below)
+    low, high = found.level - found.spread, found.level + found.spread
+    below.fill_between(place, low, high, color=GREY, linewidth=0, label="± expected spread")
     below.plot(place, found.level, color=COLOURS[0], linewidth=1.2)
     for marks, face in ((few, "white"), (~few, COLOURS[0])):
         below.plot(
@@ -65,6 +82,26 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
     return figure
 
 
+def draw_decay(found: RoomPrediction) -> Figure:
+    """Draw what the Fast detector shows against time, in a third of each octave."""
+    figure, axes = empty_axes(2.6)
+    for i, band in enumerate(range(1, len(found.frequency), 3)):
+        label = f"{found.frequency[band]:g} Hz"
+        axes.plot(1e3 * found.history_time, found.history[:, band], label=label, **line_style(i))
+        axes.plot(
+            1e3 * found.time_of_maximum[band], found.level[band], color=COLOURS[i], marker="o",
+            markersize=4, linestyle="none",
+        )  # fmt: skip
+    top = found.level[1::3].max()
+    axes.set_ylim(found.level[1::3].min() - DECAY, top + 3)
+    axes.set_xlim(left=0)
+    axes.set_xlabel("Time after the impact, ms", fontsize=SIZE)
+    axes.set_ylabel("Fast level, dB re 20 µPa", fontsize=SIZE)
+    axes.plot([], [], color="black", marker="o", markersize=4, linestyle="none", label="maximum")
+    legend_above(axes)
+    return figure
+
+
 def _style(line: Line2D) -> dict[str, Any]:
     return {
         "color": line.get_color(), "marker": line.get_marker(), "linestyle": line.get_linestyle(),
@@ -77,4 +114,9 @@ def _draw_room(impact: Impact) -> Figure | None:
     return draw_prediction(predict_level(impact)) if impact.case.room else None
 
 
-IMPACT_FIGURES = {"room": _draw_room}
+def _draw_decay(impact: Impact) -> Figure | None:
+    """Draw the decay in the room of a case that has one."""
+    return draw_decay(predict_level(impact)) if impact.case.room else None
+
+
+IMPACT_FIGURES = {"room": _draw_room, "room_decay": _draw_decay}

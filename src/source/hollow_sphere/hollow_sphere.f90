@@ -3,12 +3,13 @@
 module thud_hollow_sphere
    use thud_ball, only: ball_type
    use thud_constants, only: pi
+   use thud_contact_source, only: coarse_error
    use thud_drop, only: drop_type
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, name_length
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, coarse_error, lumped_type, solve_lumped
+   use thud_lumped, only: at_deflection, at_impulse, at_loss, at_velocity, lumped_type, solve_lumped
    use thud_new_field, only: choice_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
@@ -119,6 +120,8 @@ contains
       shell%radius = ball%outer_radius
       shell%closing_deflection = 2*(ball%outer_radius - ball%wall_thickness)
       shell%mass = ball%mass
+      ! m = M (1 - deflection/2R): the rest of the wall lies on the floor.
+      shell%cap_growth = ball%mass/(2*ball%outer_radius)
       shell%stiffness = get_shell_stiffness(ball)
       shell%initial_pressure = ball%ambient_pressure + ball%gauge_pressure
       shell%ambient_pressure = ball%ambient_pressure
@@ -295,7 +298,7 @@ contains
       end if
       shell = new_shell(ball, compression_weights(choice), restitution_weights(choice))
       call solve_lumped(shell, drop, sampling, [character(len=12) :: 'shell_force', 'gas_force', 'flux_force'], &
-         history, error)
+         history, error, receiver)
    end subroutine solve_hollow_sphere
 
 end module thud_hollow_sphere

@@ -7,20 +7,21 @@
 !> is no penalty stiffness.
 module thud_modal_ball
    use thud_ball, only: ball_type
+   use thud_ball_motion, only: ball_motion_type, new_ball_motion, take_step
    use thud_blas_threads, only: use_one_blas_thread
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
-   use thud_force_history, only: continue_to_zero, force_history_type, new_force_history
+   use thud_force_history, only: continue_to_zero, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
-   use thud_lapack, only: dgemm, dgemv
+   use thud_lapack, only: dgemm
    use thud_modal_ball_options, only: modal_ball_options_type
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
-   use thud_mode_step, only: advance, get_energies, mode_step_type, place_q, place_v, set_factors
-   use thud_ring_contact, only: follow_sliding, new_ring_contact, ring_contact_type, solve_contact
-   use thud_receiver, only: receiver_type
+   use thud_mode_step, only: get_energies, mode_step_type, place_q, place_v, set_factors
+   use thud_receiver, only: can_strike, get_impulse_response, new_receiver_step, receiver_type
+   use thud_ring_contact, only: new_ring_contact, ring_contact_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, surface_rings_type
@@ -33,8 +34,8 @@ module thud_modal_ball
    !> Maximum phase angle of a mode in a step; faster ones answer statically.
    real(wp), parameter :: max_phase = pi/2
 
-   !> Part of the energy at first touch that the steps may lose in contact.
-   real(wp), parameter :: max_energy_residual = 0.02_wp
+   !> Part of the energy at first touch that closing gaps within a step may take.
+   real(wp), parameter :: max_contact_loss = 0.02_wp
 
    !> Families whose energies are separate channels, from n = 0 on.
    integer, parameter :: n_family = 6
@@ -47,26 +48,6 @@ module thud_modal_ball
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
    end type modal_ball_type
-
-   !> Motion of the ball.
-   type :: state_type
-      !> Amplitudes of the modes, m sqrt(kg), their rates and strains of their branches: [n_mode, 2 + n_branch].
-      real(wp), allocatable :: motion(:, :)
-      !> Height of the centre of mass, m.
-      real(wp) :: height
-      !> Its velocity upwards, m/s.
-      real(wp) :: speed
-      !> Its acceleration downwards without contact, m/s2.
-      real(wp) :: gravity = 0.0_wp
-      !> Energy that damping has taken, J.
-      real(wp) :: loss = 0.0_wp
-      !> Workspace of a step: motion at its beginning; push of the floor on the modes: [n_mode].
-      real(wp), allocatable :: before(:, :), push(:)
-      !> Gaps between rings and floor, and of rings that stick to where they touched first, m: [n_gap].
-      real(wp), allocatable :: gap(:)
-      !> Gaps of the undeformed ball with its centre on the floor, m: [n_gap].
-      real(wp), allocatable :: start(:)
-   end type state_type
 
 contains
 
@@ -121,8 +102,12 @@ contains
       type(mode_step_type) :: step
       type(ring_contact_type) :: contact
       type(surface_rings_type) :: rings
+      type(receiver_type) :: floor
+      type(ball_motion_type) :: state
       real(wp) :: interval
       integer :: n_sample, i
+
+      if (present(receiver)) floor = receiver
 
       n_sample = get_sample_count(sampling)
       interval = 1/(sampling%sample_rate*real(sampling%substeps, wp))
@@ -133,18 +118,24 @@ contains
       allocate (history%channel(n_sample, n_family + 2), source=0.0_wp)
       call use_one_blas_thread()
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
-      call prepare(ball, options, rings, interval, step, contact, error)
+      call prepare(ball, options, rings, floor, interval, step, contact, error)
       if (allocated(error)) return
-      call march(ball, merge(drop%gravity, 0.0_wp, options%contact_gravity), sampling, interval, rings, step, contact, &
-         history, error)
+      state = new_ball_motion(step, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
+         merge(drop%gravity, 0.0_wp, options%contact_gravity))
+      if (state%floor_moves) then
+         allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
+      end if
+      call march(ball, sampling, interval, rings, step, contact, state, history, error)
    end subroutine solve
 
    !> Modes, their steps and the response of the rings.
-   subroutine prepare(ball, options, rings, interval, step, contact, error)
+   subroutine prepare(ball, options, rings, floor, interval, step, contact, error)
       type(ball_type), intent(in) :: ball
       !> Modes and damping.
       class(modal_ball_options_type), intent(in) :: options
       type(surface_rings_type), intent(in) :: rings
+      !> What the ball drops on.
+      type(receiver_type), intent(in) :: floor
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(mode_step_type), intent(out) :: step
@@ -156,7 +147,8 @@ contains
       logical :: failed
 
       response = 0.0_wp
-      response(::rings%n_way, ::rings%n_way) = interval/ball%mass
+      response(::rings%n_way, ::rings%n_way) = interval/ball%mass + get_impulse_response(floor, &
+         new_receiver_step(floor, interval))
       call add_modes(ball, options, rings, interval, step, response, error)
       if (allocated(error)) return
       allocate (zeta, mold=step%omega)
@@ -221,35 +213,29 @@ contains
       end associate
    end subroutine add_modes
 
-   !> Marches from first touch until the ball has left for good.
-   subroutine march(ball, gravity, sampling, interval, rings, step, contact, history, error)
+   !> Marches from first touch until the ball has left for good, on a floor that moves to the end of the record.
+   subroutine march(ball, sampling, interval, rings, step, contact, state, history, error)
       type(ball_type), intent(in) :: ball
-      !> Gravity that acts during the contact, m/s2.
-      real(wp), intent(in) :: gravity
       type(sampling_type), intent(in) :: sampling
       !> Length of a step, s.
       real(wp), intent(in) :: interval
       type(surface_rings_type), intent(in) :: rings
       type(mode_step_type), intent(in) :: step
       type(ring_contact_type), intent(inout) :: contact
+      !> Motion of ball and floor.
+      type(ball_motion_type), intent(inout) :: state
       type(force_history_type), intent(inout) :: history
       !> The contact outlasts the record, or energy is lost in contact.
       type(error_type), allocatable, intent(out) :: error
-      type(state_type) :: state
       real(wp) :: impulse, quiet
       integer :: i, j, n_step, last
+      logical :: left
 
-      allocate (state%motion, state%before, source=0*step%factor(:, :, place_q))
-      allocate (state%push, source=0*step%omega)
-      allocate (state%gap(size(step%fall, 2)), state%start(size(step%fall, 2)), source=0.0_wp)
-      state%start(::rings%n_way) = -ball%outer_radius*rings%height
-      state%height = ball%outer_radius
-      state%speed = -history%impact_velocity
-      state%gravity = gravity
       ! The surface may touch again while the slowest mode swings back, half a period later.
       quiet = 0.0_wp
       if (size(step%omega) > 0) quiet = pi/(sqrt(step%spring)*minval(step%omega))
       last = 0
+      left = .false.
       samples: do i = 1, size(history%floor_force)
          call record_motion(ball, step, state, i, history)
          do j = 1, sampling%substeps
@@ -269,64 +255,46 @@ contains
                   //' mm; allowed: a lower height, or a stiffer ball')
                return
             end if
-            if (state%speed > 0.0_wp .and. (n_step - last)*interval > quiet) exit samples
+            left = state%speed > 0.0_wp .and. (n_step - last)*interval > quiet
+            if (left .and. .not. state%floor_moves) exit samples
          end do
+         if (state%floor_moves) then
+            ! The mean of the interval, as the force is.
+            history%floor_velocity(i) = (state%floor_motion%displacement - history%floor_displacement(i)) &
+               *sampling%sample_rate
+            history%velocity(i) = history%velocity(i) - history%floor_velocity(i)
+         end if
       end do samples
-      if (i > size(history%floor_force)) then
-         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(quiet)//' s after the last contact; allowed: longer than that')
-         return
-      end if
+      call check_end(sampling, quiet, left, contact, state, error)
+      if (allocated(error)) return
       history%contact_time = last*interval
       call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call finish(ball, n_step*interval, step, state, history, error)
    end subroutine march
 
-   !> One step of the modes, and the impulses of the floor at its beginning.
-   subroutine take_step(step, interval, mass, state, contact, impulse, error)
-      type(mode_step_type), intent(in) :: step
-      !> Length of the step, s; mass of the ball, kg.
-      real(wp), intent(in) :: interval, mass
-      !> Motion of the ball.
-      type(state_type), intent(inout) :: state
-      !> The rings; get their impulses.
-      type(ring_contact_type), intent(inout) :: contact
-      !> Impulse of all rings, N s.
-      real(wp), intent(out) :: impulse
-      !> The contact cannot be solved.
+   !> Refuses a record that ends too early.
+   subroutine check_end(sampling, quiet, left, contact, state, error)
+      type(sampling_type), intent(in) :: sampling
+      !> Time without contact after which the surface touches no more, s.
+      real(wp), intent(in) :: quiet
+      !> It has passed, and the ball rises.
+      logical, intent(in) :: left
+      type(ring_contact_type), intent(in) :: contact
+      !> Motion of ball and floor.
+      type(ball_motion_type), intent(in) :: state
+      !> The ball touches, or may touch again.
       type(error_type), allocatable, intent(out) :: error
-      integer :: i, n_mode, n_gap
 
-      n_mode = size(step%omega)
-      associate (motion => state%motion, before => state%before, push => state%push, gap => state%gap, way => contact%n_way)
-         before = motion
-         call advance(step, before, motion)
-         push = 0.0_wp
-         impulse = 0.0_wp
-         state%height = state%height + interval*(state%speed - interval*state%gravity/2)
-         state%speed = state%speed - interval*state%gravity
-         gap = state%start
-         gap(::way) = gap(::way) + state%height
-         if (n_mode > 0) call dgemv('T', n_mode, size(gap), -1.0_wp, step%fall, n_mode, motion, 1, 1.0_wp, gap, 1)
-         call solve_contact(contact, gap, error)
-         if (allocated(error)) return
-         call follow_sliding(contact, state%start)
-         n_gap = contact%last_gap
-         if (n_gap > 0) then
-            impulse = sum(contact%impulse(:n_gap:way))
-            if (n_mode > 0) call dgemv('N', n_mode, n_gap, 1.0_wp, step%fall, n_mode, contact%impulse, 1, &
-               0.0_wp, push, 1)
-            do i = 1, size(motion, 2)
-               motion(:, i) = motion(:, i) - step%factor(:, i, place_v)*push
-            end do
-            state%speed = state%speed + impulse/mass
-            state%height = state%height + interval*impulse/mass
+      if (.not. left) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
+            //to_text(quiet)//' s after the last contact; allowed: longer than that')
+      else if (state%floor_moves) then
+         if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_way)), state%speed)) then
+            error = input_error('&sampling: duration = '//to_text(sampling%duration) &
+               //' s ends while the floor may strike the ball again; allowed: longer')
          end if
-         ! The loss by damping lies between the impulse at the beginning and the end of the step.
-         before(:, place_v) = before(:, place_v) - push
-         state%loss = state%loss + sum(get_energies(step, before) - get_energies(step, motion))
-      end associate
-   end subroutine take_step
+      end if
+   end subroutine check_end
 
    !> Scalars of the impact, and the check of the balances.
    subroutine finish(ball, time, step, state, history, error)
@@ -335,7 +303,7 @@ contains
       real(wp), intent(in) :: time
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball after the contact.
-      type(state_type), intent(in) :: state
+      type(ball_motion_type), intent(in) :: state
       !> The history; its samples are complete.
       type(force_history_type), intent(inout) :: history
       !> The balance of energy does not close.
@@ -351,13 +319,21 @@ contains
       history%restitution = (state%speed + state%gravity*(time - history%contact_time))/history%impact_velocity
       gain = ball%mass*(history%impact_velocity + state%speed + state%gravity*time)
       history%impulse_residual = abs(history%impulse - gain)/gain
+      history%floor_work = state%floor_work
+      history%fact_name = [character(len=len(history%fact_name)) :: 'contact_loss']
+      history%fact_unit = [character(len=len(history%fact_unit)) :: 'J']
+      history%fact = [state%contact_loss]
       initial = ball%mass/2*history%impact_velocity**2
       energy = ball%mass*(state%speed**2/2 + state%gravity*(state%height - ball%outer_radius)) &
-         + sum(get_energies(step, state%motion)) + state%loss
+         + sum(get_energies(step, state%motion)) + state%loss + state%contact_loss + state%floor_work
       history%energy_residual = abs(energy - initial)/initial
-      if (.not. history%energy_residual <= max_energy_residual) then
+      ! Written so that NaN fails too.
+      if (.not. abs(state%contact_loss)/initial <= max_contact_loss) then
+         error = numerical_error('&sampling: substeps is too low: contact loses '//to_text(state%contact_loss/initial) &
+            //' of the energy; allowed: up to '//to_text(max_contact_loss))
+      else if (.not. history%energy_residual <= max_residual) then
          error = numerical_error('&sampling: substeps is too low: the balance of energy misses by ' &
-            //to_text(history%energy_residual)//'; allowed: up to '//to_text(max_energy_residual))
+            //to_text(history%energy_residual)//'; allowed: up to '//to_text(max_residual))
       end if
    end subroutine finish
 
@@ -366,7 +342,7 @@ contains
       type(ball_type), intent(in) :: ball
       type(mode_step_type), intent(in) :: step
       !> Motion of the ball.
-      type(state_type), intent(in) :: state
+      type(ball_motion_type), intent(in) :: state
       !> Number of the sample.
       integer, intent(in) :: i
       type(force_history_type), intent(inout) :: history
@@ -374,8 +350,9 @@ contains
       integer :: k, place
 
       energy = get_energies(step, state%motion)
-      history%deflection(i) = ball%outer_radius - state%height
+      history%deflection(i) = ball%outer_radius - state%height - state%floor_motion%displacement
       history%velocity(i) = -state%speed
+      if (state%floor_moves) history%floor_displacement(i) = state%floor_motion%displacement
       history%max_deflection = max(history%max_deflection, history%deflection(i))
       do k = 1, size(energy)
          place = 2 + min(step%harmonic(k), n_family)

@@ -1,0 +1,21 @@
+# Installs the executable, and the library for find_package(thud) and pkg-config.
+include(CMakePackageConfigHelpers)
+file(RELATIVE_PATH to_libraries "/${CMAKE_INSTALL_BINDIR}" "/${CMAKE_INSTALL_LIBDIR}")
+set_target_properties(thud PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
+install(TARGETS thud)
+install(TARGETS thud_library EXPORT thudTargets)
+install(DIRECTORY "${module_directory}/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/thud")
+
+set(package_directory "${CMAKE_INSTALL_LIBDIR}/cmake/thud")
+install(EXPORT thudTargets NAMESPACE thud:: DESTINATION "${package_directory}")
+configure_package_config_file("${PROJECT_SOURCE_DIR}/cmake/thudConfig.cmake.in" thudConfig.cmake
+  INSTALL_DESTINATION "${package_directory}")
+write_basic_package_version_file(thudConfigVersion.cmake COMPATIBILITY SameMajorVersion)
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/thudConfig.cmake" "${CMAKE_CURRENT_BINARY_DIR}/thudConfigVersion.cmake"
+  "${PROJECT_SOURCE_DIR}/cmake/FindFFTW.cmake" "${PROJECT_SOURCE_DIR}/cmake/FindARPACK.cmake"
+  DESTINATION "${package_directory}")
+
+list(JOIN LAPACK_LIBRARIES " " lapack_libraries)
+list(JOIN OpenMP_Fortran_FLAGS " " openmp_flags)
+configure_file("${PROJECT_SOURCE_DIR}/cmake/thud.pc.in" thud.pc @ONLY)
+install(FILES "${CMAKE_CURRENT_BINARY_DIR}/thud.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")

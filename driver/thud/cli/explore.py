@@ -1,0 +1,80 @@
+"""The command that opens the program as a page of a browser."""
+
+from __future__ import annotations
+
+import secrets
+import socket
+import sys
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thud.checks import refuse
+from thud.cli.command import QUIET, Command, argument
+from thud.extras import require_extra
+
+if TYPE_CHECKING:
+    import argparse
+
+# Names of this machine for itself.
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+
+
+def explore(options: argparse.Namespace) -> int:
+    """Serve the page until an interrupt; return the exit code."""
+    with require_extra("explorer"):
+        import uvicorn  # noqa: PLC0415 - an extra
+
+        from thud.explorer.server import new_application, start_with  # noqa: PLC0415 - likewise
+    start = start_with(options.case)
+    token = secrets.token_urlsafe(16)
+    hosts = LOOPBACK if options.host in LOOPBACK else ("*",)
+    application = new_application(start, token=token, hosts=hosts)
+    if not 0 <= options.port < 2**16:
+        refuse(f"--port = {options.port} is no port", f"0 (any that is free) to {2**16 - 1}")
+    try:
+        listener = socket.create_server((options.host, options.port))
+    except OSError as error:
+        refuse(f"{options.host}:{options.port} cannot be listened on", "a free port", error)
+    address = f"http://{options.host}:{listener.getsockname()[1]}/#token={token}"
+    if not options.quiet:
+        print(f"Page: {address}")
+        print("Ctrl-C ends it.")
+        sys.stdout.flush()
+    if hosts == ("*",):
+        print(
+            "thud-driver: the page can be reached from other machines, and is not encrypted; "
+            "who has the address can compute here",
+            file=sys.stderr,
+        )
+    if not options.no_browser:
+        webbrowser.open(address)
+    config = uvicorn.Config(application, log_level="warning", timeout_graceful_shutdown=1)
+    uvicorn.Server(config).run(sockets=[listener])
+    return 0
+
+
+EXPLORE = Command(
+    "the program as a page of a browser",
+    (
+        argument(
+            "case",
+            nargs="?",
+            metavar="CASE.nml|RESULTS",
+            help="case, or directory of results, to begin with (default: the ball of the paper)",
+            type=Path,
+        ),
+        argument(
+            "--host",
+            default=LOOPBACK[0],
+            help=f"address to listen on (default: {LOOPBACK[0]}, this machine only)",
+        ),
+        argument(
+            "--port", type=int, default=0, help="port to listen on (default: any that is free)"
+        ),
+        argument("--no-browser", action="store_true", help="only print the address"),
+        QUIET,
+    ),
+    explore,
+    "nothing is written",
+)

@@ -1,0 +1,52 @@
+"""The command that compares floors."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import TYPE_CHECKING
+
+from thud.case import read_case
+from thud.cli.command import QUIET, Command, argument, output
+from thud.errors import InputError, PlausibilityWarning
+from thud.tables import format_rows
+
+if TYPE_CHECKING:
+    import argparse
+
+    from thud.case import Case
+
+
+def compare(options: argparse.Namespace) -> int:
+    """Compare the floors of cases, print the table and save the page; return the exit code."""
+    from thud.floors.floor_comparison import compare_floors  # noqa: PLC0415 - SciPy takes its time
+
+    cases: dict[str, Case] = {}
+    for path in options.cases:
+        case = read_case(path)
+        if case.name in cases:
+            message = f"{path}: {case.name!r} also names another case; allowed: different names"
+            raise InputError(message)
+        cases[case.name] = case
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PlausibilityWarning)
+        found = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
+    for remark in found.remarks:
+        print(f"thud-driver: {remark}", file=sys.stderr)
+    paths = found.save(options.output)
+    if not options.quiet:
+        print(format_rows(found.rows()))
+        print(f"Page: {paths[-1]}")
+    return 0
+
+
+FLOOR = Command(
+    "floors and rooms of several cases on one page",
+    (
+        argument("cases", nargs="+", metavar="CASE.nml", help="namelist files with floor and room"),
+        output("the page (default: outputs/floors)", default="outputs/floors"),
+        QUIET,
+    ),
+    compare,
+    "nothing is written",
+)

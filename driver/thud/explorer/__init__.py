@@ -1,0 +1,1 @@
+"""The program as a page of a browser; see docs/explorer.md."""

@@ -1,0 +1,146 @@
+"""Floors and rooms side by side: what an impact does to each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+from thud._schema import Plate
+from thud.case import Case
+from thud.checks import refuse, require_kind
+from thud.display import MAKERS, Displayed
+from thud.errors import InputError, ThudError
+from thud.files import replace_file
+from thud.floors.prediction import RoomPrediction, predict_level
+from thud.floors.rating import CLASSES
+from thud.floors.tapping import tapping_level
+from thud.impact import compute
+from thud.levels import get_bands
+
+if TYPE_CHECKING:
+    import os
+
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class FloorComparison(Displayed):
+    """Predictions for several floors and rooms, side by side.
+
+    Attributes
+    ----------
+    predictions : dict of str to RoomPrediction
+        The predictions, by the names of their cases.
+    """
+
+    predictions: dict[str, RoomPrediction]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a reader of the numbers has to know, with the names of the floors."""
+        found = self.predictions.items()
+        return [f"{name}: {remark}" for name, one in found for remark in one.remarks]
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text; columns are the floors."""
+        found = self.predictions.values()
+        octaves = [f"{f:g} Hz octave, dB" for f in get_bands("octave").nominal[1:]]
+        return [
+            ("", *self.predictions),
+            ("floor", *(one.floor.name.replace("_", " ") for one in found)),
+            ("L_iA,Fmax, dB", *(str(one.rating.rounded) for one in found)),
+            ("standardised, dB", *(str(one.standardised_rating.rounded) for one in found)),
+            *(
+                (title, *(f"{one.octave_level[i]:.1f}" for one in found))
+                for i, title in enumerate(octaves)
+            ),
+            (
+                "class (KS F 2863-2)",
+                *(CLASSES[one.octave_rating.korean_class or 0] for one in found),
+            ),
+            ("energy into the floor, mJ", *(f"{1e3 * one.energy.sum():.3g}" for one in found)),
+            ("tapping machine, L_n,w (C_I), dB", *(_tapping(one) for one in found)),
+        ]
+
+    def figure(self) -> Figure:
+        """Return the page as a matplotlib figure."""
+        figure: Figure = MAKERS["floors"](self)
+        return figure
+
+    def html(self) -> str:
+        """Return the page as self-contained HTML with interactive plots."""
+        page: str = MAKERS["floors_html"](self)
+        return page
+
+    def save(self, directory: str | os.PathLike[str]) -> list[Path]:
+        """Write ``floors.png``, ``.svg`` and ``.html`` and return their paths.
+
+        Raises
+        ------
+        OSError
+            Where they cannot be written.
+        """
+        folder = Path(directory)
+        folder.mkdir(parents=True, exist_ok=True)
+        pictures: list[Path] = MAKERS["save_all"]({"floors": self.figure()}, folder)
+        page = folder / "floors.html"
+        replace_file(page, self.html().encode())
+        return [*pictures, page]
+
+    def __repr__(self) -> str:
+        """Return the names of the floors and their levels."""
+        found = (f"{name} {one.rating.rounded} dB" for name, one in self.predictions.items())
+        return f"<FloorComparison: {', '.join(found)}>"
+
+
+def compare_floors(
+    cases: Mapping[str, Case | RoomPrediction], *, progress: bool = False
+) -> FloorComparison:
+    """Compare what an impact causes below several floors.
+
+    Parameters
+    ----------
+    cases
+        Cases with floor and room, which are solved, or predictions, by their names.
+    progress
+        Show a progress bar.
+
+    Raises
+    ------
+    InputError
+        Where there is nothing to compare, or a case has no room.
+    """
+    if not isinstance(cases, Mapping) or not cases:
+        refuse("cases are not given", "a mapping of names to one or more cases or predictions")
+    found: dict[str, RoomPrediction] = {}
+    for name, given in tqdm(cases.items(), unit="floor", disable=not progress, leave=False):
+        require_kind("name", name, str)
+        require_kind(name, given, Case | RoomPrediction)
+        if isinstance(given, RoomPrediction):
+            found[name] = given
+            continue
+        if given.model is None or given.floor is None or given.room is None:
+            refuse(
+                f"{name}: the case has no level in a room", "a case with &model, &floor and &room"
+            )
+        try:
+            found[name] = predict_level(compute(given))
+        except ThudError as error:
+            message = f"{name}: {error}"
+            raise type(error)(message) from error
+    return FloorComparison(found)
+
+
+def _tapping(one: RoomPrediction) -> str:
+    """Return the reference level of the tapping machine, of the floors that have one."""
+    if not isinstance(one.floor, Plate):
+        return ""
+    try:
+        found = tapping_level(one.floor, one.room)
+    except InputError:  # not concrete
+        return ""
+    return f"{found.weighted} ({found.adaptation})"

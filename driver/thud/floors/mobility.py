@@ -1,0 +1,54 @@
+"""Mobility of floors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._api import call, floor_api
+from thud._schema import FloorOptions
+from thud.case import Case, case_text
+from thud.checks import require_array, require_kind, require_real
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def mobility(
+    floor: FloorOptions, frequency: ArrayLike, point: tuple[float, float] | None = None
+) -> NDArray[np.complex128]:
+    """Return the mobility of a floor, velocity over force, under the source or to a point.
+
+    Parameters
+    ----------
+    floor
+        An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate` or another floor.
+    frequency : array_like, shape (n,)
+        Frequencies, Hz.
+    point
+        Place along length and width, m, of floors with sides; None: under the source.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Complex mobilities, m/(N s).
+
+    Raises
+    ------
+    InputError
+        Where a key of the floor is out of range, or the floor has no such point.
+
+    Examples
+    --------
+    >>> import thud
+    >>> thud.mobility(thud.InfinitePlate(resistance=1600.0), [31.5]).real
+    array([0.000625])
+    """
+    require_kind("floor", floor, FloorOptions)
+    values = require_real("frequency", require_array("frequency", frequency, dimensions=(0, 1)))
+    x, y = point or (0.0, 0.0)
+    text = case_text(Case(floor=floor))
+    asked = np.ascontiguousarray(np.atleast_1d(values))
+    found = call(floor_api.floor_mobility, text, asked, int(point is not None), x, y)
+    return np.asarray(found["real"] + 1j * found["imaginary"])

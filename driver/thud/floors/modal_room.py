@@ -1,0 +1,393 @@
+"""A modal room under a modal plate: what the positions of ball and microphone do.
+
+The deterministic counterpart of the statistical prediction at low frequencies. The plate is simply
+supported and covers the ceiling of a rectangular room with rigid walls. Both are sums of modes, the
+force acts on the plate, and the plate on the air; the air does not act back on the plate, whose
+loss factor holds the radiation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.signal import lfilter, sosfilt
+
+from thud._api import api, call
+from thud._schema import Plate, Room
+from thud.case import Case, case_text
+from thud.checks import (
+    refuse,
+    refuse_value,
+    require_array,
+    require_kind,
+    require_real,
+    require_whole,
+)
+from thud.display import MAKERS, Displayed
+from thud.floors.prediction import RoomPrediction, predict_level
+from thud.levels import get_bands
+from thud.recordings.bank import band_filters
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.impact import Impact
+    from thud.recordings.recording import Recording
+
+    Array = NDArray[np.float64]
+    ComplexArray = NDArray[np.complex128]
+
+# Thirds 25 to 160 Hz, the first of the set.
+N_BAND = 9
+# Samples per second of the sound pressure, Hz: the filters of class 1 need four times 178 Hz.
+SAMPLE_RATE = 1024.0
+# Modes up to this frequency, Hz. The filter of 160 Hz lets 42 dB less through there.
+HIGHEST = 400.0
+# Least distance of random positions from all boundaries, m (ISO 16283-2).
+BORDER = 0.5
+# Decay that is waited for, dB, and time constant of the Fast detector, s.
+WAITED, FAST = 60.0, 0.125
+REFERENCE_PRESSURE = 2e-5
+# Maximum number of positions of either kind, of modes, and of modes times spectral lines: memory.
+MAX_POSITIONS, MAX_MODES, MAX_VALUES = 1000, 20000, 2 * 10**7
+
+
+@dataclass(frozen=True, repr=False)
+class ModalRoom(Displayed):
+    """Levels in a modal room under a modal plate, for positions of ball and microphone.
+
+    Attributes
+    ----------
+    prediction : RoomPrediction
+        The statistical answer for the same impact, floor and room.
+    size : tuple of float
+        Length, width and height of the room, m.
+    frequency : ndarray, shape (9,)
+        Rounded mid frequencies of the thirds 25 to 160 Hz.
+    balls : ndarray, shape (n_ball, 2)
+        Positions of the ball on the floor, m.
+    microphones : ndarray, shape (n_microphone, 3)
+        Positions of the microphones, m; the third coordinate is the height.
+    level : ndarray, shape (n_ball, n_microphone, 9)
+        Maximum Fast levels, dB re 20 uPa.
+    floor_frequency, room_frequency : ndarray, shape (n_mode,)
+        Natural frequencies of plate and room up to 400 Hz, ascending; the room's begin with 0.
+    plate_energy : ndarray, shape (n_ball, 2)
+        Energy that each impact gives to the modes of the plate, and that they lose, J.
+    room_energy : ndarray, shape (n_ball, 2)
+        Energy that the plate gives to the modes of the room, and that they lose, J.
+    """
+
+    prediction: RoomPrediction
+    size: tuple[float, float, float]
+    frequency: Array
+    balls: Array
+    microphones: Array
+    level: Array
+    floor_frequency: Array
+    room_frequency: Array
+    plate_energy: Array
+    room_energy: Array
+
+    @property
+    def mean(self) -> Array:
+        """Energy mean over all positions, dB, shape (9,)."""
+        mean: Array = 10 * np.log10((10 ** (self.level / 10)).mean(axis=(0, 1)))
+        return mean
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviation of the levels of all positions, dB, shape (9,)."""
+        spread: Array = self.level.std(axis=(0, 1))
+        return spread
+
+    @property
+    def statistical(self) -> Array:
+        """Levels and spread of the statistical prediction, dB, shape (2, 9); NaN below 50 Hz."""
+        found = np.full((2, N_BAND), np.nan)
+        there = np.isin(self.frequency, self.prediction.frequency)
+        n = there.sum()
+        found[:, there] = self.prediction.level[:n], self.prediction.spread[:n]
+        return found
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text, a third each."""
+        head = (
+            "third, Hz", "mean, dB", "spread, dB", "least, dB", "largest, dB",
+            "statistical, dB", "its spread, dB",
+        )  # fmt: skip
+        columns = (
+            self.mean, self.spread, self.level.min(axis=(0, 1)), self.level.max(axis=(0, 1)),
+            *self.statistical,
+        )  # fmt: skip
+        cells = [[f"{v:.1f}" if np.isfinite(v) else "" for v in column] for column in columns]
+        return [head, *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
+
+    def plot(self) -> Figure:
+        """Draw the levels of all positions against the statistical answer."""
+        figure: Figure = MAKERS["modal_room"](self)
+        return figure
+
+    def __repr__(self) -> str:
+        """Return the size of the room and the numbers of positions and modes."""
+        sides = " x ".join(f"{side:g}" for side in np.round(self.size, 2))
+        return (
+            f"<ModalRoom {sides} m: {len(self.balls)} x {len(self.microphones)} positions, "
+            f"{len(self.floor_frequency)} modes of the floor, {len(self.room_frequency)} of the "
+            "room>"
+        )
+
+
+def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in them
+    source: Impact | Recording,
+    floor: Plate | None = None,
+    room: Room | None = None,
+    *,
+    balls: int | ArrayLike = 16,
+    microphones: int | ArrayLike = 32,
+    seed: int = 0,
+) -> ModalRoom:
+    """Compute the levels below a floor in the thirds 25 to 160 Hz by modes, position by position.
+
+    The floor is simply supported and covers the room, whose height is its volume over the area of
+    the floor. Walls and ceilings of `room` are not part of it. Modes of the floor lose their energy
+    at the rate omega eta of the statistical prediction, those of the room at 6 ln 10/T.
+
+    Parameters
+    ----------
+    source
+        Impact of any model, or a recording; its force on a rigid floor.
+    floor, room
+        Floor and room; by default those of the impact's case.
+    balls : int or array_like, shape (n_ball, 2)
+        Number of random positions of the ball, or positions, m.
+    microphones : int or array_like, shape (n_microphone, 3)
+        The same of the microphones; the third coordinate is the height.
+    seed
+        Of the random positions, which keep 0.5 m from all boundaries.
+
+    Returns
+    -------
+    ModalRoom
+        Its `level` has a maximum Fast level for each pair of positions.
+
+    Raises
+    ------
+    InputError
+        Where the floor is no plate, a position lies outside, or the room has too many modes.
+    """
+    prediction = predict_level(source, floor, room)
+    floor, room = prediction.floor, prediction.room  # type: ignore[assignment]
+    require_kind("floor", floor, Plate)
+    assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
+    size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
+    draw = np.random.default_rng(_seed(seed))
+    places = _positions("balls", balls, size[:2], draw)
+    heard = _positions("microphones", microphones, size, draw)
+    numbers, plate_frequency = _plate_modes(floor)
+    orders, room_frequency = _room_modes(size, room.sound_speed)
+    time = float(np.max(prediction.reverberation_time))
+    found = call(
+        api.get_radiator, case_text(Case(floor=floor, room=room)), np.maximum(plate_frequency, 1.0)
+    )
+    losses = 2 * np.pi * plate_frequency * found["loss_factor"]
+    decay = 6 * math.log(10) / _times(prediction, room_frequency)
+    duration = 0.5 + max(time, 6 * math.log(10) / losses.min()) * WAITED / 60
+    omega, force = _spectrum(source, duration)
+    if len(omega) * len(orders) > MAX_VALUES:
+        refuse(
+            f"room: {len(orders)} modes below {HIGHEST:g} Hz ring for {duration:.1f} s",
+            "a smaller volume or reverberation time; in large rooms the statistical prediction "
+            "holds",
+        )
+    mass = found["surface_mass"] * floor.length * floor.width / 4
+    plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
+    stiffness = room.air_density * room.sound_speed**2 / (room.volume * _norms(orders))
+    air = _receptance(omega, room_frequency, decay) * (1j * omega) * stiffness[:, None]
+    coupling = _coupling(orders, numbers, size[:2])
+    shapes = np.prod(np.cos(np.pi * orders * heard[:, None] / size), axis=2)
+    levels, plates, rooms = [], [], []
+    step = omega[1] / (2 * np.pi)
+    for place in places:
+        drive = np.prod(np.sin(np.pi * numbers * place / size[:2]), axis=1)
+        velocity = drive[:, None] * plate * force
+        flow = coupling @ velocity
+        sound = air * flow
+        levels.append(_fast_maxima(shapes @ sound))
+        # Energies by Parseval's theorem.
+        plates.append(
+            [
+                2 * step * ((drive @ velocity) * force.conj()).real.sum(),
+                2 * step * mass * (losses @ (abs(velocity) ** 2)).sum(),
+            ]
+        )
+        rooms.append(
+            [
+                2 * step * (sound * flow.conj()).real.sum(),
+                2 * step * ((decay / stiffness) @ (abs(sound) ** 2)).sum(),
+            ]
+        )
+    return ModalRoom(
+        prediction=prediction,
+        size=size,
+        frequency=get_bands("third").nominal[:N_BAND],
+        balls=places,
+        microphones=heard,
+        level=np.array(levels),
+        floor_frequency=np.sort(plate_frequency),
+        room_frequency=np.sort(room_frequency),
+        plate_energy=np.array(plates),
+        room_energy=np.array(rooms),
+    )
+
+
+def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
+    """Return natural frequencies of a simply supported plate, Hz, by numbers of half-waves."""
+    # sqrt(B'/m'') = c_L h/sqrt(12).
+    square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
+    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * square.sum(-1) / (2 * np.pi)
+    return found
+
+
+def _plate_modes(floor: Plate) -> tuple[Array, Array]:
+    """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
+    # f = c (k1**2 + k2**2): half-waves along one side at the highest frequency.
+    unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
+    numbers = _grid(
+        [1 + int(side * math.sqrt(HIGHEST / unit)) for side in (floor.length, floor.width)]
+    )
+    numbers += 1
+    frequency = plate_frequencies(floor, numbers)
+    keep = frequency <= HIGHEST
+    if not keep.any():
+        refuse(
+            f"floor: its first natural frequency is {frequency.min():.0f} Hz",
+            f"a floor with modes below {HIGHEST:g} Hz",
+        )
+    _require_modes("floor: the plate", int(keep.sum()))
+    return numbers[keep], frequency[keep]
+
+
+def _room_modes(size: tuple[float, float, float], speed: float) -> tuple[Array, Array]:
+    """Return numbers of half-waves, shape (n, 3), and frequencies of the room's modes, Hz."""
+    most = [1 + int(2 * side * HIGHEST / speed) for side in size]
+    _require_modes("room: volume gives", math.prod(most) // 3)
+    orders = _grid(most)
+    frequency = speed / 2 * np.sqrt(((orders / size) ** 2).sum(axis=1))
+    keep = frequency <= HIGHEST
+    return orders[keep], frequency[keep]
+
+
+def _grid(most: list[int]) -> Array:
+    """Return all combinations of whole numbers from 0 to below the given ones."""
+    grid = np.meshgrid(*(np.arange(float(one)) for one in most), indexing="ij")
+    return np.stack(grid, -1).reshape(-1, len(most))
+
+
+def _require_modes(what: str, count: int) -> None:
+    if count > MAX_MODES:
+        refuse(
+            f"{what} about {count} modes below {HIGHEST:g} Hz",
+            f"at most {MAX_MODES}; there the statistical prediction holds",
+        )
+
+
+def _norms(orders: Array) -> Array:
+    """Return the means of the squares of the room's modes."""
+    norms: Array = np.prod(np.where(orders > 0, 0.5, 1.0), axis=1)
+    return norms
+
+
+def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
+    """Return the integrals of products of modes over the ceiling, m2, shape (n_room, n_plate).
+
+    The integral of sin(m pi x/L) cos(l pi x/L) is 2 L m/(pi (m**2 - l**2)) where m + l is odd,
+    else 0; the room's mode has the factor (-1)**n at the ceiling.
+    """
+    total = (-1.0) ** orders[:, 2:]
+    for axis, side in enumerate(sides):
+        m, waves = numbers[None, :, axis], orders[:, None, axis]
+        odd = (m + waves) % 2 == 1
+        product = np.where(odd, 2 * side * m / (np.pi * np.where(odd, m**2 - waves**2, 1.0)), 0.0)
+        total = total * product
+    return total
+
+
+def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:
+    """Return 1/(w0**2 - w**2 + i w a), a the rate of decay of the energy; 0 at w = 0."""
+    natural = 2 * np.pi * frequency[:, None]
+    divisor: ComplexArray = natural**2 - omega**2 + 1j * omega * decay[:, None]
+    divisor[:, omega == 0] = 1.0
+    return (omega > 0) / divisor
+
+
+def _spectrum(source: Impact | Recording, duration: float) -> tuple[Array, ComplexArray]:
+    """Return angular frequencies, rad/s, and the Fourier transform of the force, N s."""
+    force = source.force("floor")
+    # An even number, which the inverse transform takes its length for.
+    n_sample = 2 * math.ceil(SAMPLE_RATE / 2 * max(duration, len(force) / source.sample_rate))
+    omega = 2 * np.pi * np.arange(n_sample // 2 + 1) * SAMPLE_RATE / n_sample
+    # The same period in samples of the force; rounding moves a frequency by less than 1e-5.
+    count = max(round(n_sample * source.sample_rate / SAMPLE_RATE), len(force))
+    return omega, np.fft.rfft(force, count)[: len(omega)] / source.sample_rate
+
+
+def _fast_maxima(spectrum: ComplexArray) -> Array:
+    """Return maximum Fast levels of the thirds, dB, shape (n_microphone, 9)."""
+    pressure = np.fft.irfft(spectrum, axis=1) * SAMPLE_RATE
+    found: Array = fast_levels(pressure).max(axis=2).T
+    return found
+
+
+def fast_levels(pressure: Array) -> Array:
+    """Return what the Fast detector shows of sound pressure, dB, shape (9, n_record, n_sample).
+
+    The pressure, Pa, has 1024 samples a second and shape (n_record, n_sample); it is filtered into
+    the thirds 25 to 160 Hz by filters of class 1.
+    """
+    kept = math.exp(-1 / (SAMPLE_RATE * FAST))
+    levels = []
+    for sections in band_filters("third", SAMPLE_RATE)[:N_BAND]:
+        square = sosfilt(sections, pressure, axis=-1) ** 2
+        shown = lfilter([1 - kept], [1, -kept], square, axis=-1)
+        levels.append(10 * np.log10(np.maximum(shown, 1e-30) / REFERENCE_PRESSURE**2))
+    return np.array(levels)
+
+
+def _times(prediction: RoomPrediction, frequency: Array) -> Array:
+    """Return reverberation times at frequencies, s: those of the nearest thirds."""
+    distance = abs(np.log(np.maximum(frequency, 1.0)[:, None] / prediction.frequency))
+    found: Array = prediction.reverberation_time[distance.argmin(axis=1)]
+    return found
+
+
+def _positions(
+    name: str, given: int | ArrayLike, size: tuple[float, ...], draw: np.random.Generator
+) -> Array:
+    """Return positions, m, shape (n, len(size)), drawn or checked."""
+    sides = np.array(size)
+    if isinstance(given, int | np.integer | float | str):
+        require_whole(name, given, 1, MAX_POSITIONS)
+        border = np.minimum(BORDER, sides / 4)
+        random: Array = border + draw.random((int(given), len(size))) * (sides - 2 * border)
+        return random
+    places = require_real(name, require_array(name, given, dimensions=(2,)))
+    if places.shape[1] != len(size) or not 1 <= len(places) <= MAX_POSITIONS:
+        refuse(
+            f"{name} have the shape {places.shape}",
+            f"(n, {len(size)}), n from 1 to {MAX_POSITIONS}",
+        )
+    outside = places[~((places >= 0) & (places <= sides)).all(axis=1)]
+    if len(outside):
+        limits = ", ".join(f"0 to {side:g}" for side in size)
+        refuse_value(name, outside[0].tolist(), f"{limits} m")
+    return places
+
+
+def _seed(seed: int) -> int:
+    require_whole("seed", seed, 0, 2**32 - 1)
+    return seed

@@ -1,0 +1,123 @@
+"""Level of the tapping machine below a floor, for reference beside the ball's (ISO 12354-2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._api import api, call
+from thud._schema import Plate, Room
+from thud.case import Case, case_text
+from thud.checks import refuse, require_kind
+from thud.display import Displayed
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+# Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
+THIRDS = np.array(
+    [50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630, 800, 1000, 1250, 1600, 2000, 2500,
+     3150], dtype=float,
+)  # fmt: skip
+RATED = slice(3, None)
+# Reference curve of the thirds 100 to 3150 Hz, dB (ISO 717-2), its value at 500 Hz, and the sum of
+# the excesses that is allowed.
+CURVE = np.array([62, 62, 62, 62, 62, 62, 61, 60, 59, 58, 57, 54, 51, 48, 45, 42], dtype=float)
+AT_500, MAX_EXCESS = 60, 32.0
+# Ratio of wave speed, m/s, and density, kg/m3, that the constant of the formula holds, that of
+# concrete, and how far another one may be: the level moves by 10 lg of the ratio, 1 dB.
+CONCRETE, WITHIN = 3500 / 2300, 1.26
+
+
+@dataclass(frozen=True, repr=False)
+class TappingLevel(Displayed):
+    """Normalised level of the tapping machine below a homogeneous floor, in thirds.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (19,)
+        Rounded mid frequencies of the thirds 50 to 3150 Hz.
+    level : ndarray, shape (19,)
+        L_n, dB re 20 uPa, for an absorption of 10 m2.
+    """
+
+    frequency: NDArray[np.float64]
+    level: NDArray[np.float64]
+
+    @property
+    def weighted(self) -> int:
+        """L_n,w, dB: the reference curve of ISO 717-2 shifted by whole decibels."""
+        level = np.round(self.level[RATED], 1)
+        # From where every excess is above the allowed sum.
+        shift = int(np.floor((level - CURVE).min() - MAX_EXCESS))
+        while np.maximum(level - CURVE - shift, 0).sum() > MAX_EXCESS:
+            shift += 1
+        return AT_500 + shift
+
+    @property
+    def adaptation(self) -> int:
+        """Spectrum adaptation term C_I, dB, of the thirds 100 to 2500 Hz (ISO 717-2 annex A)."""
+        total = 10 * np.log10((10 ** (self.level[3:18] / 10)).sum())
+        return int(np.floor(total + 0.5)) - 15 - self.weighted
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text, a third each."""
+        found = zip(self.frequency, self.level, strict=True)
+        return [("third, Hz", "L_n, dB"), *((f"{f:g}", f"{level:.1f}") for f, level in found)]
+
+    def __repr__(self) -> str:
+        """Return the single numbers."""
+        return f"<TappingLevel: L_n,w {self.weighted} dB, C_I {self.adaptation} dB>"
+
+
+def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
+    """Return the level of the tapping machine below a homogeneous concrete floor.
+
+    L_n = 155 - 30 lg m'' + 10 lg T_s + 10 lg sigma + 10 lg(f/1000 Hz), T_s = 2.2/(f eta), with the
+    radiation and losses of the prediction of heavy impacts (ISO 12354-2 annex B). The constant
+    holds density and wave speed of concrete; it is the bare plate, without floating floor, ceiling
+    or flanking walls.
+
+    Parameters
+    ----------
+    floor
+        A plate.
+    room
+        Its air counts (default: that of `Room`).
+
+    Raises
+    ------
+    InputError
+        Where the floor is no plate, or out of range.
+
+    Examples
+    --------
+    >>> import thud
+    >>> thud.tapping_level(thud.Plate(thickness=0.2))
+    <TappingLevel: L_n,w 71 dB, C_I -11 dB>
+    """
+    require_kind("floor", floor, Plate)
+    ratio = floor.wave_speed / floor.density
+    if not 1 / WITHIN <= ratio / CONCRETE <= WITHIN:
+        refuse(
+            f"floor: wave_speed/density = {ratio:.3g} is not that of concrete, which the formula "
+            "of ISO 12354-2 holds",
+            f"{CONCRETE / WITHIN:.2f} to {CONCRETE * WITHIN:.2f} m4/(kg s)",
+        )
+    case = Case(floor=floor, room=require_room(room))
+    found = call(api.get_radiator, case_text(case), THIRDS)
+    time = 2.2 / (THIRDS * found["loss_factor"])
+    radiated = time * found["radiation_factor"] * THIRDS / 1000
+    level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)
+    return TappingLevel(THIRDS, level)
+
+
+def require_room(room: Room | None) -> Room:
+    """Return a room, the default one for None; raise InputError for anything else."""
+    if room is None:
+        return Room()
+    require_kind("room", room, Room)
+    return room

@@ -1,0 +1,100 @@
+!> What a floor that moves makes of an impact: levels of the contact force against the blocked one, the energy that goes
+!> into the floor, and the motion of further points.
+module thud_floor_result
+   use thud_band, only: band_type, get_level_bands
+   use thud_case, only: case_type, get_floor_number
+   use thud_error, only: error_type
+   use thud_floor_model, only: floor_model_type
+   use thud_force_exposure, only: get_force_exposure_levels
+   use thud_force_history, only: force_history_type
+   use thud_injected_energy, only: get_injected_energies, get_mean_conductances
+   use thud_kinds, only: wp
+   use thud_receiver, only: advance_receiver, get_receiver_velocity, new_receiver_motion, new_receiver_step, &
+      receiver_motion_type, receiver_step_type, receiver_type
+   implicit none (type, external)
+   private
+
+   public :: floor_result_type, get_floor_result, get_point_velocity
+
+   !> Results on a floor, by bands of one set after the other.
+   type :: floor_result_type
+      !> The bands that the case asks for: [n_band].
+      type(band_type), allocatable :: bands(:)
+      !> Levels of the force on a rigid floor and on this one, dB: [n_band].
+      real(wp), allocatable :: blocked_level(:), contact_level(:)
+      !> Energy that the force gives to the floor, by its velocity and by its mobility, J: [n_band].
+      real(wp), allocatable :: energy_by_motion(:), energy_by_mobility(:)
+      !> Mean of the real part of the mobility, m/(N s): [n_band].
+      real(wp), allocatable :: conductance(:)
+      !> Velocity of the points of the floor, m/s: [n_sample, n_point].
+      real(wp), allocatable :: point_velocity(:, :)
+   end type floor_result_type
+
+contains
+
+   !> Results on the floor of a case.
+   subroutine get_floor_result(case, blocked, contact, found, error)
+      type(case_type), intent(in) :: case
+      !> The drop on a rigid floor, and on the floor.
+      type(force_history_type), intent(in) :: blocked, contact
+      type(floor_result_type), intent(out) :: found
+      !> A level cannot be computed, or the floor has no such point.
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: receiver
+      integer :: first, n, i
+
+      call get_level_bands(case%bands, found%bands, first)
+      found%bands = found%bands(first:)
+      n = size(found%bands)
+      allocate (found%blocked_level(n), found%contact_level(n), found%energy_by_motion(n), found%energy_by_mobility(n))
+      call get_force_exposure_levels(blocked%floor_force, blocked%sample_rate, found%bands, trim(case%level_method), &
+         found%blocked_level, error)
+      if (.not. allocated(error)) call get_force_exposure_levels(contact%floor_force, contact%sample_rate, found%bands, &
+         trim(case%level_method), found%contact_level, error)
+      if (allocated(error)) return
+      associate (floor => case%floors(get_floor_number(case))%model)
+         call floor%get_receiver(receiver, error)
+         if (allocated(error)) return
+         call get_injected_energies(receiver, contact%floor_force, contact%floor_velocity, contact%sample_rate, &
+            found%bands, found%energy_by_motion, found%energy_by_mobility)
+         found%conductance = get_mean_conductances(receiver, found%bands)
+         allocate (found%point_velocity(size(contact%floor_force), floor%point_x%count))
+         do i = 1, floor%point_x%count
+            call get_point_velocity(floor, contact%floor_force, contact%sample_rate, floor%point_x%values(i), &
+               floor%point_y%values(i), found%point_velocity(:, i), error)
+            if (allocated(error)) return
+         end do
+      end associate
+   end subroutine get_floor_result
+
+   !> Velocity of a point of a floor.
+   subroutine get_point_velocity(floor, force, sample_rate, x, y, velocity, error)
+      class(floor_model_type), intent(in) :: floor
+      !> The contact force, N: [n_sample].
+      real(wp), intent(in) :: force(:)
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> Place of the point, m.
+      real(wp), intent(in) :: x, y
+      !> Velocity downwards, m/s: [n_sample].
+      real(wp), intent(out) :: velocity(:)
+      !> The floor has no such point.
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: transfer
+      type(receiver_step_type) :: step
+      type(receiver_motion_type) :: motion
+      integer :: i
+
+      velocity = 0.0_wp
+      call floor%get_transfer(x, y, transfer, error)
+      if (allocated(error)) return
+      motion = new_receiver_motion(transfer)
+      step = new_receiver_step(transfer, 1/sample_rate)
+      velocity(1) = get_receiver_velocity(transfer, force(1), motion)
+      do i = 2, size(force)
+         call advance_receiver(transfer, step, (force(i - 1) + force(i))/2, motion)
+         velocity(i) = get_receiver_velocity(transfer, force(i), motion)
+      end do
+   end subroutine get_point_velocity
+
+end module thud_floor_result

@@ -1,0 +1,84 @@
+!> A light ceiling that hangs below a floor without rigid connection: its mass on the stiffness of the air between them,
+!> and the sound that runs along that air.
+module thud_ceiling
+   use thud_constants, only: pi
+   use thud_field, only: field_type
+   use thud_kinds, only: wp
+   use thud_new_field, only: real_field
+   use thud_plate, only: air_type
+   implicit none (type, external)
+   private
+
+   public :: ceiling_type, get_cavity_mode_density, get_ceiling_fields, get_forced_share, get_mass_law
+
+   !> A ceiling; without mass there is none.
+   type :: ceiling_type
+      !> Mass per area, kg/m2.
+      real(wp) :: mass = 0.0_wp
+      !> Depth of the air above it, m.
+      real(wp) :: depth = 0.1_wp
+      !> Loss factor of that air, large with absorber in it.
+      real(wp) :: loss_factor = 0.3_wp
+   end type ceiling_type
+
+contains
+
+   !> Keys and allowed ranges.
+   function get_ceiling_fields(ceiling) result(fields)
+      !> The ceiling that the fields read and set.
+      type(ceiling_type), intent(in), target :: ceiling
+      !> One field per component: [3].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass of a suspended ceiling over its area; 0: none', &
+         '[0, 200]'), &
+         real_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air above the ceiling', '[0.01, 2]'), &
+         real_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of that air', '[0.001, 1]')]
+   end function get_ceiling_fields
+
+   !> Mean in a band of the square of the ceiling's velocity over the floor's, which drives it through the air's stiffness:
+   !> abs((1 + i eta)/(1 + i eta - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
+   elemental function get_forced_share(ceiling, air, lower, upper) result(share)
+      type(ceiling_type), intent(in) :: ceiling
+      type(air_type), intent(in) :: air
+      !> Edges of the band, Hz.
+      real(wp), intent(in) :: lower, upper
+      real(wp) :: share
+      complex(wp) :: b
+      real(wp) :: resonance
+
+      resonance = sqrt(air%density*air%sound_speed**2/(ceiling%depth*ceiling%mass))/(2*pi)
+      associate (low => lower/resonance, high => upper/resonance, eta => ceiling%loss_factor)
+         ! 1/((1 - x**2)**2 + eta**2) = Im(1/(b**2 - x**2))/eta with b**2 = 1 - i eta; the logarithms' arguments stay below
+         ! the real axis.
+         b = sqrt(cmplx(1.0_wp, -eta, wp))
+         share = (1 + eta**2)/(eta*(high - low))*aimag((log(b + high) - log(b - high) - log(b + low) + log(b - low))/(2*b))
+      end associate
+   end function get_forced_share
+
+   !> Modes per hertz of the air above the ceiling: lateral ones of each half-wave across that fits.
+   elemental function get_cavity_mode_density(ceiling, air, area, frequency) result(density)
+      type(ceiling_type), intent(in) :: ceiling
+      type(air_type), intent(in) :: air
+      !> Area of the ceiling, m2; frequency, Hz.
+      real(wp), intent(in) :: area, frequency
+      !> Modes per hertz, s.
+      real(wp) :: density
+
+      density = 2*pi*area*frequency/air%sound_speed**2*(1 + int(2*ceiling%depth*frequency/air%sound_speed))
+   end function get_cavity_mode_density
+
+   !> Transmission of sound through the ceiling by its mass, 5 dB above that of normal incidence (field incidence), at most
+   !> all.
+   elemental function get_mass_law(ceiling, air, frequency) result(transmission)
+      type(ceiling_type), intent(in) :: ceiling
+      type(air_type), intent(in) :: air
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      real(wp) :: transmission
+
+      transmission = min(1.0_wp, sqrt(10.0_wp)/(1 + (pi*frequency*ceiling%mass/(air%density*air%sound_speed))**2))
+   end function get_mass_law
+
+end module thud_ceiling

@@ -1,0 +1,181 @@
+!> Two simply supported plates with a resilient layer between them: the receiver that the upper one is, and the power that
+!> reaches the lower one.
+module thud_double_plate
+   use thud_constants, only: pi
+   use thud_error, only: error_type
+   use thud_kinds, only: wp
+   use thud_modal_receiver, only: new_modal_receiver
+   use thud_plate, only: air_type, get_bending_stiffness, get_surface_mass, get_total_loss, plate_type
+   use thud_plate_modes, only: check_losses, check_mode_count, far, get_far_compliance, get_half_waves, &
+      get_modal_stiffness, get_shape, mode_limit, rest_corner
+   use thud_receiver, only: receiver_type
+   implicit none (type, external)
+   private
+
+   public :: double_plate_type, get_layer_resonance, get_lower_conductance, new_double_receiver
+
+   !> The floor.
+   type :: double_plate_type
+      !> Plate under the source, and plate over the room; sides alike.
+      type(plate_type) :: upper, lower
+      !> Dynamic stiffness of the layer over area, N/m3, and its loss factor.
+      real(wp) :: layer_stiffness = 0.0_wp, layer_loss = 0.0_wp
+   end type double_plate_type
+
+contains
+
+   !> Resonance of both masses on the layer, sqrt(s' (1/m1 + 1/m2))/(2 pi).
+   elemental function get_layer_resonance(floor) result(frequency)
+      type(double_plate_type), intent(in) :: floor
+      !> The frequency, Hz.
+      real(wp) :: frequency
+
+      frequency = sqrt(floor%layer_stiffness*(1/get_surface_mass(floor%upper) + 1/get_surface_mass(floor%lower)))/(2*pi)
+   end function get_layer_resonance
+
+   !> Velocity of a point of the upper plate over the force at another.
+   !>
+   !> Both plates have the same shapes, and each shape two modes: those of two masses on three springs. A mode takes the mean
+   !> of the loss factors of plates and layer, by their shares of its elastic energy; with equal shapes this is off by the
+   !> square of what the loss factors differ. The rest is as that of one plate.
+   subroutine new_double_receiver(floor, source, point, receiver, error)
+      type(double_plate_type), intent(in) :: floor
+      !> Places of source and point, over length and width.
+      real(wp), intent(in) :: source(2), point(2)
+      type(receiver_type), intent(out) :: receiver
+      !> There are too many modes, or the losses are too high.
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: m(:), n(:)
+      real(wp), allocatable :: shape(:), omega(:, :), share(:, :), loss_factor(:, :), gain(:, :)
+      logical, allocatable :: single(:, :)
+      real(wp) :: rest
+
+      call get_all_half_waves(floor, m, n, error)
+      if (allocated(error)) return
+      allocate (omega(size(m), 2), share(size(m), 2), loss_factor(size(m), 2))
+      call get_mode_pairs(floor, get_modal_stiffness(floor%upper, m, n), get_modal_stiffness(floor%lower, m, n), omega, &
+         share, loss_factor)
+      single = omega < 2*pi*mode_limit
+      call check_losses('floating_floor', pack(omega, single), pack(loss_factor, single), error)
+      if (allocated(error)) return
+      shape = get_shape(m, n, source)*get_shape(m, n, point)
+      gain = 4/(floor%upper%length*floor%upper%width)*share*spread(shape, 2, 2)
+      rest = sum(gain/omega**2, mask=.not. single)
+      if (all(abs(source - point) < epsilon(1.0_wp))) rest = rest + get_far_compliance(floor%upper)
+      call new_modal_receiver(pack(gain, single), pack(omega, single), pack(loss_factor, single), rest, rest_corner, &
+         receiver)
+   end subroutine new_double_receiver
+
+   !> Half waves of the modes up to far above the limit, of the plate that has more of them.
+   subroutine get_all_half_waves(floor, m, n, error)
+      type(double_plate_type), intent(in) :: floor
+      !> Half waves along length and width: [n_shape].
+      integer, allocatable, intent(out) :: m(:), n(:)
+      !> There are too many.
+      type(error_type), allocatable, intent(out) :: error
+      integer, allocatable :: m_lower(:), n_lower(:)
+
+      call check_mode_count('floating_floor', floor%upper, error)
+      if (.not. allocated(error)) call check_mode_count('floating_floor', floor%lower, error)
+      if (allocated(error)) return
+      call get_half_waves(floor%upper, far*mode_limit, m, n)
+      call get_half_waves(floor%lower, mode_limit, m_lower, n_lower)
+      if (maxval(m_lower) <= maxval(m) .and. maxval(n_lower) <= maxval(n)) return
+      call get_half_waves(floor%lower, far*mode_limit, m, n)
+   end subroutine get_all_half_waves
+
+   !> The two modes of each shape.
+   elemental subroutine get_pair(floor, upper, lower, omega_1, omega_2, share_1, share_2, loss_1, loss_2)
+      type(double_plate_type), intent(in) :: floor
+      !> Bending stiffness of the shape in both plates over area, N/m3.
+      real(wp), intent(in) :: upper, lower
+      !> Angular frequencies, rad/s, the lower first.
+      real(wp), intent(out) :: omega_1, omega_2
+      !> Squared displacements of the upper plate of modes with modal mass 1 over area, m2/kg.
+      real(wp), intent(out) :: share_1, share_2
+      !> Loss factors.
+      real(wp), intent(out) :: loss_1, loss_2
+      real(wp) :: first, second, coupling, angle, top, bottom
+
+      associate (m1 => get_surface_mass(floor%upper), m2 => get_surface_mass(floor%lower), s => floor%layer_stiffness)
+         first = (upper + s)/m1
+         second = (lower + s)/m2
+         coupling = -s/sqrt(m1*m2)
+         omega_2 = sqrt((first + second)/2 + hypot((first - second)/2, coupling))
+         ! By the product of both: their difference would cancel.
+         omega_1 = sqrt((upper*lower + s*(upper + lower))/(m1*m2))/omega_2
+         angle = atan2(2*coupling, first - second)/2
+         top = cos(angle)/sqrt(m1)
+         bottom = sin(angle)/sqrt(m2)
+         share_2 = top**2
+         loss_2 = get_loss(floor, omega_2, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
+         top = -sin(angle)/sqrt(m1)
+         bottom = cos(angle)/sqrt(m2)
+         share_1 = top**2
+         loss_1 = get_loss(floor, omega_1, upper*top**2, lower*bottom**2, s*(top - bottom)**2)
+      end associate
+   end subroutine get_pair
+
+   !> The two modes of many shapes.
+   pure subroutine get_mode_pairs(floor, upper, lower, omega, share, loss_factor)
+      type(double_plate_type), intent(in) :: floor
+      !> As in `get_pair`: [n_shape].
+      real(wp), intent(in) :: upper(:), lower(:)
+      !> As in `get_pair`: [n_shape, 2].
+      real(wp), intent(out) :: omega(:, :), share(:, :), loss_factor(:, :)
+
+      call get_pair(floor, upper, lower, omega(:, 1), omega(:, 2), share(:, 1), share(:, 2), loss_factor(:, 1), &
+         loss_factor(:, 2))
+   end subroutine get_mode_pairs
+
+   !> Mean of the loss factors by elastic energy.
+   elemental function get_loss(floor, omega, upper, lower, layer) result(loss_factor)
+      type(double_plate_type), intent(in) :: floor
+      !> Angular frequency, rad/s.
+      real(wp), intent(in) :: omega
+      !> Elastic energies in plates and layer, of any unit.
+      real(wp), intent(in) :: upper, lower, layer
+      real(wp) :: loss_factor
+
+      loss_factor = (upper*floor%upper%loss_factor + lower*get_total_loss(floor%lower, air_type(), omega/(2*pi)) &
+         + layer*floor%layer_loss)/(upper + lower + layer)
+   end function get_loss
+
+   !> Power that reaches the lower plate over the mean square of the force, both plates infinite and the layer without
+   !> bending stiffness (Cremer, Heckl and Petersson, *Structure-Borne Sound*).
+   !>
+   !> In wavenumbers u = k**2 the lower plate has h2 = s/(B1 B2 (u**2 - q1) (u**2 - q2)) with the roots q of the determinant,
+   !> and dissipates omega Im B2/(4 pi) integral of u**2 |h2|**2 du, by partial fractions with
+   !> integral du/(u**2 - q) = pi/(2 sqrt(-q)). What it dissipates is what it gets.
+   elemental function get_lower_conductance(floor, frequency) result(conductance)
+      type(double_plate_type), intent(in) :: floor
+      !> Frequency, Hz.
+      real(wp), intent(in) :: frequency
+      !> The power, m/(N s).
+      real(wp) :: conductance
+      complex(wp) :: root(4)
+      complex(wp) :: b1, b2, s, k1, k2, half, term, total
+      real(wp) :: omega
+      integer :: i, j
+
+      omega = 2*pi*frequency
+      b1 = get_bending_stiffness(floor%upper)*cmplx(1.0_wp, floor%upper%loss_factor, wp)
+      b2 = get_bending_stiffness(floor%lower)*cmplx(1.0_wp, get_total_loss(floor%lower, air_type(), frequency), wp)
+      s = floor%layer_stiffness*cmplx(1.0_wp, floor%layer_loss, wp)
+      k1 = (s - get_surface_mass(floor%upper)*omega**2)/b1
+      k2 = (s - get_surface_mass(floor%lower)*omega**2)/b2
+      half = sqrt(((k1 - k2)/2)**2 + s**2/(b1*b2))
+      root(1:2) = -(k1 + k2)/2 + [half, -half]
+      root(3:4) = conjg(root(1:2))
+      total = 0.0_wp
+      do i = 1, 4
+         term = root(i)/sqrt(-root(i))
+         do j = 1, 4
+            if (j /= i) term = term/(root(i) - root(j))
+         end do
+         total = total + term
+      end do
+      conductance = omega*b2%im*abs(s/(b1*b2))**2/8*real(total)
+   end function get_lower_conductance
+
+end module thud_double_plate

@@ -1,0 +1,84 @@
+!> Coupled subsystems of a statistical energy analysis in one band: what each loses, and what flows between them.
+module thud_energy_flow
+   use thud_kinds, only: wp
+   implicit none (type, external)
+   private
+
+   public :: add_subsystem, connect, energy_flow_type, get_loss, new_energy_flow
+
+   !> Subsystems and the flow between them.
+   type :: energy_flow_type
+      !> Modes per hertz of the subsystems, s: [n].
+      real(wp), allocatable :: mode_density(:)
+      !> Rate at which the first subsystems lose energy, 1/s, what flows to others included: [at most n].
+      real(wp), allocatable :: total(:)
+      !> Rate that at least goes to none of the others, 1/s: [n].
+      real(wp), allocatable :: own(:)
+      !> Rate at which energy of j goes to i, 1/s: [n, n].
+      real(wp), allocatable :: rate(:, :)
+   end type energy_flow_type
+
+contains
+
+   !> Subsystems without flow between them.
+   pure function new_energy_flow(mode_density, total, own) result(flow)
+      !> Modes per hertz, s: [n].
+      real(wp), intent(in) :: mode_density(:)
+      !> Rates of all losses, 1/s, of the first subsystems, where they are known: [at most n].
+      real(wp), intent(in) :: total(:)
+      !> Rates of the losses that go to no other subsystem, 1/s: [n].
+      real(wp), intent(in) :: own(:)
+      type(energy_flow_type) :: flow
+
+      flow%mode_density = mode_density
+      flow%total = total
+      flow%own = own
+      allocate (flow%rate(size(own), size(own)), source=0.0_wp)
+   end function new_energy_flow
+
+   !> Adds a subsystem without flow.
+   pure subroutine add_subsystem(flow, mode_density, own)
+      type(energy_flow_type), intent(inout) :: flow
+      !> Modes per hertz, s; rate of its losses, 1/s.
+      real(wp), intent(in) :: mode_density, own
+      real(wp), allocatable :: rate(:, :)
+
+      call move_alloc(flow%rate, rate)
+      associate (n => size(flow%own))
+         allocate (flow%rate(n + 1, n + 1), source=0.0_wp)
+         flow%rate(:n, :n) = rate
+      end associate
+      flow%mode_density = [flow%mode_density, mode_density]
+      flow%own = [flow%own, own]
+   end subroutine add_subsystem
+
+   !> Lets energy flow from one subsystem to another, and back by reciprocity: n1 a12 = n2 a21.
+   pure subroutine connect(flow, from, to, rate)
+      type(energy_flow_type), intent(inout) :: flow
+      !> Numbers of the subsystems.
+      integer, intent(in) :: from, to
+      !> Rate at which the energy of the first goes to the second, 1/s.
+      real(wp), intent(in) :: rate
+
+      flow%rate(to, from) = flow%rate(to, from) + rate
+      flow%rate(from, to) = flow%rate(from, to) + rate*flow%mode_density(from)/flow%mode_density(to)
+   end subroutine connect
+
+   !> Matrix A of dE/dt = -A E. Its columns sum to the losses that go to no subsystem: the total ones less the flow, but at
+   !> least the own ones.
+   pure function get_loss(flow) result(loss)
+      type(energy_flow_type), intent(in) :: flow
+      !> A, 1/s: [n, n].
+      real(wp) :: loss(size(flow%own), size(flow%own))
+      real(wp) :: leaving
+      integer :: i
+
+      loss = -flow%rate
+      do i = 1, size(flow%own)
+         leaving = sum(flow%rate(:, i))
+         loss(i, i) = loss(i, i) + leaving + flow%own(i)
+         if (i <= size(flow%total)) loss(i, i) = max(loss(i, i), flow%total(i))
+      end do
+   end function get_loss
+
+end module thud_energy_flow

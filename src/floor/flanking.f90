@@ -1,0 +1,116 @@
+!> Walls below a floor that take energy from it over their junctions and radiate into the room.
+module thud_flanking
+   use thud_constants, only: pi
+   use thud_field, only: field_type, list_type, name_length
+   use thud_kinds, only: wp
+   use thud_new_field, only: choice_field, list_field, real_field
+   use thud_plate, only: air_type, get_critical_frequency, get_surface_mass, plate_type
+   implicit none (type, external)
+   private
+
+   public :: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
+
+   !> Words of rigid junctions, and of one with a given index.
+   character(len=*), parameter :: junctions(*) = [character(len=5) :: 'cross', 't', 'index']
+
+   !> Reference frequency of the vibration reduction index, Hz (ISO 12354-1).
+   real(wp), parameter :: reference_frequency = 1000.0_wp
+
+   !> Walls of one construction, each along a part of the floor's edge.
+   type :: walls_type
+      !> Lengths of the junctions with the floor, m, one for each wall.
+      type(list_type) :: lengths
+      !> Height, m, and thickness, m.
+      real(wp) :: height = 2.5_wp, thickness = 0.2_wp
+      !> Density, kg/m3.
+      real(wp) :: density = 2300.0_wp
+      !> Speed of longitudinal waves, m/s.
+      real(wp) :: wave_speed = 3500.0_wp
+      !> Internal loss factor.
+      real(wp) :: loss_factor = 0.005_wp
+      !> Rigid junction: the wall goes on above the floor, which goes on behind it (`cross`) or ends there (`t`), or a
+      !> junction of a given index.
+      character(len=name_length) :: junction = 'cross'
+      !> Vibration reduction index between floor and wall, dB, of the junction `index`.
+      real(wp) :: index = 10.0_wp
+   end type walls_type
+
+contains
+
+   !> Keys and allowed ranges.
+   function get_wall_fields(walls) result(fields)
+      !> The walls that the fields read and set.
+      type(walls_type), intent(in), target :: walls
+      !> One field per component: [8].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         list_field('wall_lengths', walls%lengths, 'm', &
+         'lengths of the flanking walls along the floor (default: no walls)', '[0.1, 100]'), &
+         real_field('wall_height', walls%height, 'm', 'height of the walls', '[0.5, 20]'), &
+         real_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls', '[0.005, 2]'), &
+         real_field('wall_density', walls%density, 'kg/m3', 'density of the walls', '[10, 20000]'), &
+         real_field('wall_wave_speed', walls%wave_speed, 'm/s', 'speed of longitudinal waves in the walls', &
+         '[100, 10000]'), &
+         real_field('wall_loss_factor', walls%loss_factor, '', 'internal loss factor of the walls', '[0, 1]'), &
+         choice_field('wall_junction', walls%junction, &
+         'junction of floor and walls: rigid cross or t, or one of a given index', junctions), &
+         real_field('junction_index', walls%index, 'dB', &
+         'vibration reduction index from floor to wall, of the junction index', '[-10, 80]')]
+   end function get_wall_fields
+
+   !> The walls as plates: [n_wall].
+   pure function get_walls(walls) result(plates)
+      type(walls_type), intent(in) :: walls
+      type(plate_type), allocatable :: plates(:)
+      integer :: i
+
+      allocate (plates(walls%lengths%count))
+      do i = 1, size(plates)
+         plates(i) = plate_type(length=walls%lengths%values(i), width=walls%height, thickness=walls%thickness, &
+            density=walls%density, wave_speed=walls%wave_speed, loss_factor=walls%loss_factor)
+      end do
+   end function get_walls
+
+   !> Vibration reduction index between floor and wall round the corner: 8.7 + 5.7 M**2 dB of a rigid cross, 5.7 + 5.7 M**2
+   !> of a rigid T, M the decimal logarithm of the ratio of masses, or the given one; at least 10 lg(l l0 (1/S1 + 1/S2)),
+   !> l0 = 1 m (ISO 12354-1 annex E).
+   pure function get_vibration_reduction(walls, floor, wall) result(index)
+      type(walls_type), intent(in) :: walls
+      type(plate_type), intent(in) :: floor, wall
+      !> The index, dB.
+      real(wp) :: index
+      real(wp) :: ratio
+
+      ratio = log10(get_surface_mass(floor)/get_surface_mass(wall))
+      select case (walls%junction)
+       case ('cross')
+         index = 8.7_wp + 5.7_wp*ratio**2
+       case ('t')
+         index = 5.7_wp + 5.7_wp*ratio**2
+       case default
+         index = walls%index
+      end select
+      index = max(index, 10*log10(wall%length*(1/(floor%length*floor%width) + 1/(wall%length*wall%width))))
+   end function get_vibration_reduction
+
+   !> Rate at which energy of the floor goes into a wall.
+   !>
+   !> The index is K = D + 10 lg(l/sqrt(a1 a2)), D the mean of the velocity level differences of both directions and
+   !> a = pi**2 S eta sqrt(1000 Hz f)/c0 (ISO 12354-1). With D = 5 lg(eta1 eta2/(eta12 eta21)) and
+   !> n1 eta12 = n2 eta21 the losses cancel:
+   !> eta12 = l c0/(pi**2 S1 sqrt(1000 Hz f)) sqrt(fc2/fc1) 10**(-K/10) (Nightingale and Bosmans 2003).
+   elemental function get_junction_rate(floor, wall, air, index, frequency) result(rate)
+      type(plate_type), intent(in) :: floor, wall
+      type(air_type), intent(in) :: air
+      !> Vibration reduction index, dB; frequency, Hz.
+      real(wp), intent(in) :: index, frequency
+      !> The rate, 1/s.
+      real(wp) :: rate
+
+      rate = 2*pi*frequency*wall%length*air%sound_speed &
+         /(pi**2*floor%length*floor%width*sqrt(reference_frequency*frequency)) &
+         *sqrt(get_critical_frequency(wall, air)/get_critical_frequency(floor, air))*10**(-index/10)
+   end function get_junction_rate
+
+end module thud_flanking

@@ -1,0 +1,46 @@
+!> A thin infinite plate: a resistance, at every frequency and everywhere.
+module thud_infinite_plate_floor
+   use thud_error, only: error_type
+   use thud_field, only: field_type
+   use thud_floor_model, only: floor_model_type
+   use thud_kinds, only: wp
+   use thud_new_field, only: real_field
+   use thud_receiver, only: receiver_type
+   implicit none (type, external)
+   private
+
+   public :: infinite_plate_floor_type
+
+   !> The floor; the default is 22 mm of chipboard.
+   type, extends(floor_model_type) :: infinite_plate_floor_type
+      !> Force over velocity, 8 sqrt(B' m''), N s/m.
+      real(wp) :: resistance = 1600.0_wp
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: get_receiver
+   end type infinite_plate_floor_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&infinite_plate`.
+   function get_fields(options) result(fields)
+      class(infinite_plate_floor_type), intent(in), target :: options
+      !> One field: [1].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [real_field('resistance', options%resistance, 'N s/m', &
+         'force over velocity', '[1, 1e15]')]
+   end function get_fields
+
+   !> The mobility is the direct part alone.
+   subroutine get_receiver(options, receiver, error)
+      class(infinite_plate_floor_type), intent(in) :: options
+      type(receiver_type), intent(out) :: receiver
+      !> Never.
+      type(error_type), allocatable, intent(out) :: error
+
+      receiver%direct = 1/options%resistance
+      allocate (receiver%pole(0), receiver%residue(0))
+   end subroutine get_receiver
+
+end module thud_infinite_plate_floor

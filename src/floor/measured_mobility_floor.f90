@@ -1,0 +1,124 @@
+!> A floor by its measured mobility, as a sum of poles that `thud.fit_mobility` or `thud-driver mobility` has fitted.
+module thud_measured_mobility_floor
+   use thud_constants, only: pi
+   use thud_error, only: error_type, input_error, numerical_error
+   use thud_field, only: field_type, list_type
+   use thud_floor_model, only: floor_model_type, reason_length
+   use thud_kinds, only: wp
+   use thud_new_field, only: list_field, real_field
+   use thud_passivity, only: find_violations
+   use thud_receiver, only: get_conductance, receiver_type
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: measured_mobility_floor_type
+
+   !> The floor.
+   type, extends(floor_model_type) :: measured_mobility_floor_type
+      !> Mobility at high frequencies, m/(N s).
+      real(wp) :: direct = 0.0_wp
+      !> Frequencies of the poles, |p|/(2 pi), Hz, and their damping ratios, 1 of a real pole.
+      type(list_type) :: pole_frequency, damping_ratio
+      !> Residues, those of pairs of poles doubled, m/(N s2).
+      type(list_type) :: residue_real, residue_imaginary
+      !> Band of the measurement, Hz.
+      real(wp) :: lowest_frequency = 10.0_wp, highest_frequency = 1000.0_wp
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: check
+      procedure, pass(options) :: get_receiver
+      procedure, pass(options) :: get_validity
+   end type measured_mobility_floor_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&measured_mobility`.
+   function get_fields(options) result(fields)
+      !> The options that the fields read and set.
+      class(measured_mobility_floor_type), intent(in), target :: options
+      !> One field per component: [7].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('direct', options%direct, 'm/(N s)', 'mobility at high frequencies', '[0, 1000]'), &
+         list_field('pole_frequency', options%pole_frequency, 'Hz', 'magnitudes of the poles over 2 pi', '[1e-6, 1e7]'), &
+         list_field('damping_ratio', options%damping_ratio, '', 'damping ratios of the poles, 1 of a real pole', &
+         '(0, 1]'), &
+         list_field('residue_real', options%residue_real, 'm/(N s2)', &
+         'real parts of the residues, of a pair of poles doubled', '[-1e12, 1e12]'), &
+         list_field('residue_imaginary', options%residue_imaginary, 'm/(N s2)', 'imaginary parts of the residues', &
+         '[-1e12, 1e12]'), &
+         real_field('lowest_frequency', options%lowest_frequency, 'Hz', 'first frequency of the measurement', &
+         '(0, highest_frequency)'), &
+         real_field('highest_frequency', options%highest_frequency, 'Hz', 'last frequency of the measurement', '(0, 1e7]')]
+   end function get_fields
+
+   !> Refuses lists that do not fit each other, and a mobility that is not passive.
+   subroutine check(options, error)
+      class(measured_mobility_floor_type), intent(in) :: options
+      !> Names the lists, or the frequency with the least real part.
+      type(error_type), allocatable, intent(out) :: error
+      type(receiver_type) :: receiver
+
+      associate (n => options%pole_frequency%count)
+         if (n == 0 .or. any([options%damping_ratio%count, options%residue_real%count, options%residue_imaginary%count] &
+            /= n)) then
+            error = input_error('&measured_mobility: pole_frequency has '//to_text(n)//' values, damping_ratio ' &
+               //to_text(options%damping_ratio%count)//', residue_real '//to_text(options%residue_real%count) &
+               //' and residue_imaginary '//to_text(options%residue_imaginary%count) &
+               //'; allowed: as many of each, at least one')
+         else
+            call get_receiver(options, receiver, error)
+         end if
+      end associate
+   end subroutine check
+
+   !> The receiver, if it is passive.
+   subroutine get_receiver(options, receiver, error)
+      class(measured_mobility_floor_type), intent(in) :: options
+      type(receiver_type), intent(out) :: receiver
+      !> Names the frequency with the least real part.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp), parameter :: rounding = 1.0e-12_wp
+      real(wp), allocatable :: omega(:), conductance(:)
+      real(wp) :: lift
+      logical :: failed
+      integer :: i
+
+      associate (n => options%pole_frequency%count)
+         receiver%direct = options%direct
+         allocate (receiver%pole(n), receiver%residue(n))
+         associate (zeta => options%damping_ratio%values(:n))
+            receiver%pole = 2*pi*options%pole_frequency%values(:n)*cmplx(-zeta, sqrt((1 - zeta)*(1 + zeta)), wp)
+         end associate
+         receiver%residue = cmplx(options%residue_real%values(:n), options%residue_imaginary%values(:n), wp)
+         where (.not. receiver%pole%im > 0.0_wp) receiver%residue = real(receiver%residue, wp)
+      end associate
+      ! The test needs a constant part; this one is below rounding.
+      lift = rounding*(receiver%direct + sum(abs(receiver%residue/receiver%pole)))
+      call find_violations(receiver%pole, receiver%residue, receiver%direct + lift, omega, failed)
+      if (failed) then
+         error = numerical_error('&measured_mobility: the zeros of the real part were not found')
+      else if (size(omega) > 0) then
+         conductance = get_conductance(receiver, omega/(2*pi))
+         i = minloc(conductance, dim=1)
+         error = input_error('&measured_mobility: the real part of the mobility is '//to_text(conductance(i)) &
+            //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
+      end if
+   end subroutine get_receiver
+
+   !> Band of the measurement.
+   subroutine get_validity(options, lowest, highest, reason)
+      class(measured_mobility_floor_type), intent(in) :: options
+      !> Ends of the band, Hz.
+      real(wp), intent(out) :: lowest, highest
+      !> What ends it.
+      character(len=reason_length), intent(out) :: reason
+
+      lowest = options%lowest_frequency
+      highest = options%highest_frequency
+      reason = 'the mobility was not measured, and follows from the fit'
+   end subroutine get_validity
+
+end module thud_measured_mobility_floor

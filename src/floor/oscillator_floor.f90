@@ -1,0 +1,72 @@
+!> A mass on a spring and a damper: one mode of a floor, or a force plate on its mounts.
+module thud_oscillator_floor
+   use thud_error, only: error_type
+   use thud_field, only: field_type
+   use thud_floor_model, only: floor_model_type
+   use thud_kinds, only: wp
+   use thud_new_field, only: real_field
+   use thud_receiver, only: receiver_type
+   implicit none (type, external)
+   private
+
+   public :: oscillator_floor_type
+
+   !> Half the distance of the poles over their mean, below which damping counts as critical and they are held so far
+   !> apart: the mobility changes by its square, and as much cancels in the sum over both.
+   real(wp), parameter :: apart = 6.0e-6_wp
+
+   !> The floor; the default swings at 25 Hz with a loss factor of 0.05.
+   type, extends(floor_model_type) :: oscillator_floor_type
+      !> Mass, kg.
+      real(wp) :: mass = 100.0_wp
+      !> Stiffness, N/m.
+      real(wp) :: stiffness = 2.467e6_wp
+      !> Damping, N s/m.
+      real(wp) :: damping = 785.0_wp
+   contains
+      procedure, pass(options) :: get_fields
+      procedure, pass(options) :: get_receiver
+   end type oscillator_floor_type
+
+contains
+
+   !> Keys and allowed ranges of the group `&oscillator`.
+   function get_fields(options) result(fields)
+      class(oscillator_floor_type), intent(in), target :: options
+      !> One field per component: [3].
+      type(field_type), allocatable :: fields(:)
+
+      fields = [ &
+         real_field('mass', options%mass, 'kg', 'mass that moves under the source', '[1e-3, 1e12]'), &
+         real_field('stiffness', options%stiffness, 'N/m', 'stiffness of its support', '[0, 1e15]'), &
+         real_field('damping', options%damping, 'N s/m', 'damping of its support', '[0, 1e12]')]
+   end function get_fields
+
+   !> Y = s/(m s**2 + c s + k) with the poles -c/(2 m) +- sqrt(c**2/(4 m**2) - k/m).
+   subroutine get_receiver(options, receiver, error)
+      class(oscillator_floor_type), intent(in) :: options
+      type(receiver_type), intent(out) :: receiver
+      !> Never.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: decay, square, fast, slow
+      complex(wp) :: pole
+
+      decay = options%damping/(2*options%mass)
+      square = decay**2 - options%stiffness/options%mass
+      if (.not. (options%damping > 0.0_wp .or. options%stiffness > 0.0_wp)) then
+         receiver%pole = [(0.0_wp, 0.0_wp)]
+         receiver%residue = [cmplx(1/options%mass, kind=wp)]
+      else if (square > (apart*decay)**2) then
+         fast = -decay - sqrt(square)
+         ! By the product of the poles: their sum would cancel.
+         slow = options%stiffness/(options%mass*fast)
+         receiver%pole = cmplx([fast, slow], kind=wp)
+         receiver%residue = cmplx([fast, -slow]/(options%mass*(fast - slow)), kind=wp)
+      else
+         pole = cmplx(-decay, max(sqrt(max(-square, 0.0_wp)), apart*decay), wp)
+         receiver%pole = [pole]
+         receiver%residue = [2*pole/(options%mass*cmplx(0.0_wp, 2*pole%im, wp))]
+      end if
+   end subroutine get_receiver
+
+end module thud_oscillator_floor

@@ -1,0 +1,164 @@
+!> The drop on a floor that moves as text: files and the table on the screen.
+module thud_floor_report
+   use thud_band, only: get_band_name
+   use thud_case, only: case_type
+   use thud_floor_result, only: floor_result_type
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_report, only: get_fact_group, get_force_csv, get_scalar_lines, line
+   use thud_text, only: fixed, newline, to_text
+   implicit none (type, external)
+   private
+
+   public :: get_floor_force_csv, get_floor_levels_csv, get_floor_summary, get_floor_table
+
+   !> Widths of the columns of the table: names, numbers, units.
+   integer, parameter :: name_column = 22, number_column = 10, unit_column = 4
+
+   !> Columns of the file of forces that every floor has.
+   character(len=32), parameter :: own_columns(3) = [character(len=32) :: &
+      'blocked_force_N', 'floor_displacement_m', 'floor_velocity_m_per_s']
+
+contains
+
+   !> Forces and motions against time.
+   subroutine get_floor_force_csv(blocked, contact, found, text)
+      !> The drop on a rigid floor, and on the floor.
+      type(force_history_type), intent(in) :: blocked, contact
+      type(floor_result_type), intent(in) :: found
+      !> Text of `floor_force.csv`.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=32) :: names(size(own_columns) + size(found%point_velocity, 2))
+      real(wp) :: columns(size(contact%floor_force), size(names))
+      integer :: i
+
+      names(:size(own_columns)) = own_columns
+      do i = 1, size(found%point_velocity, 2)
+         names(size(own_columns) + i) = 'point_'//to_text(i)//'_velocity_m_per_s'
+      end do
+      columns(:, 1) = blocked%floor_force
+      columns(:, 2) = contact%floor_displacement
+      columns(:, 3) = contact%floor_velocity
+      columns(:, size(own_columns) + 1:) = found%point_velocity
+      text = get_force_csv(contact, names, columns)
+   end subroutine get_floor_force_csv
+
+   !> Levels of both forces and energies per band.
+   subroutine get_floor_levels_csv(found, text)
+      type(floor_result_type), intent(in) :: found
+      !> Text of `floor_levels.csv`.
+      character(len=:), allocatable, intent(out) :: text
+      integer :: i, j
+
+      text = 'bandwidth,nominal_Hz,lower_edge_Hz,upper_edge_Hz,blocked_level_dB,contact_level_dB,difference_dB,' &
+         //'energy_by_motion_J,energy_by_mobility_J,conductance_m_per_Ns'//newline
+      do i = 1, size(found%bands)
+         associate (band => found%bands(i))
+            text = text//trim(band%set)
+            associate (numbers => [band%nominal, band%lower, band%upper, found%blocked_level(i), found%contact_level(i), &
+               found%contact_level(i) - found%blocked_level(i), found%energy_by_motion(i), found%energy_by_mobility(i), &
+               found%conductance(i)])
+               do j = 1, size(numbers)
+                  text = text//','//to_text(numbers(j))
+               end do
+            end associate
+         end associate
+         text = text//newline
+      end do
+   end subroutine get_floor_levels_csv
+
+   !> The scalars of the drop on the floor.
+   subroutine get_floor_summary(contact, text)
+      type(force_history_type), intent(in) :: contact
+      !> Groups of `summary.nml`.
+      character(len=:), allocatable, intent(out) :: text
+
+      text = newline//'&floor_summary'//newline//get_scalar_lines(contact)//line('floor_work', to_text(contact%floor_work), &
+         'J')//'/'//newline
+      if (size(contact%fact) > 0) text = text//newline//get_fact_group('floor_facts', contact)
+   end subroutine get_floor_summary
+
+   !> The drop on the floor beside the blocked one.
+   subroutine get_floor_table(case, blocked, contact, found, text)
+      type(case_type), intent(in) :: case
+      !> The drop on a rigid floor, and on the floor.
+      type(force_history_type), intent(in) :: blocked, contact
+      type(floor_result_type), intent(in) :: found
+      !> The table.
+      character(len=:), allocatable, intent(out) :: text
+      character(len=name_column) :: name
+      character(len=13) :: energy
+      character(len=:), allocatable :: cells
+      integer :: i
+
+      name = 'on '//trim(case%floor)
+      text = '  '//name//'   blocked       contact    difference       energy'//newline
+      do i = 1, size(found%bands)
+         name = 'level, '//get_band_name(found%bands(i))//' Hz '//trim(found%bands(i)%set)
+         associate (blocked_level => found%blocked_level(i), contact_level => found%contact_level(i))
+            call get_cells([blocked_level, contact_level, contact_level - blocked_level], 2, spread('dB', 1, 3), cells)
+         end associate
+         write (energy, '(es11.2, " J")') found%energy_by_motion(i)
+         text = text//'  '//name//cells//'  '//energy//newline
+      end do
+      text = text//newline
+      call add_row('peak force', blocked%peak_force, contact%peak_force, 1, 'N')
+      call add_row('contact time', 1.0e3_wp*blocked%contact_time, 1.0e3_wp*contact%contact_time, 3, 'ms')
+      call add_row('restitution', blocked%restitution, contact%restitution, 4, '')
+      call add_row('impulse', blocked%impulse, contact%impulse, 3, 'N s')
+      call add_row('velocity of the floor', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_velocity)), 3, 'mm/s')
+      call add_row('its displacement', 0.0_wp, 1.0e3_wp*maxval(abs(contact%floor_displacement)), 4, 'mm')
+      call add_row('energy to the floor', 0.0_wp, 1.0e3_wp*contact%floor_work, 3, 'mJ')
+      text = text//newline//'  Energies by the velocity and by the mobility of the floor differ by at most ' &
+         //fixed(1.0e2_wp*get_disagreement(found), 3)//' % of all bands.'//newline
+
+   contains
+
+      !> Adds a number of both drops.
+      subroutine add_row(title, rigid, moving, decimals, unit)
+         character(len=*), intent(in) :: title
+         !> On a rigid floor, and on the floor.
+         real(wp), intent(in) :: rigid, moving
+         integer, intent(in) :: decimals
+         character(len=*), intent(in) :: unit
+
+         name = title
+         call get_cells([rigid, moving], decimals, [unit, unit], cells)
+         text = text//'  '//name//cells//newline
+      end subroutine add_row
+
+   end subroutine get_floor_table
+
+   !> Maximum difference of the two energies of a band over the energy of the bands of its set.
+   pure function get_disagreement(found) result(ratio)
+      type(floor_result_type), intent(in) :: found
+      real(wp) :: ratio
+      integer :: i
+
+      ratio = maxval([(abs(found%energy_by_motion(i) - found%energy_by_mobility(i)) &
+         /max(sum(found%energy_by_mobility, mask=found%bands%set == found%bands(i)%set), tiny(1.0_wp)), &
+         i=1, size(found%bands))])
+   end function get_disagreement
+
+   !> Numbers with their units, each in its column.
+   pure subroutine get_cells(values, decimals, units, text)
+      !> The numbers: [n].
+      real(wp), intent(in) :: values(:)
+      integer, intent(in) :: decimals
+      !> Their units: [n].
+      character(len=*), intent(in) :: units(:)
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: number
+      character(len=unit_column) :: unit
+      integer :: i
+
+      text = ''
+      do i = 1, size(values)
+         number = fixed(values(i), decimals)
+         unit = units(i)
+         text = text//repeat(' ', max(number_column - len(number), 0))//number//' '//unit
+      end do
+      text = trim(text)
+   end subroutine get_cells
+
+end module thud_floor_report

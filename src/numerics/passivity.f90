@@ -1,0 +1,226 @@
+!> Passivity of a rational mobility or admittance: its real part must not be negative at any frequency.
+module thud_passivity
+   use thud_kinds, only: wp
+   use thud_lapack, only: dposv
+   use thud_rational, only: get_basis, get_coefficients, get_eigenvalues, get_residues, get_state_input, get_state_matrix
+   implicit none (type, external)
+   private
+
+   public :: find_violations, make_passive
+
+   !> Rounds of the correction; each adds the worst frequencies of the one before.
+   integer, parameter :: n_round = 30
+
+   !> Sweeps of Hildreth's method.
+   integer, parameter :: n_sweep = 2000
+
+   !> Margin of the corrected real part over the mean magnitude: above rounding.
+   real(wp), parameter :: margin = 1.0e-9_wp
+
+   !> Ridge of the normal equations over their unit diagonal: close poles make them singular.
+   real(wp), parameter :: ridge = 1.0e-12_wp
+
+   !> Sections of the search for a minimum; each leaves 0.618 of the interval.
+   integer, parameter :: n_section = 60
+
+contains
+
+   !> Frequencies at which the real part is least and negative, one in each interval where it is negative.
+   !>
+   !> With the real state space A, b, c, d the real part vanishes at the squares of frequencies that are eigenvalues of
+   !> A (b c/d - A) (half-size test; Gustavsen and Semlyen, IEEE Trans. Power Delivery 24, 2009): between two of them it has
+   !> one sign.
+   subroutine find_violations(pole, residue, direct, omega, failed)
+      !> Poles, 1/s, and residues, those of pairs doubled: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Constant part, above 0.
+      real(wp), intent(in) :: direct
+      !> The angular frequencies, rad/s: [n_violation].
+      real(wp), allocatable, intent(out) :: omega(:)
+      !> LAPACK found no eigenvalues.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: state(:, :), input(:), output(:), border(:)
+      complex(wp), allocatable :: square(:)
+      real(wp) :: scale
+      integer :: j, n
+
+      scale = maxval(abs(pole))
+      allocate (state, source=get_state_matrix(pole/scale))
+      allocate (input, source=get_state_input(pole))
+      allocate (output, source=get_coefficients(pole, residue/scale))
+      n = size(input)
+      allocate (square(n))
+      state = matmul(state, reshape([(input*output(j)/direct, j=1, n)], [n, n]) - state)
+      call get_eigenvalues(state, square, failed)
+      allocate (omega(0))
+      if (failed) return
+      ! A candidate that is no zero does not harm; one that rounding has moved off the real axis must not be missed.
+      border = scale*[0.0_wp, sorted(pack(sqrt(abs(square)), square%re > 0.0_wp))]
+      border = [border, 2*max(border(size(border)), scale)]
+      do j = 1, size(border) - 1
+         associate (middle => get_least(pole, residue, direct, border(j), border(j + 1)))
+            if (get_real_part(pole, residue, direct, middle) < 0.0_wp) omega = [omega, middle]
+         end associate
+      end do
+   end subroutine find_violations
+
+   !> Changes residues and constant part by as little as possible, by weighted squares at some frequencies, so that the
+   !> real part is nowhere negative.
+   subroutine make_passive(line, weight, pole, residue, direct, failed)
+      !> Angular frequencies, rad/s, and weights of the change there: [n_line].
+      real(wp), intent(in) :: line(:), weight(:)
+      !> Poles, 1/s: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> Residues, those of pairs doubled: [n].
+      complex(wp), intent(inout) :: residue(:)
+      !> Constant part.
+      real(wp), intent(inout) :: direct
+      !> LAPACK found no eigenvalues.
+      logical, intent(out) :: failed
+      real(wp), allocatable :: normal(:, :), omega(:), held(:), x(:), length(:)
+      complex(wp), allocatable :: basis(:, :)
+      real(wp) :: least
+      integer :: i, n
+
+      call get_basis(pole, cmplx(0.0_wp, line, wp), basis)
+      n = size(basis, 2)
+      allocate (length(n))
+      do i = 1, n
+         length(i) = norm2(weight*abs(basis(:, i)))
+         basis(:, i) = weight*basis(:, i)/length(i)
+      end do
+      normal = real(matmul(conjg(transpose(basis)), basis))
+      do i = 1, n
+         normal(i, i) = normal(i, i) + ridge
+      end do
+      least = margin*sum(abs([(get_response(pole, residue, direct, line(i)), i=1, size(line))]))/size(line)
+      allocate (held(0))
+      do i = 1, n_round
+         direct = max(direct, least)
+         call find_violations(pole, residue, direct, omega, failed)
+         if (failed .or. size(omega) == 0) return
+         held = [held, omega]
+         x = get_correction(pole, residue, direct, held, normal, length, least)
+         residue = residue + get_residues(pole, x(:n - 1))
+         direct = direct + x(n)
+      end do
+      ! What is left is within rounding of the corrections; a larger constant part ends it.
+      do i = 1, n_round
+         direct = max(direct, least)
+         call find_violations(pole, residue, direct, omega, failed)
+         if (failed .or. size(omega) == 0) return
+         direct = direct + least - minval([(get_real_part(pole, residue, direct, omega(n)), n=1, size(omega))])
+      end do
+      failed = .true.
+   end subroutine make_passive
+
+   !> The least change x of the coefficients, x' N x, that makes the real part at least `least` at some frequencies:
+   !> Hildreth's method on the dual problem.
+   function get_correction(pole, residue, direct, omega, normal, length, least) result(x)
+      !> Poles, 1/s, and residues: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Constant part.
+      real(wp), intent(in) :: direct
+      !> The angular frequencies, rad/s: [n_held].
+      real(wp), intent(in) :: omega(:)
+      !> N for coefficients times the lengths: [n_x, n_x].
+      real(wp), intent(in) :: normal(:, :), length(:)
+      !> The real part to be had.
+      real(wp), intent(in) :: least
+      !> Changes of the coefficients and of the constant part: [n_x].
+      real(wp) :: x(size(length))
+      complex(wp), allocatable :: basis(:, :)
+      real(wp) :: factor(size(length), size(length)), rows(size(length), size(omega)), solved(size(length), size(omega))
+      real(wp) :: gram(size(omega), size(omega)), missing(size(omega)), force(size(omega))
+      integer :: i, sweep, info
+
+      call get_basis(pole, cmplx(0.0_wp, omega, wp), basis)
+      do i = 1, size(omega)
+         rows(:, i) = real(basis(i, :))/length
+         missing(i) = least - get_real_part(pole, residue, direct, omega(i))
+      end do
+      factor = normal
+      solved = rows
+      call dposv('U', size(length), size(omega), factor, size(length), solved, size(length), info)
+      x = 0.0_wp
+      if (info /= 0) return
+      gram = matmul(transpose(rows), solved)
+      force = 0.0_wp
+      do sweep = 1, n_sweep
+         do i = 1, size(omega)
+            force(i) = max(0.0_wp, force(i) + (missing(i) - dot_product(gram(:, i), force))/gram(i, i))
+         end do
+      end do
+      x = matmul(solved, force)/length
+   end function get_correction
+
+   !> Angular frequency between two others at which the real part is least: golden sections.
+   pure function get_least(pole, residue, direct, lower, upper) result(omega)
+      !> Poles, 1/s, and residues: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Constant part; the ends, rad/s.
+      real(wp), intent(in) :: direct, lower, upper
+      real(wp) :: omega
+      real(wp), parameter :: golden = (sqrt(5.0_wp) - 1)/2
+      real(wp) :: low, high, left, right
+      integer :: i
+
+      low = lower
+      high = upper
+      do i = 1, n_section
+         left = high - golden*(high - low)
+         right = low + golden*(high - low)
+         if (get_real_part(pole, residue, direct, left) < get_real_part(pole, residue, direct, right)) then
+            high = right
+         else
+            low = left
+         end if
+      end do
+      omega = (low + high)/2
+   end function get_least
+
+   !> Real part at a frequency.
+   pure function get_real_part(pole, residue, direct, omega) result(part)
+      !> Poles, 1/s, and residues: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Constant part; angular frequency, rad/s.
+      real(wp), intent(in) :: direct, omega
+      real(wp) :: part
+
+      part = real(get_response(pole, residue, direct, omega))
+   end function get_real_part
+
+   !> Value at a frequency.
+   pure function get_response(pole, residue, direct, omega) result(response)
+      !> Poles, 1/s, and residues, those of pairs doubled: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Constant part; angular frequency, rad/s.
+      real(wp), intent(in) :: direct, omega
+      complex(wp) :: response
+
+      associate (s => cmplx(0.0_wp, omega, wp))
+         response = direct + sum(residue/(s - pole) + conjg(residue)/(s - conjg(pole)))/2
+      end associate
+   end function get_response
+
+   !> Numbers in rising order.
+   pure function sorted(values) result(rising)
+      !> The numbers: [n].
+      real(wp), intent(in) :: values(:)
+      !> The same: [n].
+      real(wp) :: rising(size(values))
+      real(wp) :: value
+      integer :: i, j
+
+      rising = values
+      do i = 2, size(rising)
+         value = rising(i)
+         do j = i - 1, 1, -1
+            if (rising(j) <= value) exit
+            rising(j + 1) = rising(j)
+         end do
+         rising(j + 1) = value
+      end do
+   end function sorted
+
+end module thud_passivity

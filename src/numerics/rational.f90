@@ -1,0 +1,146 @@
+!> Rational functions of frequency, d + sum of r_k/(s - p_k), with real coefficients: their real state space and zeros.
+!>
+!> Of a pair of conjugate poles the one with positive imaginary part is kept, with twice its residue.
+module thud_rational
+   use thud_kinds, only: wp
+   use thud_lapack, only: dgeev
+   implicit none (type, external)
+   private
+
+   public :: get_basis, get_coefficients, get_eigenvalues, get_order, get_residues, get_state_matrix, get_state_input
+
+contains
+
+   !> Number of poles, both of a pair counted.
+   pure function get_order(pole) result(order)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      integer :: order
+
+      order = size(pole) + count(pole%im > 0.0_wp)
+   end function get_order
+
+   !> Functions of which the rational function is the sum with real coefficients: 1/(s - p), of a pair
+   !> 1/(s - p) + 1/(s - p*) and i/(s - p) - i/(s - p*), and at last 1.
+   pure subroutine get_basis(pole, s, basis)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> Complex frequencies: [n_line].
+      complex(wp), intent(in) :: s(:)
+      !> The functions: [n_line, order + 1].
+      complex(wp), allocatable, intent(out) :: basis(:, :)
+      complex(wp), parameter :: i = (0.0_wp, 1.0_wp)
+      integer :: j, k
+
+      allocate (basis(size(s), get_order(pole) + 1))
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         basis(:, j) = 1/(s - pole(k))
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         basis(:, j + 1) = i*basis(:, j) - i/(s - conjg(pole(k)))
+         basis(:, j) = basis(:, j) + 1/(s - conjg(pole(k)))
+         j = j + 1
+      end do
+      basis(:, j + 1) = 1.0_wp
+   end subroutine get_basis
+
+   !> Residues of real coefficients.
+   pure function get_residues(pole, coefficient) result(residue)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> Coefficients of the basis: [order].
+      real(wp), intent(in) :: coefficient(:)
+      !> Residues, those of pairs doubled: [n].
+      complex(wp) :: residue(size(pole))
+      integer :: j, k
+
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         residue(k) = coefficient(j)
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         residue(k) = 2*cmplx(coefficient(j), coefficient(j + 1), wp)
+         j = j + 1
+      end do
+   end function get_residues
+
+   !> Real coefficients of residues.
+   pure function get_coefficients(pole, residue) result(coefficient)
+      !> Poles, and residues, those of pairs doubled: [n].
+      complex(wp), intent(in) :: pole(:), residue(:)
+      !> Coefficients of the basis: [order].
+      real(wp), allocatable :: coefficient(:)
+      integer :: j, k
+
+      allocate (coefficient(get_order(pole)))
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         coefficient(j) = residue(k)%re
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         coefficient(j:j + 1) = [residue(k)%re, residue(k)%im]/2
+         j = j + 1
+      end do
+   end function get_coefficients
+
+   !> Real matrix A of x' = A x + b u with the poles as eigenvalues.
+   pure function get_state_matrix(pole) result(matrix)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> The matrix: [order, order].
+      real(wp), allocatable :: matrix(:, :)
+      integer :: j, k
+
+      allocate (matrix(get_order(pole), get_order(pole)))
+      matrix = 0.0_wp
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         matrix(j, j) = pole(k)%re
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         matrix(j, j + 1) = pole(k)%im
+         matrix(j + 1, j) = -pole(k)%im
+         matrix(j + 1, j + 1) = pole(k)%re
+         j = j + 1
+      end do
+   end function get_state_matrix
+
+   !> Its input b, with which the coefficients of the basis are the output.
+   pure function get_state_input(pole) result(input)
+      !> Poles: [n].
+      complex(wp), intent(in) :: pole(:)
+      !> The vector: [order].
+      real(wp), allocatable :: input(:)
+      integer :: j, k
+
+      allocate (input(get_order(pole)))
+      j = 0
+      do k = 1, size(pole)
+         j = j + 1
+         input(j) = 1.0_wp
+         if (.not. pole(k)%im > 0.0_wp) cycle
+         input(j:j + 1) = [2.0_wp, 0.0_wp]
+         j = j + 1
+      end do
+   end function get_state_input
+
+   !> Eigenvalues of a real matrix.
+   pure subroutine get_eigenvalues(matrix, eigenvalue, failed)
+      !> The matrix: [n, n].
+      real(wp), intent(in) :: matrix(:, :)
+      !> The eigenvalues: [n].
+      complex(wp), intent(out) :: eigenvalue(:)
+      !> LAPACK did not find them.
+      logical, intent(out) :: failed
+      real(wp) :: copy(size(matrix, 1), size(matrix, 1)), wr(size(matrix, 1)), wi(size(matrix, 1))
+      real(wp) :: unused(1, 1), work(16*size(matrix, 1))
+      integer :: info
+
+      copy = matrix
+      call dgeev('N', 'N', size(wr), copy, size(wr), wr, wi, unused, 1, unused, 1, work, size(work), info)
+      eigenvalue = cmplx(wr, wi, wp)
+      failed = info /= 0
+   end subroutine get_eigenvalues
+
+end module thud_rational

@@ -1,0 +1,231 @@
+!> Impact of a lumped source on a floor that moves: marches through every contact of the record and checks that the
+!> source has left for good. Gravity does not act, as on a rigid floor: the bounce that it would end is another impact.
+module thud_coupled_impact
+   use thud_contact_source, only: coarse_error, contact_source_type
+   use thud_coupled_phases, only: begin_contact, get_distance, get_event, impact_type, no_event, observe, pass_event
+   use thud_coupled_step, only: coupled_state_type, get_relative_state, take_coupled_step
+   use thud_drop, only: drop_type
+   use thud_error, only: error_type, input_error
+   use thud_force_history, only: force_history_type
+   use thud_interrupt, only: check_interrupt
+   use thud_kinds, only: wp
+   use thud_receiver, only: can_strike, new_receiver_motion, receiver_type
+   use thud_receiver_stages, only: new_receiver_stages
+   use thud_sampling, only: sampling_type
+   use thud_text, only: to_text
+   use thud_zero_search, only: advance_search, is_found, narrow, new_zero_search, zero_search_type
+   implicit none (type, external)
+   private
+
+   public :: solve_coupled
+
+   !> Touches, releases and turning points in one step; more than a few are a fault of the steps.
+   integer, parameter :: max_events = 100
+
+contains
+
+   !> Force history of one drop; the caller checks contact time and balances.
+   subroutine solve_coupled(source, drop, sampling, n_step, receiver, history, state, error)
+      !> The source before first touch.
+      class(contact_source_type), intent(inout) :: source
+      type(drop_type), intent(in) :: drop
+      type(sampling_type), intent(in) :: sampling
+      !> Steps in each sampling interval.
+      integer, intent(in) :: n_step
+      !> What the source drops on.
+      type(receiver_type), intent(in) :: receiver
+      !> The history, prepared by the source; gets samples, maxima, contact time and the motion of the floor.
+      type(force_history_type), intent(inout) :: history
+      !> State at the end of the record, not relative to the floor: [n_state].
+      real(wp), intent(out) :: state(:)
+      !> The equations fail, or the contact outlasts the record.
+      type(error_type), allocatable, intent(out) :: error
+      type(impact_type) :: impact
+      real(wp) :: step
+      integer :: i, j, n
+
+      step = 1/(sampling%sample_rate*n_step)
+      n = size(history%floor_force)
+      allocate (history%floor_displacement(n), history%floor_velocity(n), source=0.0_wp)
+      impact%receiver = receiver
+      impact%stages = new_receiver_stages(receiver, step)
+      impact%scale = history%impact_velocity
+      impact%motion%motion = new_receiver_motion(receiver)
+      allocate (impact%motion%displacement(source%n_mass), impact%motion%acceleration(source%n_mass), source=0.0_wp)
+      allocate (impact%motion%velocity(source%n_mass), source=history%impact_velocity)
+      call begin_contact(source, impact)
+      do i = 1, n
+         call record(source, impact, i, history)
+         if (i == n) exit
+         do j = 1, n_step
+            impact%time = ((i - 1)*real(n_step, wp) + j - 1)*step
+            call advance(source, drop, step, impact, history, error)
+            if (allocated(error)) return
+         end do
+         call check_interrupt(error)
+         if (allocated(error)) return
+      end do
+      call check_end(source, sampling, impact, error)
+      if (allocated(error)) return
+      call finish_record(source, impact, history)
+      state = get_relative_state(source, impact%motion)
+      state(1:2*source%n_mass:2) = impact%motion%displacement
+      state(2:2*source%n_mass:2) = impact%motion%velocity
+   end subroutine solve_coupled
+
+   !> Moves source and floor on by one step, through the events inside it.
+   subroutine advance(source, drop, step, impact, history, error)
+      class(contact_source_type), intent(inout) :: source
+      type(drop_type), intent(in) :: drop
+      !> Length of the step, s.
+      real(wp), intent(in) :: step
+      type(impact_type), intent(inout) :: impact
+      !> Gets maxima and the time of each release.
+      type(force_history_type), intent(inout) :: history
+      !> The equations fail.
+      type(error_type), allocatable, intent(out) :: error
+      type(coupled_state_type) :: end
+      real(wp) :: left
+      integer :: k, event
+
+      left = step
+      do k = 1, max_events
+         call take_part(source, drop, left, impact, end, error)
+         if (allocated(error)) return
+         event = get_event(source, end)
+         if (event == no_event .or. impact%caught) then
+            impact%motion = end
+            impact%time = impact%time + left
+            call observe(source, impact, history)
+            return
+         end if
+         call go_to_event(source, drop, event, end, left, impact, error)
+         if (allocated(error)) return
+         call pass_event(source, event, impact, history)
+         if (.not. left > 0.0_wp) return
+      end do
+      error = coarse_error(to_text(max_events)//' touches, releases and turning points fall into one step')
+   end subroutine advance
+
+   !> Moves source and floor on to an event.
+   subroutine go_to_event(source, drop, event, end, left, impact, error)
+      class(contact_source_type), intent(in) :: source
+      type(drop_type), intent(in) :: drop
+      !> The event.
+      integer, intent(in) :: event
+      !> Motion after the rest of the step.
+      type(coupled_state_type), intent(inout) :: end
+      !> Length of the rest, s: before and after.
+      real(wp), intent(inout) :: left
+      type(impact_type), intent(inout) :: impact
+      !> The equations fail.
+      type(error_type), allocatable, intent(out) :: error
+      type(zero_search_type) :: search
+
+      search = new_zero_search(get_distance(source, event, impact%motion), left, get_distance(source, event, end))
+      do while (.not. is_found(search))
+         call advance_search(search)
+         call take_part(source, drop, search%trial, impact, end, error)
+         if (allocated(error)) return
+         call narrow(search, get_distance(source, event, end))
+      end do
+      call take_part(source, drop, search%right, impact, end, error)
+      if (allocated(error)) return
+      impact%motion = end
+      impact%time = impact%time + search%right
+      left = left - search%right
+   end subroutine go_to_event
+
+   !> Motion after a part of a step.
+   subroutine take_part(source, drop, length, impact, end, error)
+      class(contact_source_type), intent(in) :: source
+      type(drop_type), intent(in) :: drop
+      !> Length of the part, s.
+      real(wp), intent(in) :: length
+      type(impact_type), intent(in) :: impact
+      type(coupled_state_type), intent(out) :: end
+      !> The equations fail.
+      type(error_type), allocatable, intent(out) :: error
+      logical :: valid, converged
+
+      if (length < impact%stages%interval) then
+         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%scale, impact%motion, end, &
+            valid, converged)
+      else
+         call take_coupled_step(source, impact%stages, impact%scale, impact%motion, end, valid, converged)
+      end if
+      if (.not. valid) then
+         error = source%get_failure(drop, impact%time, get_relative_state(source, impact%motion))
+      else if (.not. converged) then
+         error = coarse_error('the equations of a step '//to_text(1.0e3_wp*impact%time) &
+            //' ms after first touch are not solved')
+      end if
+   end subroutine take_part
+
+   !> Writes one instant into the history.
+   pure subroutine record(source, impact, i, history)
+      class(contact_source_type), intent(in) :: source
+      type(impact_type), intent(in) :: impact
+      !> Number of the sample.
+      integer, intent(in) :: i
+      type(force_history_type), intent(inout) :: history
+
+      associate (motion => impact%motion)
+         history%floor_displacement(i) = motion%motion%displacement
+         history%floor_velocity(i) = motion%floor_velocity
+         call source%record_sample(get_relative_state(source, motion), i, history)
+         ! Of a force that sets in with a jump, and of the velocity that jumps with it, the first sample is the half.
+         if (i > 1) history%floor_force(i) = motion%force
+         if (i == 1) history%floor_velocity(i) = motion%floor_velocity/2
+      end associate
+   end subroutine record
+
+   !> Refuses a record that ends too early.
+   subroutine check_end(source, sampling, impact, error)
+      class(contact_source_type), intent(in) :: source
+      type(sampling_type), intent(in) :: sampling
+      type(impact_type), intent(in) :: impact
+      !> The source touches the floor, or the floor can strike it again.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: displacement, velocity
+
+      if (impact%caught) return
+      if (source%touching) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration) &
+            //' s ends while the source is still in contact; allowed: longer than the contact')
+         return
+      end if
+      associate (motion => impact%motion)
+         call source%get_reach(get_relative_state(source, motion), displacement, velocity)
+         if (can_strike(impact%receiver, motion%motion, -displacement, -velocity - motion%floor_velocity)) then
+            error = input_error('&sampling: duration = '//to_text(sampling%duration) &
+               //' s ends while the floor may strike the source again; allowed: longer')
+         end if
+      end associate
+   end subroutine check_end
+
+   !> Clears the flight after the last contact, and writes what the march has summed up.
+   pure subroutine finish_record(source, impact, history)
+      class(contact_source_type), intent(in) :: source
+      type(impact_type), intent(in) :: impact
+      type(force_history_type), intent(inout) :: history
+      integer :: last, n
+
+      last = floor(history%contact_time*history%sample_rate) + 1
+      history%deflection(last + 1:) = 0.0_wp
+      history%velocity(last + 1:) = 0.0_wp
+      if (allocated(history%channel)) history%channel(last + 1:, :) = 0.0_wp
+      history%floor_work = impact%motion%work
+      history%peak_force = impact%peak_force
+      history%fact_name = [character(len=len(history%fact_name)) :: history%fact_name, 'contacts']
+      history%fact_unit = [character(len=len(history%fact_unit)) :: history%fact_unit, '']
+      history%fact = [history%fact, real(impact%n_contact, wp)]
+      if (.not. source%cap_growth > 0.0_wp) return
+      ! The cap that rests on the floor resists its acceleration.
+      n = size(history%part_name)
+      history%part_name = [character(len=len(history%part_name)) :: history%part_name, 'cap_force']
+      history%part = reshape([history%part, history%floor_force - sum(history%part, dim=2)], &
+         [size(history%floor_force), n + 1])
+   end subroutine finish_record
+
+end module thud_coupled_impact

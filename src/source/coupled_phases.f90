@@ -1,0 +1,169 @@
+!> The phases of a lumped source on a floor that moves: compression, restitution and flight, and the events between them.
+module thud_coupled_phases
+   use thud_contact_source, only: contact_source_type
+   use thud_coupled_step, only: coupled_state_type, get_relative_state
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_receiver, only: get_receiver_velocity, receiver_type
+   use thud_receiver_stages, only: receiver_stages_type
+   implicit none (type, external)
+   private
+
+   public :: begin_contact, get_distance, get_event, impact_type, observe, pass_event
+
+   !> Part of the energy that a source keeps which a light floor has caught: then its contact ends. Of the force, times
+   !> deflection, likewise.
+   real(wp), parameter :: spent_part = 1.0e-12_wp
+
+   !> What ends a part of a step: the turning point between compression and restitution, release, touch.
+   integer, parameter :: turn = 1, release = 2, touch = 3
+
+   !> Nothing does.
+   integer, parameter, public :: no_event = 0
+
+   !> Impact in progress.
+   type :: impact_type
+      !> The receiver, and a whole step of it.
+      type(receiver_type) :: receiver
+      type(receiver_stages_type) :: stages
+      !> Motion of source and floor.
+      type(coupled_state_type) :: motion
+      !> Time since first touch, s; velocity at first touch, m/s.
+      real(wp) :: time = 0.0_wp, scale = 0.0_wp
+      !> Maximum force on the floor so far, N.
+      real(wp) :: peak_force = 0.0_wp
+      !> Contacts so far.
+      integer :: n_contact = 0
+      !> A floor caught the source.
+      logical :: caught = .false.
+   end type impact_type
+
+contains
+
+   !> Force and velocity of the floor when the source has just touched: the part of the receiver that answers at once
+   !> shares the first force with the source, and the cap has no mass yet.
+   pure subroutine begin_contact(source, impact)
+      class(contact_source_type), intent(inout) :: source
+      type(impact_type), intent(inout) :: impact
+      real(wp), dimension(source%n_state) :: state, rate, slower, slower_rate
+      real(wp) :: length, change
+      integer :: k
+      logical :: valid
+
+      source%touching = .true.
+      source%compressing = .true.
+      impact%n_contact = impact%n_contact + 1
+      associate (motion => impact%motion, place => 2*source%n_mass + 1)
+         motion%force = 0.0_wp
+         length = 1.0e-7_wp*impact%scale
+         ! The force grows with the velocity at most by its square: Newton's iterations come from one side.
+         do k = 1, 50
+            motion%floor_velocity = get_receiver_velocity(impact%receiver, motion%force, motion%motion)
+            state = get_relative_state(source, motion)
+            slower = state
+            slower(2) = state(2) - length
+            call source%get_derivative(0.0_wp, state, rate, valid)
+            call source%get_derivative(0.0_wp, slower, slower_rate, valid)
+            change = (rate(place) - motion%force) &
+               /(1 + impact%receiver%direct*(rate(place) - slower_rate(place))/(state(2) - slower(2)))
+            if (abs(change) <= epsilon(change)*abs(motion%force)) exit
+            motion%force = motion%force + change
+         end do
+         motion%acceleration = rate(2:2*source%n_mass:2)
+         impact%peak_force = max(impact%peak_force, motion%force)
+      end associate
+   end subroutine begin_contact
+
+   !> Event that a part of a step has passed.
+   pure function get_event(source, end) result(event)
+      class(contact_source_type), intent(in) :: source
+      !> Motion after it.
+      type(coupled_state_type), intent(in) :: end
+      integer :: event
+      real(wp) :: state(source%n_state)
+
+      state = get_relative_state(source, end)
+      event = no_event
+      if (.not. source%touching) then
+         if (state(1) >= 0.0_wp) event = touch
+      else if (source%compressing) then
+         if (state(2) <= 0.0_wp) event = turn
+      else if (state(1) <= 0.0_wp) then
+         event = release
+      else if (state(2) > 0.0_wp) then
+         ! The floor comes back.
+         event = turn
+      end if
+   end function get_event
+
+   !> What falls to zero at an event: gap, deflection, or velocity.
+   pure function get_distance(source, event, motion) result(distance)
+      class(contact_source_type), intent(in) :: source
+      !> The event.
+      integer, intent(in) :: event
+      type(coupled_state_type), intent(in) :: motion
+      !> Positive before it, m or m/s.
+      real(wp) :: distance
+      real(wp) :: state(source%n_state)
+
+      state = get_relative_state(source, motion)
+      select case (event)
+      case (touch)
+         distance = -state(1)
+      case (release)
+         distance = state(1)
+      case default
+         distance = merge(state(2), -state(2), source%compressing)
+      end select
+   end function get_distance
+
+   !> Changes the phase at an event.
+   pure subroutine pass_event(source, event, impact, history)
+      class(contact_source_type), intent(inout) :: source
+      !> The event.
+      integer, intent(in) :: event
+      type(impact_type), intent(inout) :: impact
+      !> Gets maxima and the time of release.
+      type(force_history_type), intent(inout) :: history
+
+      associate (motion => impact%motion)
+         select case (event)
+         case (turn)
+            call observe(source, impact, history)
+            source%compressing = .not. source%compressing
+         case (release)
+            source%touching = .false.
+            history%contact_time = impact%time
+            motion%force = 0.0_wp
+            motion%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, motion%motion)
+            motion%displacement(1) = motion%motion%displacement
+         case default
+            motion%displacement(1) = motion%motion%displacement
+            call begin_contact(source, impact)
+         end select
+      end associate
+   end subroutine pass_event
+
+   !> Raises the maxima, and ends the contact of a source that has given its energy to the floor.
+   pure subroutine observe(source, impact, history)
+      class(contact_source_type), intent(inout) :: source
+      type(impact_type), intent(inout) :: impact
+      !> Gets maxima and the contact time.
+      type(force_history_type), intent(inout) :: history
+      real(wp) :: state(source%n_state)
+
+      if (.not. source%touching) return
+      state = get_relative_state(source, impact%motion)
+      call source%record_peaks(state, history)
+      associate (motion => impact%motion)
+         impact%peak_force = max(impact%peak_force, motion%force)
+         impact%caught = max(maxval(motion%velocity**2), motion%force*state(1)/source%mass) <= spent_part*impact%scale**2
+         if (.not. impact%caught) return
+         source%touching = .false.
+         history%contact_time = impact%time
+         motion%force = 0.0_wp
+         motion%floor_velocity = get_receiver_velocity(impact%receiver, 0.0_wp, motion%motion)
+      end associate
+   end subroutine observe
+
+end module thud_coupled_phases

@@ -1,0 +1,267 @@
+!> One time step of a source in contact with a floor that moves: collocation with the forces on the floor and the
+!> accelerations of the masses at the stages of `thud_radau` as unknowns.
+!>
+!> The mass of a cap that rests on the floor makes its motion arbitrarily stiff, with the time constant mass over
+!> resistance that starts from zero at first touch; the method damps such decay instead of following it.
+module thud_coupled_step
+   use thud_contact_source, only: contact_source_type
+   use thud_kinds, only: wp
+   use thud_lapack, only: dgetf2, dgetrs
+   use thud_radau, only: n_stage, radau_derivative, radau_integral, radau_node
+   use thud_receiver, only: receiver_motion_type
+   use thud_receiver_stages, only: advance_stages, get_free_motion, receiver_stages_type
+   implicit none (type, external)
+   private
+
+   public :: coupled_state_type, get_relative_state, take_coupled_step
+
+   !> Newton's iterations of a step, and those in a row with the same derivatives.
+   integer, parameter :: max_iterations = 30, max_reuse = 5
+
+   !> Change of velocity over the scale of velocities below which they end.
+   real(wp), parameter :: tolerance = 1.0e-13_wp
+
+   !> Length of the differences that give the derivatives, relative.
+   real(wp), parameter :: difference = 1.0e-7_wp
+
+   !> Second integral of a polynomial up to each stage from its values there: [n_stage, n_stage].
+   real(wp), parameter :: second_integral(n_stage, n_stage) = matmul(radau_integral, radau_integral)
+
+   !> Motion of source and floor.
+   type :: coupled_state_type
+      !> Displacements of the masses towards the floor, m, their velocities, m/s, and accelerations, m/s2: [n_mass].
+      real(wp), allocatable :: displacement(:), velocity(:), acceleration(:)
+      !> Force on the floor, N, and velocity of the floor, m/s.
+      real(wp) :: force = 0.0_wp, floor_velocity = 0.0_wp
+      !> Impulse given to the floor, N s; energy given to it and lost in the source, J.
+      real(wp) :: impulse = 0.0_wp, work = 0.0_wp, loss = 0.0_wp
+      !> Motion of the floor.
+      type(receiver_motion_type) :: motion
+   end type coupled_state_type
+
+   !> A trial of the unknowns, and what the source answers.
+   type :: trial_type
+      !> Forces on the floor, N: [n_stage], and accelerations, m/s2: [n_stage, n_mass].
+      real(wp), allocatable :: force(:), acceleration(:, :)
+      !> Displacements and velocities of the floor without these forces, m and m/s: [n_stage].
+      real(wp), dimension(n_stage) :: free_displacement, free_velocity
+      !> Displacements, velocities and accelerations of the floor, m, m/s, m/s2: [n_stage].
+      real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
+      !> State relative to the floor at the stages: [n_state, n_stage]; and its rate.
+      real(wp), allocatable :: state(:, :), rate(:, :)
+      !> Derivatives of the rate by displacements and velocities: [n_state, 2*n_mass, n_stage].
+      real(wp), allocatable :: derivative(:, :, :)
+   end type trial_type
+
+contains
+
+   !> State of the equations of the source, relative to the floor.
+   pure function get_relative_state(source, coupled) result(state)
+      class(contact_source_type), intent(in) :: source
+      type(coupled_state_type), intent(in) :: coupled
+      !> The state: [n_state].
+      real(wp) :: state(source%n_state)
+      integer :: n
+
+      n = 2*source%n_mass
+      state = 0.0_wp
+      state(1:n:2) = coupled%displacement - coupled%motion%displacement
+      state(2:n:2) = coupled%velocity - coupled%floor_velocity
+      state(n + 1:n + 2) = [coupled%impulse, coupled%loss]
+   end function get_relative_state
+
+   !> One step.
+   pure subroutine take_coupled_step(source, stages, scale, start, end, valid, converged)
+      class(contact_source_type), intent(in) :: source
+      !> The floor in this step.
+      type(receiver_stages_type), intent(in) :: stages
+      !> Scale of velocities, m/s.
+      real(wp), intent(in) :: scale
+      !> Motion at the beginning and at the end.
+      type(coupled_state_type), intent(in) :: start
+      type(coupled_state_type), intent(out) :: end
+      !> The source stays in the domain of its equations; the iterations end.
+      logical, intent(out) :: valid, converged
+      type(trial_type) :: trial
+      real(wp) :: matrix(n_stage*(1 + source%n_mass), n_stage*(1 + source%n_mass)), change(n_stage*(1 + source%n_mass), 1)
+      integer :: pivot(n_stage*(1 + source%n_mass))
+      integer :: iteration, info, n
+
+      n = size(change)
+      allocate (trial%force(n_stage), source=start%force)
+      trial%acceleration = spread(start%acceleration, 1, n_stage)
+      allocate (trial%state(source%n_state, n_stage), trial%rate(source%n_state, n_stage), &
+         trial%derivative(source%n_state, 2*source%n_mass, n_stage), source=0.0_wp)
+      call get_free_motion(stages, start%motion, trial%free_velocity, trial%free_displacement)
+      converged = .false.
+      do iteration = 1, max_iterations
+         call try(source, stages, start, trial, valid)
+         if (.not. valid) return
+         if (mod(iteration, max_reuse) == 1) then
+            call differentiate(source, stages%interval, scale, trial)
+            call set_matrix(source, stages, trial, matrix)
+            call dgetf2(n, n, matrix, n, pivot, info)
+            if (info /= 0) return
+         end if
+         change(:, 1) = get_residual(source, trial)
+         call dgetrs('N', n, 1, matrix, n, pivot, change, n, info)
+         ! Written so that NaN ends here too.
+         if (.not. maxval(abs(change)) < huge(1.0_wp)) return
+         trial%force = trial%force + change(:n_stage, 1)
+         trial%acceleration = trial%acceleration + reshape(change(n_stage + 1:, 1), shape(trial%acceleration))
+         converged = max(maxval(abs(change(:n_stage, 1)))/source%mass, maxval(abs(change(n_stage + 1:, 1)))) &
+            *stages%interval <= tolerance*scale
+         if (converged) exit
+      end do
+      end = start
+      associate (h => stages%interval, weight => radau_integral(n_stage, :), k => 2*source%n_mass)
+         end%displacement = start%displacement + h*start%velocity &
+            + h**2*matmul(second_integral(n_stage, :), trial%acceleration)
+         end%velocity = start%velocity + h*matmul(weight, trial%acceleration)
+         end%acceleration = trial%acceleration(n_stage, :)
+         end%force = trial%force(n_stage)
+         end%floor_velocity = trial%floor_velocity(n_stage)
+         end%impulse = start%impulse + h*dot_product(weight, trial%force)
+         end%work = start%work + h*dot_product(weight, trial%force*trial%floor_velocity)
+         end%loss = start%loss + h*dot_product(weight, trial%rate(k + 2, :))
+      end associate
+      call advance_stages(stages, trial%force, end%motion)
+   end subroutine take_coupled_step
+
+   !> Motion at the stages under the trial's forces and accelerations, and the source's answer.
+   pure subroutine try(source, stages, start, trial, valid)
+      class(contact_source_type), intent(in) :: source
+      type(receiver_stages_type), intent(in) :: stages
+      !> Motion at the beginning.
+      type(coupled_state_type), intent(in) :: start
+      type(trial_type), intent(inout) :: trial
+      !> The source stays in the domain of its equations.
+      logical, intent(out) :: valid
+      integer :: i, k
+
+      associate (h => stages%interval, w => trial%floor_displacement, u => trial%floor_velocity, state => trial%state)
+         w = trial%free_displacement + matmul(stages%displacement, trial%force)
+         u = trial%free_velocity + matmul(stages%velocity, trial%force)
+         trial%floor_acceleration = matmul(radau_derivative, u - start%floor_velocity)/h
+         do k = 1, source%n_mass
+            state(2*k - 1, :) = start%displacement(k) + h*radau_node*start%velocity(k) &
+               + h**2*matmul(second_integral, trial%acceleration(:, k)) - w
+            state(2*k, :) = start%velocity(k) + h*matmul(radau_integral, trial%acceleration(:, k)) - u
+         end do
+         do i = 1, n_stage
+            call get_rate(source, state(:, i), trial%rate(:, i), valid)
+            if (.not. valid) return
+         end do
+      end associate
+   end subroutine try
+
+   !> Derivatives of the source's answer.
+   pure subroutine differentiate(source, interval, scale, trial)
+      class(contact_source_type), intent(in) :: source
+      !> Length of the step, s; scale of velocities, m/s.
+      real(wp), intent(in) :: interval, scale
+      type(trial_type), intent(inout) :: trial
+      real(wp) :: moved(source%n_state), rate(source%n_state)
+      real(wp) :: length
+      integer :: i, j
+      logical :: valid
+
+      do i = 1, n_stage
+         do j = 1, 2*source%n_mass
+            length = difference*merge(abs(trial%state(j, i)) + scale*interval, scale, mod(j, 2) == 1)
+            moved = trial%state(:, i)
+            ! Towards smaller deflections, which leave no domain.
+            moved(j) = moved(j) - length
+            call get_rate(source, moved, rate, valid)
+            trial%derivative(:, j, i) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
+         end do
+      end do
+   end subroutine differentiate
+
+   !> Accelerations, force and loss of the source; alone in flight a mass has none.
+   pure subroutine get_rate(source, state, rate, valid)
+      class(contact_source_type), intent(in) :: source
+      !> State relative to the floor, and its rate: [n_state].
+      real(wp), intent(in) :: state(:)
+      real(wp), intent(out) :: rate(:)
+      !> The state is in the domain of the equations.
+      logical, intent(out) :: valid
+
+      if (source%touching .or. source%n_mass > 1) then
+         call source%get_derivative(0.0_wp, state, rate, valid)
+      else
+         valid = .true.
+         rate = 0.0_wp
+      end if
+   end subroutine get_rate
+
+   !> What the forces on the floor and the accelerations miss.
+   pure function get_residual(source, trial) result(residual)
+      class(contact_source_type), intent(in) :: source
+      type(trial_type), intent(in) :: trial
+      !> The equations, less the unknowns: [n_unknown].
+      real(wp) :: residual(n_stage*(1 + source%n_mass))
+      integer :: k
+
+      associate (n => source%n_mass)
+         residual(:n_stage) = trial%rate(2*n + 1, :) - trial%force - get_cap_mass(source, trial)*trial%floor_acceleration
+         do k = 1, n
+            residual(k*n_stage + 1:(k + 1)*n_stage) = trial%rate(2*k, :) - trial%acceleration(:, k)
+         end do
+      end associate
+   end function get_residual
+
+   !> Mass of the cap at the stages; a step past release goes on without it.
+   pure function get_cap_mass(source, trial) result(mass)
+      class(contact_source_type), intent(in) :: source
+      type(trial_type), intent(in) :: trial
+      !> The mass, kg: [n_stage].
+      real(wp) :: mass(n_stage)
+
+      mass = 0.0_wp
+      if (source%touching) mass = source%cap_growth*max(trial%state(1, :), 0.0_wp)
+   end function get_cap_mass
+
+   !> Derivative of the unknowns less the equations.
+   pure subroutine set_matrix(source, stages, trial, matrix)
+      class(contact_source_type), intent(in) :: source
+      type(receiver_stages_type), intent(in) :: stages
+      type(trial_type), intent(in) :: trial
+      !> The derivative: [n_unknown, n_unknown].
+      real(wp), intent(out) :: matrix(:, :)
+      real(wp), dimension(n_stage, 2) :: by_force, by_acceleration
+      real(wp) :: by_cap(n_stage, n_stage), cap_mass(n_stage)
+      real(wp) :: slope
+      integer :: i, j, k, row, column, kind, place
+
+      matrix = 0.0_wp
+      cap_mass = get_cap_mass(source, trial)
+      by_cap = matmul(radau_derivative, stages%velocity)/stages%interval
+      do i = 1, n_stage
+         ! What displacements and velocities relative to the floor gain at this stage.
+         by_force = -reshape([stages%displacement(i, :), stages%velocity(i, :)], [n_stage, 2])
+         by_acceleration = reshape([stages%interval**2*second_integral(i, :), stages%interval*radau_integral(i, :)], &
+            [n_stage, 2])
+         do k = 0, source%n_mass
+            ! Row 0 is the balance of the cap, the others are the equations of motion.
+            row = k*n_stage + i
+            place = merge(2*source%n_mass + 1, 2*k, k == 0)
+            matrix(row, row) = 1.0_wp
+            do j = 1, 2*source%n_mass
+               slope = trial%derivative(place, j, i)
+               ! The mass of the cap grows with the deflection.
+               if (k == 0 .and. j == 1 .and. cap_mass(i) > 0.0_wp) then
+                  slope = slope - source%cap_growth*trial%floor_acceleration(i)
+               end if
+               column = (j + 1)/2*n_stage
+               kind = 2 - mod(j, 2)
+               matrix(row, :n_stage) = matrix(row, :n_stage) - slope*by_force(:, kind)
+               matrix(row, column + 1:column + n_stage) = matrix(row, column + 1:column + n_stage) &
+                  - slope*by_acceleration(:, kind)
+            end do
+         end do
+         matrix(i, :n_stage) = matrix(i, :n_stage) + cap_mass(i)*by_cap(i, :)
+      end do
+   end subroutine set_matrix
+
+end module thud_coupled_step

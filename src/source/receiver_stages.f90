@@ -1,0 +1,92 @@
+!> Exact motion of a receiver under a force that is in each step the polynomial through its values at the stages of
+!> `thud_radau`.
+module thud_receiver_stages
+   use thud_kinds, only: wp
+   use thud_phi, only: get_phi
+   use thud_radau, only: n_stage, radau_integral, radau_monomial, radau_node
+   use thud_receiver, only: receiver_motion_type, receiver_type
+   implicit none (type, external)
+   private
+
+   public :: advance_stages, get_free_motion, new_receiver_stages, receiver_stages_type
+
+   !> Factors of one step.
+   type :: receiver_stages_type
+      !> Length of the step, s.
+      real(wp) :: interval = 0.0_wp
+      !> Velocity, m/(N s), and displacement, m/N, at each stage by unit force at each: [n_stage, n_stage].
+      real(wp) :: velocity(n_stage, n_stage), displacement(n_stage, n_stage)
+      !> The same by unit x_k at the beginning, m/(N s2) and m/(N s): [n_pole, n_stage].
+      complex(wp), allocatable :: free_velocity(:, :), free_displacement(:, :)
+      !> The x_k at the end by unit x_k at the beginning: [n_pole]; by unit force at each stage, s: [n_pole, n_stage].
+      complex(wp), allocatable :: decay(:), gain(:, :)
+   end type receiver_stages_type
+
+contains
+
+   !> Factors of steps of one length.
+   pure function new_receiver_stages(receiver, interval) result(stages)
+      type(receiver_type), intent(in) :: receiver
+      !> Length of the steps, s.
+      real(wp), intent(in) :: interval
+      type(receiver_stages_type) :: stages
+      complex(wp) :: phi(0:n_stage + 1), gain(n_stage), travel(n_stage)
+      real(wp) :: time
+      integer :: i, k, m, n
+
+      n = 0
+      if (allocated(receiver%pole)) n = size(receiver%pole)
+      stages%interval = interval
+      stages%velocity = 0.0_wp
+      stages%displacement = receiver%direct*interval*radau_integral
+      do i = 1, n_stage
+         stages%velocity(i, i) = receiver%direct
+      end do
+      allocate (stages%free_velocity(n, n_stage), stages%free_displacement(n, n_stage), stages%decay(n), &
+         stages%gain(n, n_stage))
+      do i = 1, n_stage
+         time = radau_node(i)*interval
+         do k = 1, n
+            phi = get_phi(receiver%pole(k)*time, n_stage + 1)
+            stages%decay(k) = phi(0)
+            stages%free_velocity(k, i) = receiver%residue(k)*phi(0)
+            stages%free_displacement(k, i) = receiver%residue(k)*time*phi(1)
+            ! The force (t/h)**m gives x_k = m! c**m (c h) phi_(m+1), its integral has one c h and one number more.
+            gain = [(gamma(real(m, wp))*radau_node(i)**(m - 1)*time*phi(m), m=1, n_stage)]
+            travel = [(gamma(real(m, wp))*radau_node(i)**(m - 1)*time**2*phi(m + 1), m=1, n_stage)]
+            stages%gain(k, :) = matmul(gain, radau_monomial)
+            travel = matmul(travel, radau_monomial)
+            stages%velocity(i, :) = stages%velocity(i, :) + real(receiver%residue(k)*stages%gain(k, :), wp)
+            stages%displacement(i, :) = stages%displacement(i, :) + real(receiver%residue(k)*travel, wp)
+         end do
+      end do
+   end function new_receiver_stages
+
+   !> Velocity and displacement at the stages without force.
+   pure subroutine get_free_motion(stages, motion, velocity, displacement)
+      type(receiver_stages_type), intent(in) :: stages
+      !> The motion at the beginning of the step.
+      type(receiver_motion_type), intent(in) :: motion
+      !> Velocity, m/s, and displacement, m, downwards: [n_stage].
+      real(wp), intent(out) :: velocity(:), displacement(:)
+      integer :: i
+
+      do i = 1, n_stage
+         velocity(i) = sum(real(stages%free_velocity(:, i)*motion%amplitude, wp))
+         displacement(i) = motion%displacement + sum(real(stages%free_displacement(:, i)*motion%amplitude, wp))
+      end do
+   end subroutine get_free_motion
+
+   !> Motion a step on.
+   pure subroutine advance_stages(stages, force, motion)
+      type(receiver_stages_type), intent(in) :: stages
+      !> The force downwards at the stages, N: [n_stage].
+      real(wp), intent(in) :: force(:)
+      type(receiver_motion_type), intent(inout) :: motion
+
+      motion%displacement = motion%displacement + dot_product(stages%displacement(n_stage, :), force) &
+         + sum(real(stages%free_displacement(:, n_stage)*motion%amplitude, wp))
+      motion%amplitude = stages%decay*motion%amplitude + matmul(stages%gain, force)
+   end subroutine advance_stages
+
+end module thud_receiver_stages

@@ -1,0 +1,196 @@
+"""The page of the program: what the server answers, refuses and keeps to itself."""
+
+from __future__ import annotations
+
+import json
+import socket
+import tomllib
+from typing import TYPE_CHECKING, Any
+
+import f90nml
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+from starlette.testclient import TestClient
+
+import thud
+from thud import cli
+from thud._schema import FLOORS, MODELS
+from thud.explorer import server
+from thud.explorer.form import form
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+TOKEN = "secret"  # noqa: S105 - of the test
+HEAD = {server.TOKEN: TOKEN}
+CALIBRATION = "2000 N/FS"
+SHELL: dict[str, Any] = {"model": {"name": "hollow_sphere"}}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[TestClient]:
+    """Return a client of the server that has the token."""
+    application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",))
+    with TestClient(application, base_url="http://127.0.0.1", headers=HEAD) as found:
+        yield found
+
+
+def last_report(client: TestClient, path: str, **request: Any) -> dict[str, Any]:  # noqa: ANN401 - as the client
+    """Return the last line of a stream of reports."""
+    response = client.post(path, **request)
+    assert response.status_code == 200, response.text
+    lines = [json.loads(line) for line in response.text.splitlines()]
+    assert all(0 <= line["done"] <= 1 for line in lines[:-1])
+    found: dict[str, Any] = lines[-1]
+    return found
+
+
+def test_fields_are_those_of_the_schema() -> None:
+    groups = {(group["part"], group["name"]): group for group in form()}
+    for name in MODELS:
+        assert ("model", name) in groups
+    for name in FLOORS:
+        assert ("floor", name) in groups
+    (thickness,) = (
+        field for field in groups["ball", "ball"]["fields"] if field["name"] == "wall_thickness"
+    )
+    assert thickness["unit"] == "m"
+    assert thickness["default"] == thud.Ball().wall_thickness
+    low, high = thickness["slider"]
+    assert low < thickness["default"] < high
+
+
+def test_answer_is_that_of_the_library(client: TestClient) -> None:
+    answer = client.post("/solve", json=SHELL | {"drop": {"height": 0.5}}).json()
+    impact = thud.solve(drop=thud.Drop(height=0.5))
+    assert answer["levels"]["octave"]["level"] == pytest.approx(impact.levels(), abs=1e-12)
+    assert answer["conforms"] is impact.conformity().conforms
+    assert answer["numbers"]["contact time, ms"] == pytest.approx(1e3 * impact.contact_time)
+    assert max(answer["force"]["force"]) == pytest.approx(impact.floor_force.max(), rel=1e-3)
+
+
+def test_slow_model_reports_and_answers(client: TestClient) -> None:
+    values = {
+        "model": {"name": "finite_element"},
+        "mesh": {"radial_elements": 2, "polar_elements": 16},
+        "ball": {"youngs_modulus": 2.08e6},
+    }
+    answer = last_report(client, "/solve_slowly", json=values)["answer"]
+    impact = thud.solve(
+        thud.Ball(youngs_modulus=2.08e6),
+        model="finite_element",
+        radial_elements=2,
+        polar_elements=16,
+    )
+    assert answer["levels"]["octave"]["level"] == pytest.approx(impact.levels(), abs=1e-9)
+    assert np.shape(answer["motion"]["outer"])[1:] == (17, 2)
+
+
+def test_recording_is_judged(client: TestClient) -> None:
+    path = REPOSITORY / "inputs/recordings/drop_1.wav"
+    query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
+    report = last_report(client, "/measure", params=query, content=path.read_bytes())
+    answer = report["answer"]
+    recording = thud.read_recording(path, height=1.0, mass=2.5, calibration=CALIBRATION)
+    assert answer["levels"]["octave"]["level"] == pytest.approx(recording.levels(), abs=1e-9)
+    assert answer["verdict"] == recording.conformity().verdict
+    assert answer["drops"] == 1
+
+
+@pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])
+def test_hostile_recordings_get_a_sentence(client: TestClient, name: str) -> None:
+    report = last_report(client, "/measure", params={"name": name}, content=b"\0" * 100)
+    assert report.keys() == {"error"}
+    assert "/recording" not in report["error"]
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"drop": {"height": -1}}, "height"),
+        ({"drop": {"height": "high"}}, "height"),
+        ({"drop": {"height": None}}, "height"),
+        ({"drop": {"hight": 1}}, "hight"),
+        ({"drop": [1]}, "no groups of keys"),
+        ([], "no groups of keys"),
+        ({"model": {"name": "cube"}}, "cube"),
+        ({"model": {"name": ["a"]}}, "model"),
+        ({"floor": {"name": 3}}, "floor"),
+        ({"ball": {"mass": 1e300}}, "mass"),
+        ({"ball": {"mass": {"a": 1}}}, "mass"),
+    ],
+)
+def test_bad_values_get_a_sentence(client: TestClient, values: object, words: str) -> None:
+    response = client.post("/solve", content=json.dumps(values))
+    assert response.status_code == 400
+    assert words in response.text
+    assert "\n" not in response.text
+
+
+def test_only_the_page_with_its_token_is_answered(client: TestClient) -> None:
+    assert client.get("/about").status_code == 200
+    assert client.get("/about", headers={server.TOKEN: "guess"}).status_code == 403
+    assert client.get("/about", headers={"Origin": "http://elsewhere.example"}).status_code == 403
+    assert client.get("/about", headers={"Host": "rebound.example"}).status_code == 400
+    page = client.get("/", headers={server.TOKEN: ""})
+    assert page.status_code == 200
+    assert TOKEN not in page.text
+
+
+def test_no_path_reaches_the_file_system(client: TestClient) -> None:
+    for path in ("/page/..%2f..%2fserver.py", "/page/server.py", "/page/%2fetc%2fpasswd"):
+        assert client.get(path).status_code == 404
+    assert client.post("/download/..%2fcase.nml", json=SHELL).status_code == 404
+
+
+def test_long_bodies_are_refused(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert client.post("/solve", content=b" " * (server.MAX_CASE + 1)).status_code == 413
+    monkeypatch.setattr(server, "MAX_RECORDING", 1000)
+    assert client.post("/measure?name=a.wav", content=b"\0" * 1001).status_code == 413
+
+
+def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None:
+    values = SHELL | {"drop": {"height": 0.7}}
+    path = tmp_path / "case.nml"
+    path.write_bytes(client.post("/download/case.nml", json=values).content)
+    assert thud.read_case(path).drop.height == 0.7
+    table = client.post("/download/force.csv", json=values).text.splitlines()
+    assert table[0] == "time_s,force_N"
+    force = np.array([line.split(",") for line in table[1:]], dtype=float)[:, 1]
+    assert force.max() == pytest.approx(
+        thud.solve(drop=thud.Drop(height=0.7)).floor_force.max(), rel=1e-8
+    )
+    assert "<html" in client.post("/download/report.html", json=values).text
+
+
+def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> None:
+    values = SHELL | {"ball": {"mass": 2.4}, "moved": {"height": [1.0, 0.5], "width": [1, 2]}}
+    path = tmp_path / "study.toml"
+    path.write_bytes(client.post("/download/study.toml", json=values).content)
+    content = tomllib.loads(path.read_text())
+    assert content["fixed"] == {"model": "hollow_sphere", "mass": 2.4}
+    assert content["parameters"] == {"height": {"low": 0.5, "high": 1.0, "count": 11}}
+    found = thud.sweep(path)
+    assert found.sizes == {**found.sizes, "height": 11}
+    assert client.post("/download/study.toml", json=SHELL).status_code == 400
+
+
+def test_page_starts_with_a_case_or_results(tmp_path: Path) -> None:
+    case = REPOSITORY / "inputs/rubber_ball_160cm.nml"
+    assert server.start_with(case)["drop"]["height"] == 1.6
+    assert cli.main(["run", str(case), "--no-figures", "-q", "-o", str(tmp_path / "r")]) == 0
+    assert server.start_with(tmp_path / "r")["drop"]["height"] == 1.6
+    assert server.start_with(None) == {}
+    text = json.dumps(server.start_with(case))
+    assert f90nml.Namelist(json.loads(text))["ball"]["mass"] == 2.5
+
+
+def test_unusable_port_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["explore", "--port", "99999", "--no-browser"]) == 1
+    assert "--port = 99999 is no port; allowed: 0" in capsys.readouterr().err
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert cli.main(["explore", "--port", str(port), "--no-browser"]) == 1
+    assert "cannot be listened on; allowed: a free port" in capsys.readouterr().err

@@ -1,0 +1,144 @@
+"""Floors side by side, and the tapping machine beside the ball."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from conftest import REPOSITORY
+
+import thud
+from thud.cli import main
+from thud.floors.rating import CLASS_LIMITS
+from thud.floors.tapping import CURVE, THIRDS
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# ISO 12354, 220 mm floor of 5 m x 4 m: thirds 50 to 630 Hz.
+PUBLISHED = [57.3, 58.2, 59.2, 60.2, 61.1, 62.1, 62.5, 62.7, 63.0, 63.3, 63.6, 64.0]
+CASES = {
+    name: thud.Case(name=name, floor=thud.Plate(thickness=thickness), room=thud.Room())
+    for name, thickness in (("thin", 0.14), ("thick", 0.22))
+}
+
+
+@pytest.fixture(scope="module")
+def found() -> thud.FloorComparison:
+    """Return the comparison of two floors."""
+    return thud.compare_floors(CASES)
+
+
+def test_tapping_levels_are_those_of_the_published_example() -> None:
+    # f_c = c0**2 sqrt(3)/(pi c_L h) = 76.8 Hz; absorption of the edges that has the printed loss
+    # factor at 50 Hz, 0.0831, with the printed radiation factor there, 0.7209.
+    speed = 340**2 * np.sqrt(3) / (np.pi * 76.8 * 0.22)
+    edges = 0.0831 - 0.005 - 2 * 1.2 * 340 * 0.7209 / (2 * np.pi * 50 * 484)
+    absorption = edges * np.pi**2 * 20 * np.sqrt(50 * 76.8) / 340
+    floor = thud.Plate(
+        thickness=0.22, density=2200.0, wave_speed=speed, edges="absorption",
+        edge_absorption=absorption,
+    )  # fmt: skip
+    found = thud.tapping_level(floor, thud.Room(sound_speed=340.0))
+    assert found.level[:12] == pytest.approx(PUBLISHED, abs=0.1)
+
+
+def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
+    """Excesses of 2 dB in all sixteen thirds are 32 dB, the maximum: the curve stays."""
+    level = np.concatenate([np.zeros(3), CURVE + 2.0])
+    assert thud.TappingLevel(THIRDS, level).weighted == 60
+    level[3] += 0.1
+    assert thud.TappingLevel(THIRDS, level).weighted == 61
+    flat = thud.TappingLevel(THIRDS, np.full(19, 60.0))
+    # 10 lg 15 = 11.8 dB above one third.
+    assert flat.adaptation == round(60 + 10 * np.log10(15)) - 15 - flat.weighted
+
+
+def test_tapping_machine_refuses_what_is_no_concrete_plate() -> None:
+    with pytest.raises(thud.InputError, match="not that of concrete"):
+        thud.tapping_level(thud.Plate(density=500.0))
+    with pytest.raises(thud.InputError, match="an object of Plate"):
+        thud.tapping_level(thud.Oscillator())  # type: ignore[arg-type]
+
+
+def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparison) -> None:
+    thin, thick = found.predictions.values()
+    expected = thud.predict_level(thud.solve_case(CASES["thin"]))
+    assert thin.level == pytest.approx(expected.level)
+    rows = {row[0]: row[1:] for row in found.rows()}
+    assert rows[""] == ("thin", "thick")
+    assert rows["L_iA,Fmax, dB"] == (str(thin.rating.rounded), str(thick.rating.rounded))
+    assert rows["63 Hz octave, dB"] == (
+        f"{thin.octave_level[0]:.1f}",
+        f"{thick.octave_level[0]:.1f}",
+    )
+    assert "thin: fewer than" in found.remarks[0]
+
+
+def test_page_draws_chain_and_classes(found: thud.FloorComparison) -> None:
+    figure = found.figure()
+    force, energy, radiated, level, classes = figure.axes[:5]
+    thin = found.predictions["thin"]
+    for axes, values in (
+        (force, 10 * np.log10(thin.energy / thin.conductance)),
+        (energy, thin.energy),
+        (radiated, 100 * thin.radiated_share),
+        (level, thin.level),
+    ):
+        assert axes.lines[0].get_ydata() == pytest.approx(values)
+    assert [line.get_ydata()[0] for line in classes.lines] == list(CLASS_LIMITS)  # type: ignore[index]
+    assert CLASS_LIMITS == (37, 41, 45, 49)
+    page = found.html()
+    assert page.count('<div id="plot') == 4
+    assert "Comparison of floors" in page
+
+
+def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    paths = [tmp_path / f"{name}.nml" for name in CASES]
+    for path, case in zip(paths, CASES.values(), strict=True):
+        thud.write_case(case, path)
+    output = tmp_path / "page"
+    assert main(["floor", *map(str, paths), "--output", str(output)]) == 0
+    assert {path.name for path in output.iterdir()} == {"floors.png", "floors.svg", "floors.html"}
+    assert "thick" in capsys.readouterr().out
+    assert main(["floor", str(paths[0]), str(paths[0]), "-o", str(output)]) == 1
+    assert "also names another case" in capsys.readouterr().err
+    bare = tmp_path / "bare.nml"
+    bare.write_text("&ball /\n&drop /\n&model /\n", encoding="utf-8")
+    assert main(["floor", str(bare), "-o", str(tmp_path / "none")]) == 1
+    assert "has no level in a room; allowed" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
+
+
+def test_comparison_refuses_nothing_and_other_things() -> None:
+    with pytest.raises(thud.InputError, match="cases are not given"):
+        thud.compare_floors({})
+    with pytest.raises(thud.InputError, match="an object of Case or RoomPrediction"):
+        thud.compare_floors({"a": 1})  # type: ignore[dict-item]
+
+
+def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> None:
+    """A survey made of the prediction, shifted by 2 dB, with scatter, background and decay."""
+    prediction = thud.predict_level(thud.solve(), thud.Plate(), thud.Room())
+    draw = np.random.default_rng(5)
+    # Levels whose energy mean is the prediction and 2 dB: offsets with an energy mean of one.
+    offsets = draw.normal(scale=2.0, size=(8, 12))
+    offsets -= 10 * np.log10((10 ** (offsets / 10)).mean(axis=0))
+    levels = prediction.level + 2.0 + offsets
+    background = prediction.level - 20
+    noisy = 10 * np.log10(10 ** (levels / 10) + 10 ** (background / 10))
+    columns = np.column_stack([prediction.frequency, noisy.T, background, np.full(12, 0.5)])
+    path = tmp_path / "survey.csv"
+    names = ",".join(f"P{i}" for i in range(1, 9))
+    header = f"frequency,{names},background,reverberation_time"
+    np.savetxt(path, columns, delimiter=",", header=header, comments="")
+    measured = thud.read_room_levels(path, volume=50.0)
+    # Backgrounds more than 15 dB below are not subtracted: at most 10 lg(1 + 10**-2.2) = 0.03 dB.
+    assert prediction.difference(measured) == pytest.approx(2.0, abs=0.03)
+    assert measured.standardised_rating is not None
+    gap = measured.standardised_rating.a_weighted - prediction.standardised_rating.a_weighted
+    assert gap == pytest.approx(2.0, abs=0.03)
+    assert (
+        REPOSITORY.joinpath("docs/rooms.md").read_text(encoding="utf-8").count("difference(") >= 1
+    )

@@ -1,0 +1,168 @@
+"""Drops on floors that move: results in Python and in files, mobility, refusals."""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from dataclasses import fields
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import thud
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable
+    from pathlib import Path
+
+MODES = thud.MeasuredModes([24.0, 89.0], [0.05, 0.1], [2.4, 0.1])
+LIGHT = thud.InfinitePlate(1600.0)
+
+
+@pytest.fixture(scope="module")
+def impact() -> thud.Impact:
+    """Return the shell's impact on a light floor."""
+    return thud.solve(floor=LIGHT)
+
+
+@pytest.fixture(scope="module")
+def moved(impact: thud.Impact) -> thud.FloorImpact:
+    """Return its drop on the floor."""
+    assert impact.on_floor is not None
+    return impact.on_floor
+
+
+def test_floor_leaves_the_blocked_impact_as_it_is(
+    impact: thud.Impact, moved: thud.FloorImpact
+) -> None:
+    alone = thud.solve()
+    assert alone.on_floor is None
+    assert np.array_equal(impact.floor_force, alone.floor_force)
+    assert impact.conformity() == alone.conformity()
+    assert np.array_equal(moved.blocked_force, alone.floor_force)
+    assert thud.solve(floor=thud.Rigid()).on_floor is None
+
+
+def test_force_and_velocity_of_a_resistance_are_proportional(moved: thud.FloorImpact) -> None:
+    assert moved.floor_velocity == pytest.approx(moved.floor_force / 1600, rel=1e-9, abs=1e-12)
+    # Rectangles: both vanish at the ends.
+    work = (moved.floor_force * moved.floor_velocity).sum() / moved.sample_rate
+    assert moved.floor_work == pytest.approx(work, rel=1e-4)
+    energy = moved.injected_energy("third")
+    level = moved.levels("third", force="floor")
+    assert energy.by_mobility == pytest.approx(10 ** (level / 10) / 1600, rel=1e-9)
+    assert energy.by_motion == pytest.approx(energy.by_mobility, rel=0.02)
+    assert energy.conductance == pytest.approx(1 / 1600)
+    assert (moved.difference()[:3] < -1).all()
+    assert moved.difference() == pytest.approx(moved.levels() - thud.solve().levels())
+
+
+def test_mobility_is_that_of_the_closed_form() -> None:
+    floor = thud.Oscillator(mass=80.0, stiffness=1e6, damping=300.0)
+    frequency = np.array([5.0, 17.8, 100.0])
+    rate = 2 * np.pi * frequency
+    expected = 1j * rate / (1e6 - 80 * rate**2 + 300j * rate)
+    assert thud.mobility(floor, frequency) == pytest.approx(expected, rel=1e-11)
+    assert thud.mobility(thud.Rigid(), 50.0) == pytest.approx([0.0])
+
+
+@pytest.mark.parametrize("model", ["hollow_sphere", "finite_element"])
+def test_results_on_a_floor_are_read_back(
+    run: Callable[..., subprocess.CompletedProcess[str]],
+    case_file: Callable[[str], Path],
+    model: str,
+) -> None:
+    options = "radial_elements = 2\n polar_elements = 24" if model == "finite_element" else ""
+    mesh = f"&mesh\n {options}\n/\n" if options else ""
+    text = f"&model name = '{model}' /\n{mesh}&floor name = 'oscillator' /\n"
+    done = run(case_file(text), "-o", "out")
+    assert done.returncode == 0, done.stderr
+    folder = case_file(text).parent / "out"
+    found = thud.read_results(folder)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", thud.PlausibilityWarning)
+        expected = thud.solve_case(found.case)
+    moved, wanted = found.on_floor, expected.on_floor
+    assert moved is not None
+    assert wanted is not None
+    for field in fields(wanted):
+        if field.name != "motion":
+            np.testing.assert_equal(getattr(moved, field.name), getattr(wanted, field.name))
+    if wanted.motion:
+        assert moved.motion is not None
+        np.testing.assert_equal(vars(moved.motion), vars(wanted.motion))
+    with (folder / "floor_levels.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    energy = moved.injected_energy()
+    for name, values in {
+        "blocked_level_dB": moved.blocked_levels(), "contact_level_dB": moved.levels(),
+        "difference_dB": moved.difference(), "energy_by_motion_J": energy.by_motion,
+        "energy_by_mobility_J": energy.by_mobility, "conductance_m_per_Ns": energy.conductance,
+    }.items():  # fmt: skip
+        assert [float(row[name]) for row in rows] == pytest.approx(values, rel=1e-9, abs=1e-12)
+    assert f"{moved.peak_force:.1f} N" in done.stdout
+
+
+def test_models_of_the_blocked_force_say_so() -> None:
+    with pytest.warns(thud.PlausibilityWarning, match="does not move under the model 'measured_m"):
+        impact = thud.solve(model=MODES, floor=LIGHT)
+    assert impact.on_floor is None
+
+
+def test_points_of_a_plate_move(
+    run: Callable[..., subprocess.CompletedProcess[str]], case_file: Callable[[str], Path]
+) -> None:
+    """The point under the source moves as the source feels it; a farther one as its transfer."""
+    text = "&model /\n&floor name = 'plate' /\n&plate point_x = 2.5, 1.0 point_y = 2.0, 0.5 /\n"
+    done = run(case_file(text), "-o", "out")
+    assert done.returncode == 0, done.stderr
+    found = thud.read_results(case_file(text).parent / "out").on_floor
+    assert found is not None
+    under, far = found.point_velocity
+    scale = abs(found.floor_velocity).max()
+    # The force is taken for constant in a sample: (w dt)**2 of the highest modes.
+    assert under == pytest.approx(found.floor_velocity, abs=0.02 * scale)
+    assert far == pytest.approx(found.velocity_at(1.0, 0.5), abs=1e-12)
+    assert 0 < abs(far).max() < scale
+    with pytest.raises(thud.InputError, match=r"&plate: .*allowed"):
+        thud.solve(floor=thud.Plate(point_x=[9.0], point_y=[1.0]))
+    with pytest.raises(thud.InputError, match="point_x has 2 values and point_y 1; allowed: as"):
+        thud.solve(floor=thud.Plate(point_x=[1.0, 2.0], point_y=[1.0]))
+
+
+def test_points_are_of_floors_with_sides(moved: thud.FloorImpact) -> None:
+    with pytest.raises(thud.InputError, match="no points but that under the source"):
+        moved.velocity_at(1.0, 1.0)
+    with pytest.raises(thud.InputError, match="no points but that under the source"):
+        thud.mobility(LIGHT, [50.0], (1.0, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("floor", "words"),
+    [
+        (thud.InfinitePlate(0.0), "&infinite_plate: resistance = 0.0 is not allowed"),
+        (thud.Oscillator(stiffness=-1.0), "&oscillator: stiffness = -1.0 is not allowed"),
+        ("plate", "floor = 'plate' is not allowed"),
+    ],
+)
+def test_floors_that_cannot_be_are_refused(floor: thud.FloorOptions, words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.solve(floor=floor)
+    with pytest.raises(thud.InputError, match=words):
+        thud.mobility(floor, [50.0])
+
+
+def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> None:
+    assert "infinite_plate" in repr(moved)
+    assert len(moved.rows()) == 6
+    assert "contact, dB" in moved._repr_html_()
+    figure = moved.plot()
+    assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
+        "Force below", "Velocity of", "Contact less", "Energy into", "Mobility Y,",
+    ]  # fmt: skip
+    thud.plot.save(figure, tmp_path / "floor.png")
+    dataset = moved.to_xarray()
+    assert dataset["floor_velocity"].attrs["units"] == "m/s"
+    assert float(dataset["floor_work"]) == moved.floor_work

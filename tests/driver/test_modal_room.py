@@ -1,0 +1,155 @@
+"""A modal room under a modal plate: frequencies, balance, an independent time integration."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import thud
+from thud.floors.modal_room import SAMPLE_RATE, fast_levels, plate_frequencies
+from thud.plot.plate_modes import plate_modes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+FLOOR = thud.Plate(length=4.5, width=3.7, thickness=0.16)
+ROOM = thud.Room(volume=40.0, reverberation_time=0.4)
+SIZE = np.array([4.5, 3.7, 40 / (4.5 * 3.7)])
+BALL = np.array([1.1, 2.3])
+MICROPHONE = np.array([3.1, 0.9, 1.4])
+
+
+@pytest.fixture(scope="module")
+def impact() -> thud.Impact:
+    """Return the shell's impact."""
+    return thud.solve()
+
+
+@pytest.fixture(scope="module")
+def found(impact: thud.Impact) -> thud.ModalRoom:
+    """Return the levels of one pair of positions."""
+    return thud.modal_room(impact, FLOOR, ROOM, balls=[BALL], microphones=[MICROPHONE])
+
+
+def room_modes() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return numbers and frequencies of the room's modes up to 400 Hz, one by one."""
+    numbers = [np.array(n) for n in itertools.product(range(15), repeat=3)]
+    pairs = [(n, 343 / 2 * float(np.linalg.norm(n / SIZE))) for n in numbers]
+    kept = [pair for pair in pairs if pair[1] <= 400]
+    return np.array([n for n, _ in kept]), np.array([f for _, f in kept])
+
+
+def test_frequencies_are_those_of_the_closed_forms(found: thud.ModalRoom) -> None:
+    assert found.room_frequency == pytest.approx(np.sort(room_modes()[1]))
+    # c_L h pi/(4 sqrt(3)) ((m/a)**2 + (n/b)**2).
+    unit = 3500 * 0.16 * np.pi / (4 * np.sqrt(3))
+    closed = sorted(
+        unit * ((m / 4.5) ** 2 + (n / 3.7) ** 2) for m in range(1, 20) for n in range(1, 20)
+    )
+    assert found.floor_frequency == pytest.approx([f for f in closed if f <= 400])
+    assert plate_frequencies(FLOOR, (1, 1)) == pytest.approx(closed[0])
+
+
+def test_energies_given_are_those_that_are_lost(impact: thud.Impact) -> None:
+    found = thud.modal_room(impact, FLOOR, ROOM, balls=3, microphones=1)
+    assert found.plate_energy[:, 0] == pytest.approx(found.plate_energy[:, 1], rel=1e-9)
+    assert found.room_energy[:, 0] == pytest.approx(found.room_energy[:, 1], rel=1e-9)
+    assert (found.room_energy < 0.1 * found.plate_energy).all()
+
+
+def test_levels_are_those_of_an_integration_in_time(
+    impact: thud.Impact, found: thud.ModalRoom
+) -> None:
+    """Step the modes in time, with coupling by quadrature instead of the closed form."""
+    step = 1 / (8 * SAMPLE_RATE)
+    count = int(1.5 / step)
+    force = np.interp(np.arange(count) * step, impact.time, impact.force("floor"), right=0.0)
+    modes = np.array(list(itertools.product(range(1, 20), repeat=2)))
+    modes = modes[plate_frequencies(FLOOR, modes) <= 400]
+    numbers, frequency = room_modes()
+    omega, wave = 2 * np.pi * plate_frequencies(FLOOR, modes), 2 * np.pi * frequency
+    # Laboratory: 0.005 + m''/(485 sqrt(f)).
+    losses = omega * (0.005 + 2300 * 0.16 / (485 * np.sqrt(omega / (2 * np.pi))))
+    decay = 6 * np.log(10) / 0.4
+    middle = [(np.arange(240) + 0.5) * side / 240 for side in SIZE[:2]]
+    area = SIZE[0] * SIZE[1] / 240**2
+    sines = [np.sin(np.pi * np.outer(modes[:, i], middle[i]) / SIZE[i]) for i in (0, 1)]
+    cosines = [np.cos(np.pi * np.outer(numbers[:, i], middle[i]) / SIZE[i]) for i in (0, 1)]
+    coupling = area * (cosines[0] @ sines[0].T) * (cosines[1] @ sines[1].T)
+    coupling *= (-1.0) ** numbers[:, 2:]
+    norm = np.prod(np.where(numbers > 0, 0.5, 1.0), axis=1)
+    drive = np.prod(np.sin(np.pi * modes * BALL / SIZE[:2]), axis=1)
+    drive /= 2300 * 0.16 * SIZE[0] * SIZE[1] / 4
+    stiffness = 1.2 * 343**2 / (ROOM.volume * norm)
+    heard = np.prod(np.cos(np.pi * numbers * MICROPHONE / SIZE), axis=1)
+    place, speed = np.zeros(len(modes)), np.zeros(len(modes))
+    travel, rate = np.zeros(len(numbers)), np.zeros(len(numbers))
+    pressure = np.empty(count)
+    for i in range(count):
+        # Velocities of the plate lie half a step on, and so do the X of the room, whose rates are
+        # the pressures of the modes: X'' + a X' + w**2 X = rho c**2/(V norm) Q.
+        push = drive * force[i] - omega**2 * place
+        speed = (speed * (1 - step * losses / 2) + step * push) / (1 + step * losses / 2)
+        place = place + step * speed
+        push = stiffness * (coupling @ speed) - wave**2 * travel
+        rate = (rate * (1 - step * decay / 2) + step * push) / (1 + step * decay / 2)
+        travel = travel + step * rate
+        pressure[i] = heard @ rate
+    # What the decimation folds back lies beyond the bands.
+    expected = fast_levels(pressure[None, ::8])[:, 0].max(axis=1)
+    # Second order: (w step)**2/24 at 178 Hz moves a resonance by 1e-3 of its frequency.
+    assert found.level[0, 0] == pytest.approx(expected, abs=0.05)
+
+
+def test_detector_shows_tones_and_their_bursts() -> None:
+    """IEC 61672-1: a burst of 200 ms reads 1.0 dB less than the tone, one of 500 ms 0.1 dB."""
+    time = np.arange(int(3 * SAMPLE_RATE)) / SAMPLE_RATE
+    tone = np.sqrt(2) * 0.02 * np.sin(2 * np.pi * 125.89 * time)
+    bursts = [np.where(time < length, tone, 0.0) for length in (3.0, 0.5, 0.2)]
+    shown = fast_levels(np.array(bursts))[7].max(axis=1)
+    # The squared tone has 0.1 dB of ripple after the detector.
+    assert shown == pytest.approx([60.0, 59.9, 59.0], abs=0.15)
+
+
+def test_random_positions_keep_their_distance_and_are_the_same_again(impact: thud.Impact) -> None:
+    one = thud.modal_room(impact, FLOOR, ROOM, balls=2, microphones=4, seed=3)
+    two = thud.modal_room(impact, FLOOR, ROOM, balls=2, microphones=4, seed=3)
+    assert (one.level == two.level).all()
+    assert one.level.shape == (2, 4, 9)
+    for places, sides in ((one.balls, SIZE[:2]), (one.microphones, SIZE)):
+        assert (places >= 0.5).all()
+        assert (places <= sides - 0.5).all()
+    assert one.mean == pytest.approx(10 * np.log10((10 ** (one.level / 10)).mean((0, 1))))
+    assert np.isnan(one.statistical[:, :3]).all()
+    assert one.statistical[0, 3:] == pytest.approx(one.prediction.level[:6])
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"balls": 0}, "balls = 0 is not allowed; allowed: whole numbers from 1"),
+        ({"balls": [[1.0, 9.0]]}, r"balls = \[1.0, 9.0\] is not allowed; allowed: 0 to 4.5"),
+        ({"microphones": [[1.0, 1.0]]}, r"microphones have the shape \(1, 2\)"),
+        ({"seed": -1}, "seed = -1"),
+        ({"floor": thud.Oscillator()}, "no plate that radiates"),
+        ({"floor": thud.Plate(thickness=2.0, length=0.5, width=0.5)}, "first natural frequency"),
+        ({"room": thud.Room(volume=1e5)}, "statistical prediction holds"),
+        ({"room": thud.Room(volume=-1.0)}, "&room: volume = -1"),
+    ],
+)
+def test_what_has_no_modal_answer_is_refused(
+    impact: thud.Impact, settings: dict[str, object], words: str
+) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.modal_room(impact, **{"floor": FLOOR, "room": ROOM} | settings)  # type: ignore[arg-type]
+
+
+def test_figures_show_positions_and_shapes(found: thud.ModalRoom) -> None:
+    labels = [text.get_text() for text in found.plot().legends[0].get_texts()]
+    assert "energy mean of the positions" in labels
+    titles = [axes.get_title() for axes in plate_modes(FLOOR, 4, columns=2).axes]
+    assert titles[0] == f"{found.floor_frequency[0]:.1f} Hz (1, 1)"
+    assert sum(map(bool, titles)) == 4

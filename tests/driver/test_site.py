@@ -1,0 +1,72 @@
+"""The documentation site builds without a warning, and its links lead somewhere."""
+
+from __future__ import annotations
+
+import runpy
+from html.parser import HTMLParser
+from typing import TYPE_CHECKING
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from conftest import REPOSITORY
+
+import thud
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+class Page(HTMLParser):
+    """Links and anchors of a page."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        super().__init__()
+        self.links: list[str] = []
+        self.anchors: set[str] = set()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Take links and anchors of a tag."""
+        found = dict(attrs)
+        self.anchors |= {value for key in ("id", "name") if (value := found.get(key))}
+        link = found.get("href" if tag in {"a", "link"} else "src")
+        if link:
+            self.links.append(link)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the built site; a warning of its builder fails."""
+    pytest.importorskip("sphinx")
+    target = tmp_path_factory.mktemp("site") / "html"
+    runpy.run_path(str(REPOSITORY / "docs/site/build.py"))["build"](target)
+    return target
+
+
+def test_no_link_is_broken(site: Path) -> None:
+    pages = {}
+    for path in site.rglob("*.html"):
+        page = Page()
+        page.feed(path.read_text(encoding="utf-8"))
+        pages[path] = page
+    broken = []
+    for path, page in pages.items():
+        for link in page.links:
+            parts = urlsplit(link)
+            if parts.scheme or parts.netloc:
+                continue
+            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            target = target / "index.html" if target.is_dir() else target
+            # FORD links to anchors that it does not make.
+            made_here = target in pages and "fortran" not in target.relative_to(site).parts
+            known = pages[target].anchors if made_here else {parts.fragment}
+            if not target.exists() or (parts.fragment and unquote(parts.fragment) not in known):
+                broken.append((path.relative_to(site).as_posix(), link))
+    assert len(pages) > len(thud.__all__)
+    assert not broken
+
+
+def test_every_page_of_the_documentation_is_in_the_site(site: Path) -> None:
+    menu = (site / "index.html").read_text(encoding="utf-8")
+    for page in (REPOSITORY / "docs").glob("*.md"):
+        assert f'href="docs/{page.stem}.html"' in menu, page

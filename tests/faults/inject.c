@@ -1,0 +1,163 @@
+// Library for LD_PRELOAD: one call of the system that changes files, or the n-th of one kind, goes wrong on purpose.
+//   FAULT_AT=5                    number of the call, counted from 1; 0 only counts
+//   FAULT_CALLS=write,rename      calls that count (default: all)
+//   FAULT_ACTION=28               number of the error, or kill, term, int, or 0.5s for a delay before the call
+//   FAULT_FROM=1                  all calls from that one on go wrong
+//   FAULT_LOG=path                each counted call, one line
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/types.h>
+#include <unistd.h>
+
+static int count = 0;
+
+static void note(const char *call, const char *subject)
+{
+   const char *path = getenv("FAULT_LOG");
+   char line[512];
+   int log, length;
+
+   if (!path) return;
+   log = (int)syscall(SYS_openat, AT_FDCWD, path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+   length = snprintf(line, sizeof line, "%d %s %.400s\n", count, call, subject);
+   syscall(SYS_write, log, line, length);
+   syscall(SYS_close, log);
+}
+
+// The number of the error with which this call has to fail, or 0.
+static int fault(const char *call, const char *subject)
+{
+   const char *calls = getenv("FAULT_CALLS"), *at = getenv("FAULT_AT"), *action = getenv("FAULT_ACTION"), *found;
+   size_t length = strlen(call);
+   int error, number;
+
+   if (!at) return 0;
+   if (calls) {
+      for (found = strstr(calls, call); found; found = strstr(found + 1, call))
+         if ((found == calls || found[-1] == ',') && (!found[length] || found[length] == ',')) break;
+      if (!found) return 0;
+   }
+   number = __atomic_add_fetch(&count, 1, __ATOMIC_SEQ_CST);
+   note(call, subject);
+   if (getenv("FAULT_FROM") ? number < atoi(at) : number != atoi(at)) return 0;
+   if (atoi(at) == 0 || !action) return 0;
+   if (strcmp(action, "kill") == 0) kill(getpid(), SIGKILL);
+   else if (strcmp(action, "term") == 0) kill(getpid(), SIGTERM);
+   else if (strcmp(action, "int") == 0) kill(getpid(), SIGINT);
+   else if (action[strlen(action) - 1] == 's') usleep((useconds_t)(1e6 * atof(action)));
+   else {
+      error = atoi(action);
+      errno = error;
+      return error;
+   }
+   return 0;
+}
+
+#define NEXT(type, name, ...) ((type (*)(__VA_ARGS__))dlsym(RTLD_NEXT, #name))
+
+static const char *of(int descriptor)
+{
+   static __thread char path[256];
+   char link[64];
+   ssize_t length;
+
+   snprintf(link, sizeof link, "/proc/self/fd/%d", descriptor);
+   length = readlink(link, path, sizeof path - 1);
+   path[length < 0 ? 0 : length] = 0;
+   return path;
+}
+
+ssize_t write(int descriptor, const void *bytes, size_t length)
+{
+   if (fault("write", of(descriptor))) return -1;
+   return NEXT(ssize_t, write, int, const void *, size_t)(descriptor, bytes, length);
+}
+
+int close(int descriptor)
+{
+   int flags = fcntl(descriptor, F_GETFL);
+
+   // An error of the disk may come with the last of the data.
+   if (flags >= 0 && (flags & O_ACCMODE) != O_RDONLY && fault("close", of(descriptor))) {
+      syscall(SYS_close, descriptor);
+      return -1;
+   }
+   return NEXT(int, close, int)(descriptor);
+}
+
+static int open_new(const char *name, const char *path, int flags, mode_t mode)
+{
+   if ((flags & O_ACCMODE) != O_RDONLY && fault("open", path)) return -1;
+   return ((int (*)(const char *, int, mode_t))dlsym(RTLD_NEXT, name))(path, flags, mode);
+}
+
+int open(const char *path, int flags, ...)
+{
+   va_list rest;
+   mode_t mode;
+
+   va_start(rest, flags);
+   mode = va_arg(rest, mode_t);
+   va_end(rest);
+   return open_new("open", path, flags, mode);
+}
+
+int open64(const char *path, int flags, ...)
+{
+   va_list rest;
+   mode_t mode;
+
+   va_start(rest, flags);
+   mode = va_arg(rest, mode_t);
+   va_end(rest);
+   return open_new("open64", path, flags, mode);
+}
+
+#define ON_PATH(name)                                                     \
+   int name(const char *path)                                             \
+   {                                                                      \
+      if (fault(#name, path)) return -1;                                  \
+      return NEXT(int, name, const char *)(path);                         \
+   }
+#define ON_PATHS(name)                                                    \
+   int name(const char *path, const char *other)                          \
+   {                                                                      \
+      if (fault(#name, other)) return -1;                                 \
+      return NEXT(int, name, const char *, const char *)(path, other);    \
+   }
+#define ON_DESCRIPTOR(name)                                               \
+   int name(int descriptor)                                               \
+   {                                                                      \
+      if (fault(#name, of(descriptor))) return -1;                        \
+      return NEXT(int, name, int)(descriptor);                            \
+   }
+
+ON_PATH(unlink)
+ON_PATH(remove)
+ON_PATH(rmdir)
+ON_PATHS(rename)
+ON_PATHS(link)
+ON_DESCRIPTOR(fsync)
+ON_DESCRIPTOR(fdatasync)
+ON_DESCRIPTOR(syncfs)
+
+int mkdir(const char *path, mode_t mode)
+{
+   if (fault("mkdir", path)) return -1;
+   return NEXT(int, mkdir, const char *, mode_t)(path, mode);
+}
+
+int renameat2(int old, const char *path, int new, const char *other, unsigned flags)
+{
+   if (fault("renameat2", other)) return -1;
+   return NEXT(int, renameat2, int, const char *, int, const char *, unsigned)(old, path, new, other, flags);
+}

@@ -1,0 +1,54 @@
+"""The campaign of faults: nothing crashes, hangs, is lost or mixed, and no result is not a number.
+
+`python tests/faults/run.py` makes all of it, which takes hours, and goes on after an interrupt;
+`--small` makes tries spread over all of it. Exit code 1 where a fault was found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from campaign import Part, Report
+from directories import check_calls, check_damage, check_races, plan
+from memory import check_memory
+
+
+def parts() -> dict[str, Part]:
+    """Return the parts of the campaign by name."""
+    return {
+        "calls": Part(len(plan()), 60, check_calls),
+        "races": Part(80, 8, check_races),
+        "damage": Part(10_000, 60, check_damage, share=100),
+        "memory": Part(1000, 12, check_memory),
+    }
+
+
+def main() -> int:
+    """Run the campaign; return the exit code."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--small", action="store_true", help="some tries of each part")
+    parser.add_argument("--seed", type=int, default=None, help="of what is random")
+    parser.add_argument("--part", action="append", help="part to run (default: all)")
+    parser.add_argument(
+        "--report", type=Path, default=Path("outputs/faults.json"), help="counts; it goes on there"
+    )
+    options = parser.parse_args()
+    seed = options.seed if options.seed is not None else 0 if not options.small else time.time_ns()
+    print(f"seed {seed}")
+    report = Report(seed, None if options.small else options.report)
+    with tempfile.TemporaryDirectory(prefix="thud_faults_") as folder:
+        for name, part in parts().items():
+            if options.part and name not in options.part:
+                continue
+            tries = part.small if options.small else part.tries
+            report.run(name, part, tries, Path(folder), spread=options.small)
+            print(report, flush=True)
+    return 1 if report.faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
