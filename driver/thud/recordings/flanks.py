@@ -160,12 +160,6 @@ class Posterior:
     factors: NDArray[np.float64]
     release: bool
 
-    def touch(self) -> tuple[float, float]:
-        """Return first touch, s, and its standard deviation, flanks of any sign allowed."""
-        mean, deviation = _moments(self.time, self.weight.sum(axis=0))
-        left = self.weight.sum(axis=1) @ LEFT[self.kinds, int(self.release)] ** 2
-        return mean, float(np.hypot(deviation, np.sqrt(left)))
-
     def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return first touch and begin of the contact, s, with their standard deviations.
 
