@@ -486,7 +486,8 @@ contains
       type(error_type), allocatable :: error
       integer :: i
 
-      many%further_name = [character(len=32) :: ]
+      if (allocated(many%further_name)) deallocate (many%further_name)
+      allocate (many%further_name(0))
       if (.not. case%has_floor) return
       many%further_name = [character(len=32) :: ('contact_'//trim(many%bands(i)%set)//'_'//get_band_name(many%bands(i)) &
          //'_Hz_dB', i=many%first_band, size(many%bands)), 'floor_work_J']
