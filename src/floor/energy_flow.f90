@@ -30,9 +30,9 @@ contains
       real(wp), intent(in) :: own(:)
       type(energy_flow_type) :: flow
 
-      flow%mode_density = mode_density
-      flow%total = total
-      flow%own = own
+      allocate (flow%mode_density, source=mode_density)
+      allocate (flow%total, source=total)
+      allocate (flow%own, source=own)
       allocate (flow%rate(size(own), size(own)), source=0.0_wp)
    end function new_energy_flow
 

@@ -136,8 +136,8 @@ contains
       walls = sum(room%walls%lengths%values(:room%walls%lengths%count))
       height = room%volume/(plate%length*plate%width)
       if (walls > 2*(plate%length + plate%width)*(1 + 1.0e-9_wp)) then
-         error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the floor; ' &
-            //'allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
+         error = input_error('&room: wall_lengths are '//to_text(walls)//' m together, longer than the edges of the ' &
+            //'floor; allowed: up to '//to_text(2*(plate%length + plate%width))//' m')
       else if (room%ceiling%mass > 0.0_wp .and. room%ceiling%depth > height) then
          error = input_error('&room: ceiling_depth = '//to_text(room%ceiling%depth)//' m is more than volume over area of ' &
             //'the floor; allowed: up to '//to_text(height)//' m')
@@ -293,7 +293,7 @@ contains
             call connect(flow, 1, i, get_junction_rate(plate, plates(i), air, &
                get_vibration_reduction(room%walls, plate, plates(i)), f))
          end do
-         energies%loss = get_loss(flow)
+         allocate (energies%loss, source=get_loss(flow))
          allocate (energies%start(size(flow%own)), energies%weight(size(flow%own)), source=0.0_wp)
          energies%start(1) = prediction%energy(band)
          energies%weight(at_room) = air%density*air%sound_speed**2/room%volume

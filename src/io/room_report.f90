@@ -4,7 +4,7 @@ module thud_room_report
    use thud_case, only: case_type
    use thud_file, only: text_file_type
    use thud_kinds, only: wp
-   use thud_rating, only: get_rounded
+   use thud_rating, only: get_a_weighted_level, get_grade, get_rounded
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: fixed, newline, to_text
    implicit none (type, external)
@@ -94,9 +94,7 @@ contains
       do i = 1, size(prediction%octaves)
          text = text//'  '//trim(get_band_name(prediction%octaves(i)))//' Hz '//fixed(prediction%octave_level(i), 1)//' dB'
       end do
-      text = text//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
-         //fixed(prediction%a_weighted, 2)//') of thirds, ISO 717-2 annex D: ' &
-         //trim(merge('contact force', 'blocked force', coupled))//', statistical mean over positions.'//newline
+      call add_ratings(prediction, coupled, text)
       resistance = 1/maxval(prediction%conductance)
       text = text//'  Room of '//fixed(case%room%volume, 1)//' m3, reverberation time ' &
          //fixed(minval(prediction%reverberation_time), 2)
@@ -109,6 +107,29 @@ contains
       if (.not. coupled .and. contact_time*resistance < firm*case%ball%mass) text = text &
          //'  The floor gives way under the source, and the force on a rigid floor is used: see docs/rooms.md.'//newline
    end subroutine get_room_table
+
+   !> Adds the single numbers of octaves and thirds.
+   subroutine add_ratings(prediction, coupled, text)
+      type(room_level_type), intent(in) :: prediction
+      !> The force is that on the floor.
+      logical, intent(in) :: coupled
+      !> The table so far.
+      character(len=:), allocatable, intent(inout) :: text
+      real(wp) :: level
+      integer :: grade
+
+      level = get_a_weighted_level(prediction%octaves(1)%set, prediction%octave_level)
+      grade = get_grade(level)
+      text = text//': L_iA,Fmax '//fixed(level, 2)//' dB, '
+      if (grade > 0) then
+         text = text//'class '//to_text(grade)
+      else
+         text = text//'no class'
+      end if
+      text = text//' (KS F 2863-2)'//newline//'  L_iA,Fmax '//to_text(get_rounded(prediction%a_weighted))//' dB (' &
+         //fixed(prediction%a_weighted, 2)//') of thirds, ISO 717-2 annex D: ' &
+         //trim(merge('contact force', 'blocked force', coupled))//', statistical mean over positions.'//newline
+   end subroutine add_ratings
 
    !> A text of a column's width.
    pure function padded(text) result(cell)

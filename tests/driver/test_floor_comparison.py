@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -139,6 +141,13 @@ def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> Non
     assert measured.standardised_rating is not None
     gap = measured.standardised_rating.a_weighted - prediction.standardised_rating.a_weighted
     assert gap == pytest.approx(2.0, abs=0.03)
-    assert (
-        REPOSITORY.joinpath("docs/rooms.md").read_text(encoding="utf-8").count("difference(") >= 1
-    )
+
+
+def test_page_of_rooms_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
+    page = REPOSITORY.joinpath("docs/rooms.md").read_text(encoding="utf-8")
+    shown = re.findall(r"```python\n(.*?)```\n\n```\n(.*?)```", page, re.DOTALL)
+    assert len(shown) == 3
+    with contextlib.chdir(REPOSITORY):
+        for code, output in shown:
+            exec(code, {})  # noqa: S102 - the page's own
+            assert capsys.readouterr().out == output

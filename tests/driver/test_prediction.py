@@ -205,6 +205,7 @@ def test_walls_ceiling_octaves_and_history_are_written(
     done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert "Room of 40.0 m3, reverberation time 0.80 s." in done.stdout
+    assert "no class (KS F 2863-2)" in done.stdout
     folder = case_file(ROOM_CASE).parent / "out"
     octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
     history = np.genfromtxt(folder / "room_history.csv", delimiter=",", skip_header=1)
@@ -229,5 +230,5 @@ def test_run_draws_the_chain(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
     case.write_text(ROOM_CASE, encoding="utf-8")
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
-    for name in ("room", "room_decay", "floor_modes"):
+    for name in ("room", "room_decay", "room_positions", "floor_modes"):
         assert (tmp_path / "out" / f"{name}.png").exists()

@@ -46,7 +46,7 @@ def drops(force: np.ndarray, rate: float, **knowledge: float) -> list[Drop]:
 
 
 def levels(drop: Drop) -> np.ndarray:
-    return measure_levels(drop).level
+    return measure_levels([drop])[0].level
 
 
 @pytest.mark.parametrize("before", [0.01, 0.1])
@@ -431,7 +431,7 @@ def test_levels_know_hum() -> None:
             hum=((50.0, 60.0)[seed % 2], rng.uniform(15, 30)),
         )  # fmt: skip
         (drop,) = drops(force, 16e3)
-        found = measure_levels(drop)
+        (found,) = measure_levels([drop])
         pulls.append((found.level - thud.force_exposure_levels(clean, 16e3)) / found.uncertainty)
     # Sums of 16 squares, in each of five bands.
     assert (np.square(pulls).sum(axis=0) < chi2.ppf(1 - 1e-3, 16)).all(), pulls

@@ -141,7 +141,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
         recording = thud.Recording.from_array(record, rate, height=HEIGHT, mass=MASS)
     except InputError as error:
         return draw, str(error)
-    drop, levels = recording.drops[0], measure_levels(recording.drops[0])
+    drop, levels = recording.drops[0], measure_levels(recording.drops)[0]
     np.testing.assert_allclose(levels.level, recording.levels(), rtol=0, atol=1e-9)
     oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
     pairs = zip(BANDS.lower, BANDS.upper, strict=True)
@@ -223,7 +223,7 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     truth = clean.sum() / rate / (MASS * speed) - 1 - GRAVITY * contact_time / speed
     time = np.arange(first, last) / rate - onset
     oracle = replace(
-        drop, time=time, force=clean[first:last], gate=(0, last - first), contact=contact
+        drop, begin=float(time[0]), force=clean[first:last], gate=(0, last - first), contact=contact
     )
     return oracle, Estimate(float(truth), spread)
 

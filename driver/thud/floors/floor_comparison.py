@@ -52,6 +52,7 @@ class FloorComparison(Displayed):
         return [
             ("", *self.predictions),
             ("floor", *(one.floor.name.replace("_", " ") for one in found)),
+            ("force", *(one.force for one in found)),
             ("L_iA,Fmax, dB", *(str(one.rating.rounded) for one in found)),
             ("standardised, dB", *(str(one.standardised_rating.rounded) for one in found)),
             *(

@@ -160,7 +160,8 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     Parameters
     ----------
     source
-        Impact of any model, or a recording; its force on a rigid floor.
+        Impact of any model, or a recording. The force is that of the statistical prediction: on the
+        floor, where the model knows it.
     floor, room
         Floor and room; by default those of the impact's case.
     balls : int or array_like, shape (n_ball, 2)
@@ -197,7 +198,7 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     losses = 2 * np.pi * plate_frequency * found["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)
     duration = 0.5 + max(time, 6 * math.log(10) / losses.min()) * WAITED / 60
-    omega, force = _spectrum(source, duration)
+    omega, force = _spectrum(prediction.source, duration)
     if len(omega) * len(orders) > MAX_VALUES:
         refuse(
             f"room: {len(orders)} modes below {HIGHEST:g} Hz ring for {duration:.1f} s",

@@ -67,6 +67,8 @@ class RoomPrediction(Displayed):
         What the Fast detector shows in each third then, dB.
     conductance : ndarray, shape (12,)
         Power that a force of unit mean square gives to the floor, m/(N s).
+    source : Impact or Recording
+        The impact on the floor whose force acts, or the impact or recording on a rigid one.
     force : str
         ``"contact"``: the prediction is of the force on the floor, which moves under the source;
         ``"blocked"``: of the force on a rigid floor, as recordings and measured modes have it.
@@ -93,6 +95,7 @@ class RoomPrediction(Displayed):
     octave_time: NDArray[np.float64]
     history_time: NDArray[np.float64]
     history: NDArray[np.float64]
+    source: Impact | Recording
     force: Literal["contact", "blocked"]
     force_change: float
 
@@ -233,6 +236,7 @@ def predict_level(
     return RoomPrediction(
         floor=floor,
         room=room,
+        source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
         time_of_maximum=bands.pop("time"),

@@ -117,12 +117,15 @@ class Contact:
         first = self.span[0]
         return self.force[self.gate[0] - first : self.gate[1] - first]
 
+    def summed(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return linear functionals of the gate's samples summed over its cells: [k, n_cell]."""
+        edges = np.rint(np.linspace(0, functionals.shape[1], len(self.covariance) + 1))
+        return np.add.reduceat(functionals, edges[:-1].astype(int), axis=1)
+
     def covariance_of(self, functionals: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the covariance of linear functionals of the gate's samples, shape (k, n)."""
         white = self.background.variances[0] * self.sample_rate / 2
-        count = len(self.covariance)
-        edges = np.rint(np.linspace(0, functionals.shape[1], count + 1)).astype(int)
-        summed = np.add.reduceat(functionals, edges[:-1], axis=1)
+        summed = self.summed(functionals)
         result: NDArray[np.float64] = white * functionals @ functionals.T
         return result + summed @ self.covariance @ summed.T
 

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from thud.checks import refuse
 from thud.levels import RECORDED_BAND, record_force
+from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
@@ -52,8 +52,8 @@ class Drop:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    time : ndarray, shape (n,)
-        Time since first touch, s.
+    begin : float
+        Time of the first sample since first touch, s.
     force : ndarray, shape (n,)
         Force without offset, drift, hum and slow noise, N.
     sample_rate : float
@@ -82,7 +82,7 @@ class Drop:
     """
 
     name: str
-    time: NDArray[np.float64]
+    begin: float
     force: NDArray[np.float64]
     sample_rate: float
     onset: float
@@ -101,18 +101,11 @@ class Drop:
     remarks: tuple[str, ...]
     contact: Contact
 
-    def band_noise(self, lower: float, upper: float) -> tuple[float, float]:
-        """Return the expected energy of the noise of the gate in a band, and a deviation, N2 s.
-
-        The second is the standard deviation of the energy of the force when the first is subtracted
-        from what is measured (docs/recordings_theory.md, section 4).
-        """
-        value, covariance = self.band_values(lower, upper)
-        noise, squares = float(np.trace(covariance)), float((covariance**2).sum())
-        # The first term is too large by twice the second, on the mean.
-        variance = max(4 * float(value @ covariance @ value) - 2 * squares, 2 * squares)
-        density, doubt = self.contact.background.density((lower + upper) / 2)
-        return noise, math.sqrt(variance + (noise * doubt / density) ** 2)
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n,)."""
+        time: NDArray[np.float64] = self.begin + np.arange(len(self.force)) / self.sample_rate
+        return time
 
     def band_values(
         self, lower: float, upper: float
@@ -121,14 +114,8 @@ class Drop:
 
         Linear functionals of the force, [n], and the covariance of the noise in them, [n, n].
         """
-        first, stop = self.gate
-        force, time = self.force[first:stop], self.time[first:stop]
-        # A record of this length has about time times band width degrees of freedom in the band.
-        nodes, weights = leggauss(12 + int(2 * (upper - lower) * (time[-1] - time[0])))
-        frequency = (lower + upper) / 2 + (upper - lower) / 2 * nodes
-        phase = 2 * np.pi * frequency[:, None] * time
-        scale = np.sqrt((upper - lower) * weights)[:, None] / self.sample_rate
-        functionals = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
+        force = self.force[slice(*self.gate)]
+        functionals = band_functionals(len(force), self.sample_rate, lower, upper)
         return functionals @ force, self.contact.covariance_of(functionals)
 
 
@@ -203,11 +190,10 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         leaving = again
     ways, told = fall.restitutions(impulse, contact_time, flights)
     restitution, shared = fall.mean(ways, impulse)
-    time = (np.arange(*contact.span)) / rate - contact.touch.value
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
         name=window.name,
-        time=time,
+        begin=contact.span[0] / rate - contact.touch.value,
         force=contact.force,
         sample_rate=rate,
         onset=window.start / rate + contact.touch.value,
