@@ -113,24 +113,22 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(mode_type) :: modes(options%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
-      integer :: i, j, n_sample, substeps
+      integer :: i, j, substeps
       logical :: released
 
       modes = new_mode(options%frequency%values(:size(modes)), options%damping_ratio%values(:size(modes)), &
          options%effective_mass%values(:size(modes)))
       v0 = get_impact_velocity(drop)
-      n_sample = get_sample_count(sampling)
       step = 1/sampling%sample_rate
-      history = new_force_history(sampling%sample_rate, n_sample, ['modal_force'])
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['modal_force'])
       history%impact_velocity = v0
       ! Sixteen checks per shortest period find the first zero.
       substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
       released = .false.
-      march: do i = 1, n_sample
+      march: do i = 1, size(history%floor_force)
          call check_interrupt(error)
          if (allocated(error)) return
-         time = (i - 1)*step
-         call get_motion(modes, v0, time, history%deflection(i), history%velocity(i), history%part(i, 1))
+         call get_motion(modes, v0, (i - 1)*step, history%deflection(i), history%velocity(i), history%part(i, 1))
          do j = 1, substeps
             time = (i - 1 + real(j, wp)/substeps)*step
             call get_motion(modes, v0, time, deflection, velocity, force)
@@ -148,7 +146,15 @@ contains
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
       call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
-      if (allocated(error)) return
+      if (.not. allocated(error)) call check_history(history, sampling, error)
+   end subroutine solve
+
+   !> Refuses a history whose ball does not turn, whose balances do not close, or of too few samples.
+   subroutine check_history(history, sampling, error)
+      type(force_history_type), intent(in) :: history
+      type(sampling_type), intent(in) :: sampling
+      type(error_type), allocatable, intent(out) :: error
+
       if (history%restitution < 0.0_wp) then
          error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
             //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
@@ -159,7 +165,7 @@ contains
       else
          call check_contact_samples(sampling, history%contact_time, error)
       end if
-   end subroutine solve
+   end subroutine check_history
 
    !> Modes of a ball on a rigid floor say nothing of another floor.
    function couples(options) result(yes)
