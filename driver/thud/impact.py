@@ -263,7 +263,7 @@ class FloorEnergy:
     by_motion : ndarray, shape (n_band,)
         Integral of the force times the velocity of the floor, both in the band, J.
     by_mobility : ndarray, shape (n_band,)
-        The same by the mobility Y of the floor, 2 integral |F|**2 Re Y df, J.
+        The same by the mobility Y of the floor, ``2 integral |F|**2 Re Y df``, J.
     conductance : ndarray, shape (n_band,)
         Mean of Re Y, m/(N s).
     """

@@ -182,3 +182,19 @@ def test_figure_shows_measurement_and_fit(exact: thud.MobilityFit) -> None:
         np.testing.assert_array_equal(fitted.get_ydata(), of(exact.mobility(line)))
         assert line[[0, -1]] == pytest.approx(FREQUENCY[[0, -1]])
     assert upper.get_ylabel() == "Mobility, m/(N s)"
+
+
+def test_ball_feels_a_noisy_measured_floor_as_the_floor() -> None:
+    joists = thud.JoistFloor(source_x=0.4, source_y=0.35)
+    frequency = np.linspace(10, 1000, 496)
+    noise = 0.03 * np.random.default_rng(2).normal(size=(496, 2)).dot([1, 1j])
+    values = thud.mobility(joists, frequency) * (1 + noise)
+    measured = thud.fit_mobility((frequency, values), order=32)
+    with pytest.warns(thud.PlausibilityWarning, match="joist_floor: above 134 Hz"):
+        expected = thud.solve(floor=joists).on_floor
+    found = thud.solve(floor=measured.floor).on_floor
+    assert expected is not None
+    assert found is not None
+    # 3 % at 496 lines shared by 65 coefficients: 1 % of differences of up to 0.9 dB.
+    np.testing.assert_allclose(found.difference(), expected.difference(), atol=0.02)
+    assert abs(expected.difference()).max() > 0.5
