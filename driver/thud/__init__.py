@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from thud.compression_fit import fit_compression as fit_compression
     from thud.floors.floor_comparison import FloorComparison as FloorComparison
     from thud.floors.floor_comparison import compare_floors as compare_floors
+    from thud.floors.mobility_fit import MobilityFit as MobilityFit
+    from thud.floors.mobility_fit import fit_mobility as fit_mobility
     from thud.floors.modal_room import ModalRoom as ModalRoom
     from thud.floors.modal_room import modal_room as modal_room
     from thud.floors.prediction import RoomPrediction as RoomPrediction
@@ -91,9 +93,11 @@ _LATE = {
     "compare_floors": "floors.floor_comparison",
     "CompressionFit": "compression_fit",
     "fit_compression": "compression_fit",
+    "fit_mobility": "floors.mobility_fit",
     "read_all": "comparison",
     "FloorComparison": "floors.floor_comparison",
     "ModalRoom": "floors.modal_room",
+    "MobilityFit": "floors.mobility_fit",
     "Rating": "floors.rating",
     "Recording": "recordings.recording",
     "RoomLevels": "floors.survey",
@@ -184,6 +188,7 @@ MAKERS.update(
     floors_html=_maker("plot.floors", "floors_html"),
     save_all=_maker("plot.look", "save_all"),
     modal_room=_maker("plot.modal_room", "draw_modal_room"),
+    mobility_fit=_maker("plot.mobility_fit", "mobility_fit"),
     prediction=_maker("plot.prediction", "draw_prediction"),
     room=_maker("plot.room", "room_levels"),
     report=_maker("report", "write_report"),

@@ -24,6 +24,7 @@ api = _core.thud_api
 floor_api = _core.thud_floor_api
 level_api = _core.thud_level_api
 ensemble_api = _core.thud_ensemble_api
+mobility_api = _core.thud_mobility_api
 
 # The status of an interrupt is this plus the number of the signal.
 _INTERRUPTED = 128

@@ -711,13 +711,13 @@ class JoistFloor(Group):
         Composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B);
         0 <= connection <= 1.
     loss_factor : float
-        Total loss factor of the floor; 0 < loss_factor <= 1.
+        Loss factor of the floor and its edges, without radiation; 0 < loss_factor <= 1.
     source_x : float
         Place of the source along the joists, over the length; 0 < source_x < 1.
     source_y : float
         Place of the source across the joists, over the width; 0 < source_y < 1.
     source_on : str
-        What the source drops on there: sheathing between joists, or a joist; "sheathing", "joist".
+        What the source drops on: sheathing between joists, or a joist; "sheathing", "joist".
     point_x : sequence of float
         Places of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -962,10 +962,10 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "total loss factor of the floor", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor and its edges, without radiation", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_x", "real", "", "place of the source along the joists, over the length", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "source_y", "real", "", "place of the source across the joists, over the width", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_on", "choice", "", "what the source drops on there: sheathing between joists, or a joist", ('sheathing', 'joist')),
+    Key("joist_floor", "joist_floor", "source_on", "choice", "", "what the source drops on: sheathing between joists, or a joist", ('sheathing', 'joist')),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ from thud._api import api, call, floor_api, text
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import require_choice, require_kind
+from thud.contact_time import contact_span
 from thud.display import MAKERS, Displayed
 from thud.errors import InputError, PlausibilityWarning
 from thud.floors.mobility import mobility
@@ -117,6 +119,14 @@ class Impact(Displayed):
     impulse_residual: float
     energy_residual: float
     on_floor: FloorImpact | None = None
+
+    @property
+    def measured_contact_time(self) -> float:
+        """Contact time as a recording gives it (`thud.contact_time`), s."""
+        first = round(self.touch_time * self.sample_rate)
+        last = math.ceil((self.touch_time + self.exact_contact_time) * self.sample_rate)
+        begin, end = contact_span(self.floor_force[first : last + 1], self.sample_rate)
+        return end - begin
 
     def __repr__(self) -> str:
         """Return the main numbers of the impact, without its arrays."""
@@ -253,7 +263,7 @@ class FloorEnergy:
     by_motion : ndarray, shape (n_band,)
         Integral of the force times the velocity of the floor, both in the band, J.
     by_mobility : ndarray, shape (n_band,)
-        The same by the mobility Y of the floor, 2 integral |F|**2 Re Y df, J.
+        The same by the mobility Y of the floor, ``2 integral |F|**2 Re Y df``, J.
     conductance : ndarray, shape (n_band,)
         Mean of Re Y, m/(N s).
     """

@@ -2,7 +2,7 @@
 
 .venv/bin/python inputs/recordings/make_recordings.py
 
-drops the ball of ../rubber_ball_fe_viscous.nml from heights that scatter, adds the plate's first
+drops the ball of ../rubber_ball_fe.nml from heights that scatter, adds the plate's first
 resonance, offset, drift, mains hum and noise, and writes the files beside it. Nothing here was
 measured.
 """
@@ -21,7 +21,7 @@ import thud
 
 HERE = Path(__file__).parent
 LABEL = "Synthetic recording, not a measurement; made by make_recordings.py of thud"
-MODEL = thud.read_case(HERE.parent / "rubber_ball_fe_viscous.nml")
+MODEL = thud.read_case(HERE.parent / "rubber_ball_fe.nml")
 GRAVITY = MODEL.drop.gravity
 # Sample rates of the model and of the files, Hz.
 FINE, RATE, RATE_LONG = 192e3, 48000, 24000
@@ -94,7 +94,7 @@ def truth(table: str, touch: float, height: float, impact: thud.Impact) -> str:
 {table}
 onset = {touch:.7f}
 height = {height:.5f}
-contact_time = {impact.contact_time:.6f}
+contact_time = {impact.measured_contact_time:.6f}
 restitution = {impact.restitution:.5f}
 peak_force = {impact.peak_force:.2f}
 impulse = {impulse:.4f}
@@ -144,7 +144,7 @@ def main() -> None:
     hum = ", ".join(f'"{frequency:g} Hz" = {size}' for frequency, size in HUM.items())
     head = f"""# {LABEL}.
 # What the files beside this one hold, without what was added to it: the force on the floor of the
-# ball of ../rubber_ball_fe_viscous.nml. In the sound files {FULL_SCALE:g} V are full scale and
+# ball of ../rubber_ball_fe.nml. In the sound files {FULL_SCALE:g} V are full scale and
 # compression is negative; the tables are in newtons, {EXCERPT:g} s from {FIRST - 0.04:g} s on.
 
 calibration = "{FULL_SCALE:g} V/FS, 0.5 mV/pC, 4 pC/N"
@@ -156,8 +156,9 @@ drift_time = {DRIFT_TIME}      # s
 hum = {{ {hum} }} # N
 plate = {{ f0 = {PLATE_F0}, Q = {PLATE_Q} }} # Hz
 
-# Of each drop: first touch in the sound file, s; height, m; contact time, s; restitution; peak, N;
-# impulse, N s; octave levels 31.5 to 500 Hz, dB. Bounces are those of the drop above them.
+# Of each drop: first touch in the sound file, s; height, m; contact time at 1 % of the peak, s;
+# restitution; peak, N; impulse, N s; octave levels 31.5 to 500 Hz, dB. Bounces are those of the
+# drop above them.
 """
     text = head + drops_alone(heights[:5]) + drops_in_one(heights[5:])
     (HERE / "truth.toml").write_text(text, encoding="utf-8")

@@ -66,7 +66,7 @@ contains
          receiver)
    end subroutine new_double_receiver
 
-   !> Half waves of the modes up to far above the limit, of the plate that has more of them.
+   !> Half waves of the upper plate's modes up to far above the limit, and those that only the lower one has below it.
    subroutine get_all_half_waves(floor, m, n, error)
       type(double_plate_type), intent(in) :: floor
       !> Half waves along length and width: [n_shape].
@@ -74,14 +74,17 @@ contains
       !> There are too many.
       type(error_type), allocatable, intent(out) :: error
       integer, allocatable :: m_lower(:), n_lower(:)
+      logical, allocatable :: new(:)
 
       call check_mode_count('floating_floor', floor%upper, error)
       if (.not. allocated(error)) call check_mode_count('floating_floor', floor%lower, error)
       if (allocated(error)) return
       call get_half_waves(floor%upper, far*mode_limit, m, n)
       call get_half_waves(floor%lower, mode_limit, m_lower, n_lower)
-      if (maxval(m_lower) <= maxval(m) .and. maxval(n_lower) <= maxval(n)) return
-      call get_half_waves(floor%lower, far*mode_limit, m, n)
+      new = get_modal_stiffness(floor%upper, m_lower, n_lower) &
+         >= get_surface_mass(floor%upper)*(2*pi*far*mode_limit)**2
+      m = [m, pack(m_lower, new)]
+      n = [n, pack(n_lower, new)]
    end subroutine get_all_half_waves
 
    !> The two modes of each shape.

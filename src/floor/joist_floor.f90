@@ -8,9 +8,9 @@ module thud_joist_floor
    use thud_kinds, only: wp
    use thud_modal_receiver, only: new_modal_receiver
    use thud_new_field, only: choice_field, real_field
-   use thud_plate, only: get_resistance, get_surface_mass, plate_type
-   use thud_plate_modes, only: check_inside, check_mode_count, far, get_half_waves, get_modal_stiffness, get_shape, &
-      mode_limit, rest_corner
+   use thud_plate, only: air_type, get_resistance, get_surface_mass, get_total_loss, plate_type
+   use thud_plate_modes, only: check_inside, check_losses, check_mode_count, far, get_half_waves, get_modal_stiffness, &
+      get_shape, mode_limit, rest_corner
    use thud_receiver, only: receiver_type
    implicit none (type, external)
    private
@@ -36,7 +36,7 @@ module thud_joist_floor
       real(wp) :: joist_width = 0.06_wp, joist_height = 0.22_wp, joist_density = 420.0_wp, joist_modulus = 1.1e10_wp
       !> Share of the full composite action of sheathing and joists.
       real(wp) :: connection = 0.1_wp
-      !> Total loss factor.
+      !> Loss factor with that of the edges, without radiation.
       real(wp) :: loss_factor = 0.05_wp
       !> Place of the source, over length and width; `sheathing` between two joists, or a `joist`.
       real(wp) :: source_x = 0.5_wp, source_y = 0.5_wp
@@ -73,11 +73,12 @@ contains
          real_field('joist_modulus', options%joist_modulus, 'Pa', 'modulus of elasticity of the joists', '[1e7, 1e12]'), &
          real_field('connection', options%connection, '', &
          'composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)', '[0, 1]'), &
-         real_field('loss_factor', options%loss_factor, '', 'total loss factor of the floor', '(0, 1]'), &
+         real_field('loss_factor', options%loss_factor, '', &
+         'loss factor of the floor and its edges, without radiation', '(0, 1]'), &
          real_field('source_x', options%source_x, '', 'place of the source along the joists, over the length', '(0, 1)'), &
          real_field('source_y', options%source_y, '', 'place of the source across the joists, over the width', '(0, 1)'), &
          choice_field('source_on', options%source_on, &
-         'what the source drops on there: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
+         'what the source drops on: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
          options%get_point_fields()]
    end function get_fields
 
@@ -164,10 +165,10 @@ contains
    subroutine get_receiver(options, receiver, error)
       class(joist_floor_type), intent(in) :: options
       type(receiver_type), intent(out) :: receiver
-      !> Never.
+      !> The losses are too high.
       type(error_type), allocatable, intent(out) :: error
 
-      call get_point_receiver(options, [options%source_x, options%source_y], .true., receiver)
+      call get_point_receiver(options, [options%source_x, options%source_y], .true., receiver, error)
    end subroutine get_receiver
 
    !> Velocity of another point: on or near a joist, as the smeared plate moves.
@@ -176,23 +177,26 @@ contains
       !> Place of the point, m.
       real(wp), intent(in) :: x, y
       type(receiver_type), intent(out) :: transfer
-      !> The point lies outside.
+      !> The point lies outside, or the losses are too high.
       type(error_type), allocatable, intent(out) :: error
 
       call check_inside('joist_floor', options%length, options%width, x, y, error)
-      if (.not. allocated(error)) call get_point_receiver(options, [x/options%length, y/options%width], .false., transfer)
+      if (.not. allocated(error)) call get_point_receiver(options, [x/options%length, y/options%width], .false., transfer, &
+         error)
    end subroutine get_transfer
 
    !> Modes of the smeared plate, across the joists at most as many half waves as there are bays. Under a source on the
    !> sheathing the rest is that of the sheathing between two joists: its static compliance, and the conductance of the
    !> infinite sheathing at high frequencies. Under one on a joist it is that of the smeared plate.
-   subroutine get_point_receiver(options, point, under_source, receiver)
+   subroutine get_point_receiver(options, point, under_source, receiver, error)
       class(joist_floor_type), intent(in) :: options
       !> Place of the point, over length and width.
       real(wp), intent(in) :: point(2)
       !> The point is that of the source.
       logical, intent(in) :: under_source
       type(receiver_type), intent(out) :: receiver
+      !> There are too many modes, or the losses are too high.
+      type(error_type), allocatable, intent(out) :: error
       type(plate_type) :: plate
       integer, allocatable :: m(:), n(:)
       real(wp), allocatable :: omega(:), gain(:), loss_factor(:)
@@ -200,17 +204,21 @@ contains
       real(wp) :: rest, corner
 
       plate = get_smeared(options)
+      call check_mode_count('joist_floor', plate, error)
+      if (allocated(error)) return
       call get_half_waves(plate, far*mode_limit, m, n)
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
       smeared = n <= max(1, int(options%width/options%spacing))
       single = smeared .and. omega < 2*pi*mode_limit
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width) &
          *get_shape(m, n, [options%source_x, options%source_y])*get_shape(m, n, point)
-      allocate (loss_factor(count(single)), source=options%loss_factor)
+      loss_factor = get_total_loss(plate, air_type(), pack(omega, single)/(2*pi))
+      call check_losses('joist_floor', pack(omega, single), loss_factor, error)
+      if (allocated(error)) return
       corner = rest_corner
       if (under_source .and. options%source_on == 'sheathing') then
-         rest = local_compliance*options%spacing**2/get_sheathing_stiffness(options)
-         corner = 1/(get_sheathing_resistance(options)*sqrt(2.0_wp)*rest)
+         rest = get_local_compliance(options)
+         corner = get_local_corner(options)
       else
          rest = sum(gain/omega**2, mask=smeared .and. .not. single)
       end if
@@ -226,7 +234,25 @@ contains
       resistance = 8*sqrt(get_sheathing_stiffness(options)*options%sheathing_density*options%sheathing_thickness)
    end function get_sheathing_resistance
 
-   !> The smeared plate, which gets what the infinite one gets below the limit, and above it what the sheathing gets.
+   !> Static compliance of the sheathing between two joists.
+   pure function get_local_compliance(options) result(compliance)
+      class(joist_floor_type), intent(in) :: options
+      !> The compliance, m/N.
+      real(wp) :: compliance
+
+      compliance = local_compliance*options%spacing**2/get_sheathing_stiffness(options)
+   end function get_local_compliance
+
+   !> Corner above which the sheathing between two joists is infinite, 0.8 times the limit of the smeared plate.
+   pure function get_local_corner(options) result(corner)
+      class(joist_floor_type), intent(in) :: options
+      !> The corner, rad/s.
+      real(wp) :: corner
+
+      corner = 1/(get_sheathing_resistance(options)*sqrt(2.0_wp)*get_local_compliance(options))
+   end function get_local_corner
+
+   !> The smeared plate, which gets what it gets as an infinite one and what the sheathing gets between joists.
    subroutine get_radiator(options, frequency, plate, conductance, error)
       class(joist_floor_type), intent(in) :: options
       !> Frequencies, Hz: [n].
@@ -239,8 +265,8 @@ contains
 
       plate = get_smeared(options)
       conductance = 1/get_resistance(plate)
-      if (options%source_on == 'sheathing') conductance = merge(conductance, 1/get_sheathing_resistance(options), &
-         frequency < get_smeared_limit(options))
+      if (options%source_on == 'sheathing') conductance = conductance + 1/(get_sheathing_resistance(options) &
+         *(1 + (get_local_corner(options)/(2*pi*frequency))**4))
    end subroutine get_radiator
 
 end module thud_joist_floor

@@ -1,6 +1,7 @@
 !> Relaxed vector fitting (Gustavsen and Semlyen, IEEE Trans. Power Delivery 14, 1999; Gustavsen, 21, 2006): a stable
 !> rational function with real coefficients through values at frequencies.
 module thud_vector_fit
+   use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    use thud_lapack, only: dgels
    use thud_rational, only: get_basis, get_eigenvalues, get_order, get_residues, get_state_input, get_state_matrix
@@ -9,8 +10,12 @@ module thud_vector_fit
 
    public :: fit_rational
 
-   !> Moves of the poles; with good values some five are needed.
+   !> Maximum moves of the poles; with good values some five are needed.
    integer, parameter :: n_move = 40
+
+   !> Moves without a gain after which the poles stay, and the least gain.
+   integer, parameter :: patience = 6
+   real(wp), parameter :: gain = 1.0e-3_wp
 
    !> Weighted relative error, root of the mean square, below which only rounding is left to fit.
    real(wp), parameter :: exact = 1.0e-13_wp
@@ -30,7 +35,7 @@ contains
    !>
    !> Each move makes the zeros of a fitted weight function the new poles; those in the right half plane are reflected.
    !> The first poles lie at equal steps of the frequency or of its logarithm; the better of both fits is taken.
-   subroutine fit_rational(omega, response, weight, order, pole, residue, direct, failed)
+   subroutine fit_rational(omega, response, weight, order, pole, residue, direct, misfit, failed)
       !> Angular frequencies, rad/s, rising, above 0: [n_line].
       real(wp), intent(in) :: omega(:)
       !> Values to fit: [n_line].
@@ -43,34 +48,40 @@ contains
       complex(wp), allocatable, intent(out) :: pole(:), residue(:)
       !> Constant part.
       real(wp), intent(out) :: direct
-      !> LAPACK found no solution.
+      !> Weighted error over the weighted values, root of the mean square.
+      real(wp), intent(out) :: misfit
+      !> LAPACK found no solution, or an interrupt ended the search.
       logical, intent(out) :: failed
       complex(wp), allocatable :: found(:)
       real(wp), allocatable :: coefficient(:), best(:)
       complex(wp) :: s(size(omega))
-      real(wp) :: scale, misfit, least
-      integer :: i, kind
+      real(wp) :: scale, here
+      integer :: i, kind, idle
 
       scale = omega(size(omega))
       s = cmplx(0.0_wp, omega/scale, wp)
-      least = huge(least)
+      misfit = huge(misfit)
       failed = .true.
       do kind = 1, 2
          found = get_first_poles(omega(1)/scale, order, kind == 1)
+         idle = 0
          do i = 0, n_move
+            if (is_interrupted()) return
             if (i > 0) call move_poles(s, response, weight, found, failed)
             if (i > 0 .and. failed) exit
-            call fit_residues(s, response, weight, found, coefficient, misfit)
-            if (misfit < least) then
-               least = misfit
+            call fit_residues(s, response, weight, found, coefficient, here)
+            idle = idle + 1
+            if (here < (1 - gain)*misfit) idle = 0
+            if (here < misfit) then
+               misfit = here
                pole = found
                best = coefficient
             end if
-            if (least < exact) exit
+            if (misfit < exact .or. idle > patience) exit
          end do
-         if (least < exact) exit
+         if (misfit < exact) exit
       end do
-      failed = .not. least < huge(least)
+      failed = .not. misfit < huge(misfit)
       if (failed) return
       residue = get_residues(pole, best(:size(best) - 1))*scale
       direct = best(size(best))

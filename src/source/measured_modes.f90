@@ -148,7 +148,15 @@ contains
       history%elastic_force = history%part(:, 1)
       history%floor_force = history%part(:, 1)
       call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
-      if (allocated(error)) return
+      if (.not. allocated(error)) call check_history(history, sampling, error)
+   end subroutine solve
+
+   !> Refuses a history whose ball does not turn, whose balances do not close, or of too few samples.
+   subroutine check_history(history, sampling, error)
+      type(force_history_type), intent(in) :: history
+      type(sampling_type), intent(in) :: sampling
+      type(error_type), allocatable, intent(out) :: error
+
       if (history%restitution < 0.0_wp) then
          error = input_error('&measured_modes: frequency and effective_mass let the force end after ' &
             //to_text(history%contact_time)//' s, before the ball turns; allowed: modes that do not')
@@ -159,7 +167,7 @@ contains
       else
          call check_contact_samples(sampling, history%contact_time, error)
       end if
-   end subroutine solve
+   end subroutine check_history
 
    !> Modes of a ball on a rigid floor say nothing of another floor.
    function couples(options) result(yes)

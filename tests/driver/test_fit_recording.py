@@ -118,6 +118,19 @@ def test_noise_above_the_band_does_not_count(record: tuple[Recording, float]) ->
     assert np.hypot(record[1], 5.0 * np.sqrt(2)) > 1.5 * expected
 
 
+def test_slow_noise_of_fast_records_had_no_weights() -> None:
+    """96 kHz and below = 355: the constant that stands for the offset was too small."""
+    impact = thud.solve()
+    force, _ = make_recording(
+        pulse(impact), impact.sample_rate, rate=96e3, noise_db=NOISE_DB, colour="brown", seed=1
+    )
+    record = thud.Recording.from_array(force, 96e3)
+    target = ForceTarget(record, below=355.0)
+    found = thud.fit(target, ["youngs_modulus"])
+    modulus, error = found.values["youngs_modulus"], found.standard_errors["youngs_modulus"]
+    assert abs(modulus - impact.case.ball.youngs_modulus) < 5 * error
+
+
 def test_too_little_quiet_leaves_the_noise_to_the_residuals() -> None:
     impact = thud.solve()
     force, _ = make_recording(

@@ -20,7 +20,7 @@ from synthetic import make_recording
 
 import thud
 from thud import cli
-from thud.recordings import kept, measurement
+from thud.recordings import kept, measurement, results
 from thud.recordings.config import Config, read_config
 from thud.recordings.levels import measure_levels
 from thud.recordings.measurement import measure_window
@@ -42,9 +42,10 @@ def test_examples_are_measured_as_they_were_made(
     monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
-    assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 0
+    # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
+    assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out
-    assert "The source conforms to the limits of the rubber ball at 95 %" in shown
+    assert "The source does not conform to the limits of the rubber ball at 95 %" in shown
     assert "hum of 50 Hz" in shown
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {
         "levels.csv",
@@ -61,13 +62,15 @@ def test_examples_are_measured_as_they_were_made(
         assert drop.restitution.value == pytest.approx(made["restitution"], abs=0.01)
         assert drop.peak_force.value == pytest.approx(made["peak_force"], rel=2e-3)
         assert drop.onset == pytest.approx(made["onset"], abs=1e-3)
-        # The foot of the pulse of finite elements is soft: docs/recordings_theory.md.
-        assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=0.6e-3)
+        assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=1e-4)
     with (tmp_path / "out/levels.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
     assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
     report = json.loads((tmp_path / "out/report.json").read_text())
-    assert report["verdict"] == recording.conformity().verdict == "conforms"
+    assert report["verdict"] == recording.conformity().verdict == "does not conform"
+    assert [one["name"] for one in report["criteria"] if one["verdict"] != "conforms"] == [
+        "octave_500"
+    ]
 
 
 def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
@@ -79,7 +82,7 @@ def test_noise_and_offset_that_read_a_wrong_contact_time() -> None:
         force = np.pad(impact.floor_force, int(quiet * impact.sample_rate)) + offset
         force += random.normal(scale=noise, size=len(force))
         found = thud.Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5)
-        assert found.contact_time == pytest.approx(impact.contact_time, abs=0.6e-3)
+        assert found.contact_time == pytest.approx(impact.measured_contact_time, abs=1e-4)
         assert found.restitution == pytest.approx(impact.restitution, abs=0.01)
         np.testing.assert_allclose(found.levels(), impact.levels(), atol=0.3)
 
@@ -162,7 +165,7 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
 def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str) -> None:
     # Five drops read 19.548 ms with an expanded uncertainty of 0.168 ms: their common error, that
-    # of a soft foot, was averaged away.
+    # of a soft foot and of the edge that the correction of the plate spreads, was averaged away.
     config = read_config(FOLDER / "lab.toml")
     if ending == "csv":
         config = replace(config, calibration=None, polarity=None)
@@ -176,15 +179,15 @@ def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str)
     assert "edges of the pulse" in {part.name for part in whole.contributions}
     for drop, time in zip(recording.drops, truth, strict=True):
         one = average_estimates([drop.contact_time])
-        assert abs(one.value - time) <= one.expanded
+        assert abs(one.value - time) <= min(one.expanded, 1e-4)
 
 
 @pytest.mark.parametrize("name", ["rubber_ball_fe", "rubber_ball_fe_elastic"])
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str) -> None:
     impact = thud.solve_case(thud.read_case(REPOSITORY / f"inputs/{name}.nml"))
-    truth = impact.exact_contact_time
-    pulse = impact.floor_force[: int(truth * impact.sample_rate) + 2]
+    truth = impact.measured_contact_time
+    pulse = impact.floor_force[: int(impact.exact_contact_time * impact.sample_rate) + 2]
     for rate in (44_100.0, 48_000.0):
         for seed, noise in enumerate((0.5, 1.5, 5.0)):
             level = 20 * np.log10(pulse.max() / noise)
@@ -341,6 +344,39 @@ def test_interrupted_measurement_goes_on_where_it_ended(
     np.testing.assert_array_equal(found.levels(), whole.levels())
 
 
+@pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
+def test_measurement_interrupted_in_its_report_is_not_measured_again(
+    error: type[BaseException] | BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, config = FOLDER / "three_drops.flac", str(FOLDER / "lab.toml")
+    command = ["measure", str(file), "--config", config, "--quiet", "--no-figures", "-o"]
+    measured: list[str] = []
+
+    def measure(window: Window, config: Config) -> Drop:
+        measured.append(window.name)
+        return measure_window(window, config)
+
+    def stop(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(measurement, "measure_window", measure)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(results, "levels_csv", stop)
+        assert cli.main([*command, str(tmp_path / "out")]) != 0
+    assert len(measured) == 3
+    assert cli.main([*command, str(tmp_path / "out")]) == 0
+    assert len(measured) == 3
+    # The results have the bits of a measurement in one piece, and nothing else is left.
+    assert cli.main([*command, str(tmp_path / "whole")]) == 0
+    assert len(measured) == 6
+    written = {path.name: path.read_bytes() for path in (tmp_path / "whole").iterdir()}
+    found = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    # HDF5 holds times of its own.
+    assert written.keys() == found.keys()
+    for name in written.keys() - {"recording.nc"}:
+        assert found[name] == written[name]
+
+
 class Call:
     """Something that is called when a pickle is read."""
 
@@ -389,7 +425,7 @@ def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> No
     )
     usual, found = example("drop_1.wav", tmp_path), example("drop_1.wav", tmp_path, lab, plate)
     drop = found.drops[0]
-    np.testing.assert_array_equal(found.levels(), measure_levels(drop, low_pass=True).level)
+    np.testing.assert_array_equal(found.levels(), measure_levels([drop], low_pass=True)[0].level)
     assert not np.array_equal(found.levels(), usual.levels())
     assert any("low-pass, -3 dB at 1.25 kHz" in step for step in found.steps)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]

@@ -230,5 +230,5 @@ def test_run_draws_the_chain(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
     case.write_text(ROOM_CASE, encoding="utf-8")
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
-    for name in ("room", "room_decay", "floor_modes"):
+    for name in ("room", "room_decay", "room_positions", "floor_modes"):
         assert (tmp_path / "out" / f"{name}.png").exists()

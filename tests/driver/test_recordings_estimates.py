@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from synthetic import band_limited, coloured_noise, half_sine, make_recording
 
 import thud
+from thud.contact_time import contact_span
 from thud.levels import record_force
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
@@ -22,6 +23,8 @@ from thud.recordings.signal import Signal
 BANDS = thud.get_bands()
 ORACLE = np.array([38.3125, 30.6046, 19.2578, 8.9323, -0.4390])
 FINE = 192_000.0
+# A half sine of 20 ms is above 1 % of its peak for this time, s.
+ABOVE = 0.02 * (1 - 2 * np.arcsin(0.01) / np.pi)
 HALF_SINE = half_sine(FINE, 0.0, int(0.02 * FINE) + 2)
 SPEED = np.sqrt(2 * 9.81)
 
@@ -43,7 +46,7 @@ def drops(force: np.ndarray, rate: float, **knowledge: float) -> list[Drop]:
 
 
 def levels(drop: Drop) -> np.ndarray:
-    return measure_levels(drop).level
+    return measure_levels([drop])[0].level
 
 
 @pytest.mark.parametrize("before", [0.01, 0.1])
@@ -58,9 +61,9 @@ def test_noise_of_5_n_does_not_stretch_the_contact(
             after=before, seed=seed,
         )  # fmt: skip
         (drop,) = drops(force, rate)
-        truth = finite_elements.exact_contact_time
-        assert drop.contact_time.value == pytest.approx(truth, abs=3e-4)
-        assert abs(drop.contact_time.value - truth) < 4 * drop.contact_time.uncertainty
+        truth = finite_elements.measured_contact_time
+        assert drop.contact_time.value == pytest.approx(truth, abs=1e-4)
+        assert abs(drop.contact_time.value - truth) < 3 * drop.contact_time.uncertainty
         assert drop.noise.deviation == pytest.approx(5, rel=0.3 if before < 0.05 else 0.1)
 
 
@@ -69,7 +72,7 @@ def test_offset_of_12_n_does_not_stretch_the_contact(finite_elements: thud.Impac
     rate = finite_elements.sample_rate
     force, _ = make_recording(pulse(finite_elements), rate, offset=12.0)
     (drop,) = drops(force, rate)
-    assert drop.contact_time.value == pytest.approx(finite_elements.exact_contact_time, abs=2e-4)
+    assert drop.contact_time.value == pytest.approx(finite_elements.measured_contact_time, abs=1e-4)
     assert "an offset of 12 N was removed" in drop.steps
 
 
@@ -82,7 +85,7 @@ def test_two_impacts_in_a_file_are_two_drops(gap: float) -> None:
     assert [drop.name for drop in found] == ["file.wav, drop 1", "file.wav, drop 2"]
     assert found[1].onset - found[0].onset == pytest.approx(0.02 + gap, abs=2e-4)
     for drop in found:
-        assert drop.contact_time.value == pytest.approx(0.02, abs=2e-4)
+        assert drop.contact_time.value == pytest.approx(ABOVE, abs=1e-4)
         assert not drop.bounces
 
 
@@ -172,8 +175,10 @@ def test_bounces_are_told_from_drops() -> None:
     for drop, part in zip(found, (1.0, 0.99), strict=True):
         assert drop.bounces == pytest.approx([falling(1, scale=part)[1][0]], abs=3e-4)
         by = drop.restitutions["bounces"]
-        assert by.value == pytest.approx(0.8 * part, abs=3e-4)
-        assert abs(by.value - 0.8 * part) < 4 * by.uncertainty
+        # Gravity below 1 % of the peak: 64 us of each edge.
+        below = 9.81 * (0.02 - ABOVE) / 2 / SPEED
+        assert by.value == pytest.approx(0.8 * part + below, abs=3e-4)
+        assert abs(by.value - 0.8 * part - below) < 4 * by.uncertainty
     (without,) = drops(force[: int(5 * 24e3)], 24e3, height=None)  # type: ignore[arg-type]
     assert np.isnan(without.restitution.value)
     assert any("of the first bounce is 0.800" in remark for remark in without.remarks)
@@ -193,7 +198,8 @@ def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
         assert ("impulse against bounces" in named) == differs
         assert any("differ by" in remark for remark in found.remarks) == differs
         if differs:
-            assert named["impulse against bounces"] == pytest.approx(abs(np.subtract(*ways)) / 2)
+            width = abs(np.subtract(*ways))
+            assert named["impulse against bounces"] == pytest.approx(width / np.sqrt(3))
             assert one.value - one.expanded <= min(ways) < max(ways) <= one.value + one.expanded
             assert any(f"mass is {fits:.3f} kg" in remark for remark in found.remarks)
 
@@ -228,6 +234,26 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
     assert {"mass", "drop height"} < set(budget)
     assert found.quantities["mass"].uncertainty == 0.01
     assert found.quantities["drop_height"].uncertainty == 0.002
+
+
+def test_noise_behind_a_drop_was_taken_for_its_bounce() -> None:
+    """A hump of noise gave a restitution of 0.03 with an uncertainty of 0.001."""
+    force, _ = make_recording(
+        HALF_SINE, FINE, rate=24e3, noise_db=60, drops=((0.0, 1.0), (0.06, 0.3)), after=0.3
+    )
+    (drop,) = drops(force, 24e3)
+    assert drop.restitution_by == "impulse"
+    assert any("it is no bounce from 1 m" in remark for remark in drop.remarks)
+
+
+def test_noise_that_ran_into_a_pulse_was_the_pulse() -> None:
+    """A hump of slow noise before the contact moved its begin by 40 ms."""
+    time = np.arange(3000) / 24e3
+    hump = np.interp(time, [0.02, 0.03, 0.036, 0.043, 0.06, 0.061], [0, 20, 20, 12, 12, 0])
+    noise = np.random.default_rng(0).normal(scale=10, size=len(time))
+    force = half_sine(24e3, 0.06, len(time), peak=480) + hump + noise
+    (window,) = find_windows(Signal.from_array(force, 24e3, "file.wav"))
+    assert (window.start + window.contact[0]) / 24e3 == pytest.approx(0.06, abs=2e-3)
 
 
 def test_mass_that_is_not_stated_is_measured() -> None:
@@ -279,7 +305,7 @@ def test_clipping_is_refused() -> None:
 def test_coarse_digits_are_no_clipping() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=96e3)
     (drop,) = drops(np.round(force / 2) * 2, 96e3)
-    assert drop.contact_time.value == pytest.approx(0.02, abs=2e-4)
+    assert drop.contact_time.value == pytest.approx(ABOVE, abs=1e-4)
 
 
 def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
@@ -352,12 +378,34 @@ def test_releases_of_hertz_were_late() -> None:
     """A force that fades as t**1.5 was continued by a line: 0.3 to 0.5 ms too late at 50 dB."""
     case = thud.read_case("inputs/tyre_one_mass.nml")
     impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.03)))
-    truth = impact.exact_contact_time
+    truth = impact.measured_contact_time
     for seed in range(3):
         force, _ = make_recording(pulse(impact), FINE, rate=48e3, noise_db=50, seed=seed)
         (drop,) = drops(force, 48e3)
-        assert abs(drop.contact_time.value - truth) < 0.25e-3
+        assert abs(drop.contact_time.value - truth) < 1e-4
         assert abs(drop.contact_time.value - truth) < 3 * drop.contact_time.uncertainty
+
+
+def test_contact_span_is_that_of_closed_forms() -> None:
+    """The average of a line is the line; that of a jump counts what lies within the contact."""
+    begin, end = contact_span(HALF_SINE[:-1], FINE)
+    # Chord and mean of an even grid: within a hundredth of a step of the sine.
+    assert (begin, 0.02 - end) == pytest.approx((0.01 / np.pi * 0.02,) * 2, abs=1e-7)
+    assert contact_span(np.full(2000, 5.0), FINE) == pytest.approx((0, 1999 / FINE), abs=1e-12)
+    # t**2: its mean over a width w is larger by w**2 / 12.
+    ramp = (np.arange(2001) / 2000) ** 2
+    assert contact_span(ramp, 1e6)[0] == pytest.approx(np.sqrt(4e-8 - 1e-8 / 12), abs=1e-8)
+
+
+def test_positive_foot_of_fractional_elements() -> None:
+    """A release 1 ms late was explained by a line whose force is negative before it."""
+    case = thud.read_case("inputs/rubber_ball_fe.nml")
+    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.03)))
+    for seed, rate in enumerate((8e3, 48e3, 96e3)):
+        force, _ = make_recording(pulse(impact), FINE, rate=rate, noise_db=50, seed=seed)
+        (drop,) = drops(force, rate)
+        error = drop.contact_time.value - impact.measured_contact_time
+        assert abs(error) < min(1e-4, 3 * drop.contact_time.uncertainty)
 
 
 def test_noise_raised_the_peak() -> None:
@@ -368,7 +416,7 @@ def test_noise_raised_the_peak() -> None:
         low = record_force(np.pad(drop.contact.gated, 2), 48e3).max()
         errors.append((low - 1500, drop.peak_force.value - 1500, drop.peak_force.uncertainty))
     maximum, stated, doubt = np.mean(errors, axis=0)
-    assert stated < 0.75 * maximum
+    assert stated < 0.85 * maximum
     assert abs(stated) < 2 * doubt / np.sqrt(6) + doubt
 
 
@@ -383,7 +431,7 @@ def test_levels_know_hum() -> None:
             hum=((50.0, 60.0)[seed % 2], rng.uniform(15, 30)),
         )  # fmt: skip
         (drop,) = drops(force, 16e3)
-        found = measure_levels(drop)
+        (found,) = measure_levels([drop])
         pulls.append((found.level - thud.force_exposure_levels(clean, 16e3)) / found.uncertainty)
     # Sums of 16 squares, in each of five bands.
     assert (np.square(pulls).sum(axis=0) < chi2.ppf(1 - 1e-3, 16)).all(), pulls

@@ -14,6 +14,7 @@ from scipy.stats import binom
 
 import thud
 from thud.levels import RECORDED_BAND
+from thud.recordings.band_noise import band_noise
 from thud.recordings.contact import Contact, Estimate, cells_between, even_edges
 from thud.recordings.estimates import Drop
 from thud.recordings.levels import METHODS, average_levels, compare_methods, measure_levels
@@ -66,7 +67,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     touch, release, force = Estimate(0, 0), Estimate(0.02, 0), half_sine(time) + noise
     return Drop(
         name=f"drop {seed + 1}",
-        time=time,
+        begin=float(time[0]),
         force=force,
         sample_rate=rate,
         onset=before,
@@ -84,9 +85,9 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         steps=(),
         remarks=(),
         contact=Contact(
-            touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)), gate, offset,
-            (before, after), Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0),
-            rate,
+            touch, release, touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)),
+            gate, offset, (before, after),
+            Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
         ),
     )  # fmt: skip
 
@@ -119,7 +120,7 @@ def test_half_sine_by_all_methods(rate: int) -> None:
     alias = (thud.get_bands().upper / (rate - thud.get_bands().upper)) ** 2
     assert (np.abs(sampled - HALF_SINE) <= 20 * np.log10(1 + 2 * alias) + 6e-5).all()
     drop = make_drop(rate=rate)
-    exact = measure_levels(drop)
+    (exact,) = measure_levels([drop])
     np.testing.assert_allclose(exact.level, sampled, rtol=0, atol=1e-3)
     found = compare_methods(drop)
     assert tuple(found) == METHODS
@@ -166,19 +167,19 @@ def test_skirts_of_the_filters_leak_as_computed() -> None:
 
 def test_method_is_a_contribution_of_the_others_only() -> None:
     for method in METHODS:
-        found = measure_levels(make_drop(), method=method)
-        expected = np.abs(found.measured - measure_levels(make_drop()).level) / math.sqrt(3)
+        (found,) = measure_levels([make_drop()], method=method)
+        expected = np.abs(found.measured - measure_levels([make_drop()])[0].level) / math.sqrt(3)
         np.testing.assert_allclose(found.contributions["method"], expected)
         assert found.steps[-1].startswith("levels: ")
         assert method in found.steps[-1]
-    assert not measure_levels(make_drop()).contributions["method"].any()
+    assert not measure_levels([make_drop()])[0].contributions["method"].any()
 
 
 def test_low_pass_does_nothing_to_the_bands() -> None:
     for rate in (8000.0, 25600.0, 96000.0):
         drop = make_drop(rate=rate)
         for bands in ("octave", "third"):
-            raw, low = measure_levels(drop, bands), measure_levels(drop, bands, low_pass=True)
+            raw, low = (measure_levels([drop], bands, low_pass=one)[0] for one in (False, True))
             np.testing.assert_allclose(low.level, raw.level, rtol=0, atol=2e-3)
             assert "1.25 kHz" in low.steps[1]
             assert low.contributions["filter"].max() < 0.003
@@ -199,12 +200,26 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
 def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -> None:
     drop = make_drop(3.0, rate)
     edges = thud.get_bands(bands)
-    found = [drop.band_noise(*pair)[0] for pair in zip(edges.lower, edges.upper, strict=True)]
+    found = band_noise([drop], edges)[0, :, 0]
     expected = drop.noise.white * (edges.upper - edges.lower) * np.diff(drop.gate) / rate
     offset = drop.contact.covariance[0, 0] / (drop.noise.white * rate / 2) * np.diff(drop.gate)
     # The offset adds at most its part of the energy of the noise.
     assert (found >= expected * (1 - 1e-9)).all()
     assert (found <= expected * (1 + offset)).all()
+
+
+def test_many_drops_at_once_are_those_one_by_one() -> None:
+    """Gates of different lengths and rates share functionals, which must not change a level."""
+    drops = [make_drop(2.0, rate, seed=i) for i, rate in enumerate((25600.0, 8000.0, 25600.0))]
+    longer = (drops[0].gate[0] - 9, drops[0].gate[1])
+    contact = replace(drops[0].contact, gate=longer)
+    drops[0] = replace(drops[0], gate=longer, contact=contact)
+    together = measure_levels(drops, "third")
+    for drop, found in zip(drops, together, strict=True):
+        (alone,) = measure_levels([drop], "third")
+        np.testing.assert_array_equal(found.level, alone.level)
+        np.testing.assert_allclose(found.background, alone.background, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found.uncertainty, alone.uncertainty, rtol=1e-9)
 
 
 def test_noise_that_rises_towards_0_hz() -> None:
@@ -238,9 +253,7 @@ def test_noise_that_rises_towards_0_hz() -> None:
         drop, contact=replace(drop.contact, background=background, covariance=covariance)
     )
     edges = thud.get_bands()
-    mean, spread = np.array(
-        [drop.band_noise(*pair) for pair in zip(edges.lower, edges.upper, strict=True)]
-    ).T
+    mean, spread = band_noise([drop], edges)[0].T
     # The mean of energies that scatter by up to as much as they are; four deviations.
     scatter = np.std(energies, axis=0) / math.sqrt(count)
     np.testing.assert_array_less(np.abs(np.mean(energies, axis=0) - mean)[:4], 4 * scatter[:4])
@@ -257,11 +270,10 @@ def test_uncertainty_from_noise_is_the_scatter(
 ) -> None:
     """Errors of many realisations against their own standard uncertainties."""
     count = 200
-    true = measure_levels(make_drop(rate=rate)).level
-    found = [
-        measure_levels(make_drop(deviation, rate, before=before, after=0.03, seed=seed))
-        for seed in range(count)
-    ]
+    true = measure_levels([make_drop(rate=rate)])[0].level
+    found = measure_levels(
+        [make_drop(deviation, rate, before=before, after=0.03, seed=seed) for seed in range(count)]
+    )
     error = np.array([f.level for f in found]) - true
     uncertainty = np.array([f.uncertainty for f in found])
     # Where the level is well above the background, dB are proportional to energies.
@@ -278,7 +290,7 @@ def test_uncertainty_from_noise_is_the_scatter(
 
 def test_background_is_flagged_and_corrected_as_the_standards_say() -> None:
     rate = 25600.0
-    clean = measure_levels(make_drop(rate=rate))
+    (clean,) = measure_levels([make_drop(rate=rate)])
     assert (clean.background < -200).all()
     assert clean.uncertainty.max() < 1e-9
     assert (clean.flag == "").all()
@@ -287,7 +299,7 @@ def test_background_is_flagged_and_corrected_as_the_standards_say() -> None:
     for above, flag in ((20.0, ""), (14.9, "corrected"), (6.1, "corrected"), (5.9, "background")):
         # White noise in the file itself is not needed: the level is taken against its density.
         density = 10 ** ((clean.level[3] - above) / 10) / width / length
-        found = measure_levels(make_drop(rate=rate, density=density))
+        (found,) = measure_levels([make_drop(rate=rate, density=density)])
         assert found.level[3] - found.background[3] <= above + 0.01
         assert found.flag[3] == flag
         correction = -10 * math.log10(1 - 10 ** (-max(above, 6.0) / 10))
@@ -298,15 +310,14 @@ def test_background_is_flagged_and_corrected_as_the_standards_say() -> None:
 
 def test_unknown_method_is_refused() -> None:
     with pytest.raises(thud.InputError, match="method = 'welch' is not known"):
-        measure_levels(make_drop(), method="welch")
+        measure_levels([make_drop()], method="welch")
 
 
 def test_average_is_that_of_energies() -> None:
     drops = [make_drop(2.0, seed=i) for i in range(5)]
     scales = [1.0, 1.01, 0.99, 1.02, 0.98]
-    found = [
-        measure_levels(replace(d, force=s * d.force)) for s, d in zip(scales, drops, strict=True)
-    ]
+    pairs = zip(scales, drops, strict=True)
+    found = measure_levels([replace(drop, force=scale * drop.force) for scale, drop in pairs])
     average = average_levels(found)
     energies = np.array([10 ** (f.level / 10) for f in found])
     np.testing.assert_allclose(average.level, 10 * np.log10(energies.mean(axis=0)), atol=1e-9)
@@ -324,21 +335,21 @@ def test_average_is_that_of_energies() -> None:
     with pytest.raises(thud.InputError, match="there are none"):
         average_levels([])
     with pytest.raises(thud.InputError, match="differ in bands or method"):
-        average_levels([found[0], measure_levels(drops[0], "third")])
+        average_levels([found[0], *measure_levels(drops, "third")])
 
 
 def test_drops_that_differ_are_marked_and_kept() -> None:
-    found = [measure_levels(make_drop(1.0, seed=i)) for i in range(6)]
+    found = measure_levels([make_drop(1.0, seed=i) for i in range(6)])
     assert average_levels(found).outliers == ()
     odd = make_drop(1.0, seed=6)
-    found.append(measure_levels(replace(odd, force=1.05 * odd.force, name="odd")))
+    found += measure_levels([replace(odd, force=1.05 * odd.force, name="odd")])
     average = average_levels(found)
     assert {o.name for o in average.outliers} == {"odd"}
     assert "odd" in average.names
     assert len(average.drops) == 7
     assert "standard deviations from the mean" in str(average.outliers[0])
     # Equal drops differ by rounding.
-    same = [measure_levels(make_drop()) for _ in range(5)]
+    same = measure_levels([make_drop() for _ in range(5)])
     assert average_levels(same).outliers == ()
 
 
@@ -490,7 +501,7 @@ def test_budget_after_the_gum() -> None:
 
 
 def test_level_budget_has_calibration_and_plate() -> None:
-    average = average_levels([measure_levels(make_drop(1.0, seed=i)) for i in range(3)])
+    average = average_levels(measure_levels([make_drop(1.0, seed=i) for i in range(3)]))
     plate = np.full(5, 0.02)
     levels = level_quantities(average, calibration=0.01, plate=plate)
     names = [c.name for c in levels[0].contributions]
@@ -507,7 +518,7 @@ def test_level_budget_has_calibration_and_plate() -> None:
 
 def test_plate_of_unstated_resonance_is_no_line_of_zero() -> None:
     """The budget had a plate of 0 dB beside the remark that its uncertainty is not given."""
-    average = average_levels([measure_levels(make_drop(1.0))])
+    average = average_levels(measure_levels([make_drop(1.0)]))
     for uncertainty, stated in ((0.0, False), (0.01, True)):
         plate = Plate(1600.0, 20.0, frequency_uncertainty=uncertainty)
         (level, *_) = level_quantities(average, plate=plate.level_uncertainty())
@@ -617,7 +628,7 @@ def _decide_level(quantity: Quantity) -> str:
 def test_energy_of_bands_adds_up_to_neighbours() -> None:
     """Thirds of an octave hold its energy, for exact levels and for the noise."""
     drop = make_drop(5.0)
-    thirds, octaves = measure_levels(drop, "third"), measure_levels(drop)
+    (thirds,), (octaves,) = measure_levels([drop], "third"), measure_levels([drop])
     starts = range(0, 16, 3)
     for attribute in ("measured", "background"):
         energy = 10 ** (getattr(thirds, attribute) / 10)

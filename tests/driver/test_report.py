@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import functools
 import html
 import io
 import itertools
@@ -22,12 +21,11 @@ from synthetic import make_recording
 from test_figure_look import assert_clean
 
 import thud
-import thud.recordings.recording as module
 from thud.errors import ReportWarning
 from thud.levels import record_force
 from thud.plot.recording import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
-from thud.recordings.estimates import Drop, Estimate
+from thud.recordings.estimates import Estimate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.report.data import read_date, report_data
@@ -64,29 +62,6 @@ def one(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     time = np.arange(len(recorded)) / rate
     np.savetxt(path, np.column_stack([time, recorded]), "%.9g", ",", header="time_s,force_N")
     return read_recording(path, config=LAB)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _known_levels() -> Any:  # noqa: ANN401 - a fixture
-    """Measure the levels of equal forces once: 500 drops take a second."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("measure_levels", "compare_methods"):
-            patch.setattr(module, name, remembered(getattr(module, name)))
-        yield
-
-
-def remembered(measure: Any) -> Any:  # noqa: ANN401 - a function
-    known: dict[Any, Any] = {}
-
-    @functools.wraps(measure)
-    def measured(drop: Drop, *arguments: str, low_pass: bool) -> Any:  # noqa: ANN401
-        key = (drop.force.tobytes(), *arguments, low_pass)
-        if key not in known:
-            known[key] = measure(drop, *arguments, low_pass=low_pass)
-        found = known[key]
-        return found if isinstance(found, dict) else replace(found, name=drop.name)
-
-    return measured
 
 
 def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN401

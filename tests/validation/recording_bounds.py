@@ -19,11 +19,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import thud
+from thud.contact_time import THRESHOLD, contact_span
 from thud.errors import InputError
 from thud.recordings import contact as contact_module
 from thud.recordings.contact import Contact, Estimate
+from thud.recordings.drops import Window
 from thud.recordings.levels import ENERGY_DECIBEL, measure_levels
 from thud.recordings.noise import MAINS, Background
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +39,15 @@ from synthetic import HARMONICS, coloured_noise, noise_density
 NOISES = (60, 50, 40, 30, 20)
 COLOURS = ("white", "pink", "brown")
 RATES = (8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3)
-SHAPES = ("half sine", "shell", "modal", "finite elements")
+# Shapes of pulses: file of the model, and how often they are drawn. Both finite elements are the
+# standard ball, with the law of the loss of Kelvin and Voigt and with the fractional one.
+SHAPES = {
+    "half sine": ("", 0.4),
+    "shell": ("100cm", 0.18),
+    "modal": ("modal", 0.14),
+    "viscous elements": ("fe_viscous", 0.14),
+    "fractional elements": ("fe", 0.14),
+}
 FINE = 192_000.0
 HEIGHT, MASS, GRAVITY = 1.0, 2.5, 9.81
 BANDS = thud.get_bands()
@@ -48,11 +59,11 @@ QUANTITIES = (*(f"{band:g} Hz" for band in BANDS.nominal), "e", "t_c", "t_c smoo
 
 @cache
 def pulse(shape: str) -> tuple[np.ndarray, float]:
-    """Return the samples of a pulse at FINE from first touch on, N, and its contact time, s."""
-    if shape == "half sine":
+    """Return the samples of a pulse at FINE from first touch on, N, and the time to release, s."""
+    file, _ = SHAPES[shape]
+    if not file:
         time = np.arange(int(0.02 * FINE) + 1) / FINE
         return 1500 * np.sin(np.pi * time / 0.02), 0.02
-    file = {"shell": "100cm", "modal": "modal", "finite elements": "fe_viscous"}[shape]
     case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"rubber_ball_{file}.nml")
     impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.05)))
     last = int(np.ceil(impact.exact_contact_time * FINE)) + 1
@@ -81,7 +92,7 @@ class Draw:
         rng = np.random.default_rng(seed)
         return cls(
             seed,
-            SHAPES[rng.choice(4, p=(0.5, 0.2, 0.15, 0.15))],
+            list(SHAPES)[rng.choice(len(SHAPES), p=[part for _, part in SHAPES.values()])],
             NOISES[seed % 5],
             COLOURS[seed // 5 % 3],
             RATES[rng.integers(len(RATES))] * rng.uniform(1, 1.0001),
@@ -130,7 +141,7 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
         recording = thud.Recording.from_array(record, rate, height=HEIGHT, mass=MASS)
     except InputError as error:
         return draw, str(error)
-    drop, levels = recording.drops[0], measure_levels(recording.drops[0])
+    drop, levels = recording.drops[0], measure_levels(recording.drops)[0]
     np.testing.assert_allclose(levels.level, recording.levels(), rtol=0, atol=1e-9)
     oracle, restitution = oracle_drop(draw, clean, onset, contact_time, deviation, drop)
     pairs = zip(BANDS.lower, BANDS.upper, strict=True)
@@ -140,9 +151,12 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
     pull = decibels / levels.uncertainty
     upper = levels.flag == "background"
     pull = np.where(upper, np.maximum(-pull, 0), pull)
-    late = drop.contact_time.value - contact_time
-    bounce = drop.restitution.value - restitution.value
-    flanks = flank_bounds(draw, oracle, record, drop)
+    begin, end = contact_span(force, FINE)
+    late = drop.contact_time.value - (end - begin)
+    # The velocities are those at begin and end of the contact.
+    fall = GRAVITY * (contact_time - (end - begin)) / np.sqrt(2 * GRAVITY * HEIGHT)
+    bounce = drop.restitution.value - (restitution.value + fall)
+    flanks = flank_bounds(draw, oracle, record)
     gravity = GRAVITY * flanks[0] / np.sqrt(2 * GRAVITY * HEIGHT)
     doubt = drop.contact_time.uncertainty
     return draw, Result(
@@ -191,6 +205,8 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     contact = Contact(
         Estimate(onset, 0),
         Estimate(onset + contact_time, 0),
+        Estimate(onset, 0),
+        Estimate(onset + contact_time, 0),
         peak,
         (first, last),
         clean[first:last],
@@ -207,41 +223,29 @@ def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
     truth = clean.sum() / rate / (MASS * speed) - 1 - GRAVITY * contact_time / speed
     time = np.arange(first, last) / rate - onset
     oracle = replace(
-        drop, time=time, force=clean[first:last], gate=(0, last - first), contact=contact
+        drop, begin=float(time[0]), force=clean[first:last], gate=(0, last - first), contact=contact
     )
     return oracle, Estimate(float(truth), spread)
 
 
-def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop) -> tuple[float, float]:
+def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray) -> tuple[float, float]:
     """Return bounds of the contact time, s: of any flank, and of one that is known to be smooth.
 
-    The first is the deviation of this method where the noise is known; the second is the
-    Cramer-Rao bound for flanks of unknown slope and curvature, for the half sine.
+    The first is the deviation of this method where the noise is known, and the contact to the
+    sample in the search for drops; the second is the Cramer-Rao bound for flanks of unknown slope
+    and curvature, for the half sine.
     """
     rate, contact = draw.rate, oracle.contact
     touch, release = contact.touch.value, contact.release.value
-    middle = sum(contact.span) / 2 / rate
-    offset = float(np.median(record))
+    signal = Signal.from_array(record, rate, "record")
+    window = Window("record", signal, 0, len(record), contact.span)
     saved = contact_module.QUIET_CELLS
     contact_module.QUIET_CELLS = (*saved, (4e-3, 1.0))
-    left, right = int((touch - 2e-4) * rate) - 2, int((release + 2e-4) * rate) + 3
-    quiet, mean = contact_module.quiet_means(record - offset, left, right, rate, middle)
-    contact_module.QUIET_CELLS = saved
-    background = Background(quiet, mean, contact.background.draws, contact.peak)
-    room = 6 * max(drop.contact_time.uncertainty, 2e-5) + 3 / rate
-    spread = 0.0
-    for sign, near, at in ((1, left, touch), (-1, right, release)):
-        bounds = (
-            (max(at - room, left / rate), at + room)
-            if sign > 0
-            else (at - room, min(at + room, right / rate))
-        )
-        ahead = bounds if sign > 0 else (-bounds[1], -bounds[0])
-        edges = sign * contact_module.flank_edges(sign * near, ahead, rate, fine=True)
-        _, one = contact_module.find_edge(
-            record - offset, edges, bounds, background, rate, middle, 3
-        )
-        spread = float(np.hypot(spread, one))
+    try:
+        found = contact_module.find_posteriors(window, record, contact.background, passes=2)
+    finally:
+        contact_module.QUIET_CELLS = saved
+    spread = float(np.hypot(*(edge.edge()[1][1] for edge in (found.touch, found.release))))
     if draw.shape != "half sine":
         return spread, np.nan
     count = max(4, int(contact_module.FLANK * min(rate, 2e4)))
@@ -249,13 +253,16 @@ def flank_bounds(draw: Draw, oracle: Drop, record: np.ndarray, drop: Drop) -> tu
     tau = (edges[1:] + edges[:-1]) / 2
     slope = np.pi * contact.peak / (release - touch)
     shapes = np.stack([np.full_like(tau, slope), tau, tau**2 / 2])
-    begin = touch - middle
+    begin = touch - sum(contact.span) / 2 / rate
     _, covariance = contact.background.predict((begin + edges[:-1], begin + edges[1:]))
     covariance += np.eye(count) * contact.background.variances[0] / 2 / (edges[1] - edges[0])
     normal = shapes @ np.linalg.solve(covariance, shapes.T)
     unit = 1 / np.sqrt(np.diagonal(normal))
     inverse = np.linalg.inv(normal * unit[:, None] * unit) * unit[:, None] * unit
-    return spread, float(np.sqrt(2 * inverse[0, 0]))
+    # What the three make of the time at which the flank passes the threshold.
+    delay = THRESHOLD * contact.peak / slope
+    change = np.array([1, delay / slope, delay**2 / slope / 2])
+    return spread, float(np.sqrt(2 * change @ inverse @ change))
 
 
 def realise_all(count: int, first: int = 0) -> list[tuple[Draw, Result | str]]:

@@ -20,6 +20,7 @@ from thud.cli.figures import compare_cases, draw_figures
 from thud.cli.floor import FLOOR
 from thud.cli.history import run_history
 from thud.cli.measure import MEASURE
+from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
@@ -100,6 +101,7 @@ COMMANDS = {
     ),
     "rate": RATE,
     "floor": FLOOR,
+    "mobility": MOBILITY,
     **study_commands(),
     "examples": EXAMPLES,
     "figures": Command(

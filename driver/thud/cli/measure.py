@@ -24,32 +24,35 @@ SHOWN = 50
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings import results  # noqa: PLC0415 - SciPy takes its time
+    from thud.recordings.kept import KeptDrops  # noqa: PLC0415
     from thud.recordings.read_recording import read_recording  # noqa: PLC0415
 
     folder = Path(options.output or Path("outputs", Path(options.drops[0]).stem))
-    recording = read_recording(
-        options.drops,
-        height=options.height,
-        mass=options.mass,
-        height_uncertainty=options.height_uncertainty,
-        mass_uncertainty=options.mass_uncertainty,
-        source=options.source,
-        channel=channel_of(options.channel),
-        unit=options.unit,
-        calibration=options.calibration,
-        calibration_uncertainty=options.calibration_uncertainty,
-        polarity=options.polarity,
-        sample_rate=options.sample_rate,
-        low_pass=options.low_pass or None,
-        config=options.config,
-        progress=not options.quiet and sys.stderr.isatty(),
-        workers=options.workers or len(os.sched_getaffinity(0)),
-        keep=folder,
-    )
-    verdict = recording.conformity()
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always", ReportWarning)
-        results.save(recording, folder, figures=not options.no_figures)
+    # Drops stay until the results are written.
+    with KeptDrops(folder) as kept:
+        recording = read_recording(
+            options.drops,
+            height=options.height,
+            mass=options.mass,
+            height_uncertainty=options.height_uncertainty,
+            mass_uncertainty=options.mass_uncertainty,
+            source=options.source,
+            channel=channel_of(options.channel),
+            unit=options.unit,
+            calibration=options.calibration,
+            calibration_uncertainty=options.calibration_uncertainty,
+            polarity=options.polarity,
+            sample_rate=options.sample_rate,
+            low_pass=options.low_pass or None,
+            config=options.config,
+            progress=not options.quiet and sys.stderr.isatty(),
+            workers=options.workers or len(os.sched_getaffinity(0)),
+            keep=kept,
+        )
+        verdict = recording.conformity()
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always", ReportWarning)
+            results.save(recording, folder, figures=not options.no_figures)
     if not options.quiet:
         rows = results.drop_table(recording)
         print(format_rows(rows[: SHOWN + 1]))

@@ -20,6 +20,7 @@ from thud.plot.compression import compression as compression
 from thud.plot.design_map import draw_design_map as draw_design_map
 from thud.plot.fit import draw_fit as draw_fit
 from thud.plot.floor import draw_floor as draw_floor
+from thud.plot.floor_mobilities import floor_mobilities as floor_mobilities
 from thud.plot.force_history import force_history as force_history
 from thud.plot.history import draw_history as draw_history
 from thud.plot.level_changes import level_changes as level_changes
@@ -38,6 +39,7 @@ from thud.plot.look import octave_axis as octave_axis
 from thud.plot.look import save as save
 from thud.plot.look import save_all as save_all
 from thud.plot.loss_factor import loss_factor as loss_factor
+from thud.plot.mobility_fit import mobility_fit as mobility_fit
 from thud.plot.modes import mode_shapes as mode_shapes
 from thud.plot.motion import animate as animate
 from thud.plot.motion import motion as motion

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud._schema import Plate
+from thud.errors import InputError
+from thud.floors.modal_room import ModalRoom, modal_room
 from thud.plot.look import COLOURS, GREY, SIZE, band_axis, empty_axes, legend_above
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.floors.modal_room import ModalRoom
+    from thud.impact import Impact
 
 
 def draw_modal_room(found: ModalRoom) -> Figure:
@@ -36,3 +39,16 @@ def draw_modal_room(found: ModalRoom) -> Figure:
     axes.set_ylabel("Maximum Fast level,\ndB re 20 µPa", fontsize=SIZE)
     legend_above(axes)
     return figure
+
+
+def _draw_positions(impact: Impact) -> Figure | None:
+    """Draw the levels of positions below the plate of a case."""
+    if not isinstance(impact.case.floor, Plate) or impact.case.room is None:
+        return None
+    try:
+        return draw_modal_room(modal_room(impact, balls=8, microphones=16))
+    except InputError:  # too many modes, or none: the statistical answer stands alone
+        return None
+
+
+IMPACT_FIGURES = {"room_positions": _draw_positions}

@@ -18,12 +18,15 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud._schema import BandSet
+    from thud.recordings.estimates import Drop
     from thud.recordings.recording import Recording
 
 # Height without the legend, inch: two of them stand side by side on a report.
 HEIGHT = 2.15
 # Maximum number of drops that have a line each; of more, their range is filled.
 MAX_LINES = 40
+# Force on both sides of the times that are drawn, s: more than its low-pass spreads.
+ROOM = 2e-2
 # Points of a force.
 POINTS = 400
 # Backgrounds further below the lowest level than this, dB, are not drawn: they change nothing.
@@ -46,12 +49,7 @@ def recording_forces(recording: Recording) -> Figure:
     longest = max(drop.contact_time.value for drop in recording.drops)
     longest = max(longest, recording.contact_time, limits.upper if limits.upper < 1 else 0)
     time = longest * np.linspace(-MARGIN, 1 + MARGIN, POINTS)
-    forces = 1e-3 * np.array(
-        [
-            np.interp(time, drop.time, record_force(drop.force, drop.sample_rate))
-            for drop in recording.drops
-        ]
-    )
+    forces = 1e-3 * np.array([_recorded(drop, time) for drop in recording.drops])
     allowed = f"allowed release, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
     axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GREY, linewidth=0, label=allowed)
     _draw_drops(axes, 1e3 * time, forces, recording)
@@ -66,6 +64,16 @@ def recording_forces(recording: Recording) -> Figure:
     axes.set_ylabel("Force on the floor\nbelow 1.25 kHz, kN", fontsize=SIZE)
     legend_above(axes)
     return figure
+
+
+def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the force of a drop below 1.25 kHz, N, at times since first touch, s."""
+    ends = ((np.array([time[0] - ROOM, time[-1] + ROOM]) - drop.begin) * drop.sample_rate).astype(
+        int
+    )
+    first, stop = np.clip(ends, 0, len(drop.force))
+    force = record_force(drop.force[first:stop], drop.sample_rate)
+    return np.interp(time, drop.time[first:stop], force)
 
 
 def recording_figure(recording: Recording, what: str = "levels") -> Figure:

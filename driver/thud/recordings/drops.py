@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud.recordings.plate import Plate
     from thud.recordings.signal import Signal
 
 # Means over cells of this length, s, show pulses; a signal is searched in pieces of PIECE cells
@@ -75,6 +76,8 @@ class Window:
         The parts around the later bounces, in order.
     remarks : tuple of str
         Doubts about the pulse as a whole.
+    plate : Plate, optional
+        The plate whose resonance was taken out of the signal.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Window:
     contact: tuple[int, int]
     bounces: tuple[Window, ...] = ()
     remarks: tuple[str, ...] = ()
+    plate: Plate | None = None
 
     @property
     def sample_rate(self) -> float:
@@ -200,6 +204,9 @@ def _pulses(cells: NDArray[np.float64], first: int, rate: float) -> list[_Pulse]
         if top < behind:
             continue
         low, high = (_walk(level, top, step, level[top] / 2) for step in (-1, 1))
+        # Noise that runs into a pulse is none.
+        if level[low : high + 1].max() > level[top]:
+            continue
         if not DURATIONS[0] <= (high - low + 1) * width / rate <= DURATIONS[1]:
             continue
         # The quiet next to the pulse, which slow noise moves away from that of a second.

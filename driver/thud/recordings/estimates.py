@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.polynomial.legendre import leggauss
 
 from thud.checks import refuse
 from thud.levels import RECORDED_BAND, record_force
+from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
@@ -37,6 +37,9 @@ TOP = 0.4
 NOTABLE_ERROR = 0.1
 # Least contact time over its uncertainty.
 MOST_DOUBT = 4.0
+# A pulse whose flight and whose peak, over those of the drop, differ by this factor is no bounce:
+# the force follows the velocity.
+UNLIKE = 3.0
 # Standard deviations that make a difference worth telling.
 NOTABLE = 3.0
 
@@ -49,8 +52,8 @@ class Drop:
     ----------
     name : str
         Name of the drop, as ``"file.wav, drop 3"``.
-    time : ndarray, shape (n,)
-        Time since first touch, s.
+    begin : float
+        Time of the first sample since first touch, s.
     force : ndarray, shape (n,)
         Force without offset, drift, hum and slow noise, N.
     sample_rate : float
@@ -61,7 +64,7 @@ class Drop:
         First sample of the contact with its margins, and the one behind it: levels are those of
         ``force[gate[0]:gate[1]]``.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
-        In s, 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+        In s (`thud.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN where not known.
     restitution_shared : dict of str to float
         Standard uncertainties that calibration, mass and drop height make of the restitution of
         all drops alike, beside that stated; signed.
@@ -72,14 +75,14 @@ class Drop:
     noise : Noise
         Noise of the quiet parts.
     bounces : tuple of float
-        Times of first touch of the later bounces that were measured since the onset, s: of one
+        Times at which the later bounces that were measured begin, since the onset, s: of one
         where the drop height is known, else of up to two.
     steps, remarks : tuple of str
         What was done to the signal, and what is doubtful; a sentence each.
     """
 
     name: str
-    time: NDArray[np.float64]
+    begin: float
     force: NDArray[np.float64]
     sample_rate: float
     onset: float
@@ -98,18 +101,11 @@ class Drop:
     remarks: tuple[str, ...]
     contact: Contact
 
-    def band_noise(self, lower: float, upper: float) -> tuple[float, float]:
-        """Return the expected energy of the noise of the gate in a band, and a deviation, N2 s.
-
-        The second is the standard deviation of the energy of the force when the first is subtracted
-        from what is measured (docs/recordings_theory.md, section 4).
-        """
-        value, covariance = self.band_values(lower, upper)
-        noise, squares = float(np.trace(covariance)), float((covariance**2).sum())
-        # The first term is too large by twice the second, on the mean.
-        variance = max(4 * float(value @ covariance @ value) - 2 * squares, 2 * squares)
-        density, doubt = self.contact.background.density((lower + upper) / 2)
-        return noise, math.sqrt(variance + (noise * doubt / density) ** 2)
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n,)."""
+        time: NDArray[np.float64] = self.begin + np.arange(len(self.force)) / self.sample_rate
+        return time
 
     def band_values(
         self, lower: float, upper: float
@@ -118,14 +114,8 @@ class Drop:
 
         Linear functionals of the force, [n], and the covariance of the noise in them, [n, n].
         """
-        first, stop = self.gate
-        force, time = self.force[first:stop], self.time[first:stop]
-        # A record of this length has about time times band width degrees of freedom in the band.
-        nodes, weights = leggauss(12 + int(2 * (upper - lower) * (time[-1] - time[0])))
-        frequency = (lower + upper) / 2 + (upper - lower) / 2 * nodes
-        phase = 2 * np.pi * frequency[:, None] * time
-        scale = np.sqrt((upper - lower) * weights)[:, None] / self.sample_rate
-        functionals = np.concatenate([scale * np.cos(phase), scale * np.sin(phase)])
+        force = self.force[slice(*self.gate)]
+        functionals = band_functionals(len(force), self.sample_rate, lower, upper)
         return functionals @ force, self.contact.covariance_of(functionals)
 
 
@@ -171,10 +161,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     rate = window.sample_rate
     # The flight behind the drop gives the restitution; without the height two flights are compared.
     landings = _landings(window, contact, 1 if height else 2)
-    touch, release = contact.touch, contact.release
-    contact_time = Estimate(
-        release.value - touch.value, math.hypot(release.uncertainty, touch.uncertainty)
-    )
+    contact_time = _between(contact.begin, contact.end)
     if not contact_time.value > MOST_DOUBT * contact_time.uncertainty:
         refuse(
             f"{window.name}: the contact cannot be told from the noise: "
@@ -183,28 +170,33 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
             f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
         )
     impulse = _impulse(contact)
-    flights = []
-    leaving = release
-    for landing, again in landings:
-        flights.append(
-            Estimate(
-                landing.value - leaving.value, math.hypot(landing.uncertainty, leaving.uncertainty)
-            )
-        )
-        leaving = again
     fall = Fall(
         height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty, gravity
     )
+    if height and landings:
+        flight = _between(contact.end, landings[0][0]).value
+        peak = _peak_of(window.bounces[0]) / contact.peak
+        if not peak / UNLIKE < gravity * flight / (2 * fall.speed) < peak * UNLIKE:
+            landings = []
+            unlike = (
+                f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: "
+                f"it is no bounce from {height:g} m"
+            )
+            remarks += (unlike,)
+    flights = []
+    leaving = contact.end
+    for landing, again in landings:
+        flights.append(_between(leaving, landing))
+        leaving = again
     ways, told = fall.restitutions(impulse, contact_time, flights)
     restitution, shared = fall.mean(ways, impulse)
-    time = (np.arange(*contact.span)) / rate - touch.value
     first, stop = (place - contact.span[0] for place in contact.gate)
     return Drop(
         name=window.name,
-        time=time,
+        begin=contact.span[0] / rate - contact.touch.value,
         force=contact.force,
         sample_rate=rate,
-        onset=window.start / rate + touch.value,
+        onset=window.start / rate + contact.touch.value,
         gate=(first, stop),
         contact_time=contact_time,
         restitution=restitution,
@@ -215,30 +207,41 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         impulse=impulse,
         effective_mass=fall.effective_mass(impulse, contact_time, ways.get("bounces")),
         noise=_noise(contact),
-        bounces=tuple(landing.value - touch.value for landing, _ in landings),
+        bounces=tuple(landing.value - contact.touch.value for landing, _ in landings),
         steps=steps,
         remarks=(*window.remarks, *remarks, *_told_aliased(contact), *told),
         contact=contact,
     )
 
 
+def _between(first: Estimate, last: Estimate) -> Estimate:
+    """Return the time between two times, s."""
+    return Estimate(last.value - first.value, math.hypot(last.uncertainty, first.uncertainty))
+
+
 def _landings(window: Window, drop: Contact, count: int) -> list[tuple[Estimate, Estimate]]:
-    """Return first touch and release of the first bounces, s from the start of the window."""
+    """Return begin and end of the first bounces, s from the start of the window."""
     found = []
     for bounce in window.bounces[:count]:
         first, stop = bounce.contact
         least = least_quiet(bounce.sample_rate)
         if first < least or len(bounce.force) - stop < least:
             break
-        touch, release = find_edges(bounce, drop.background)
         late = (bounce.start - window.start) / window.sample_rate
-        found.append(
-            (
-                Estimate(late + touch.value, touch.uncertainty),
-                Estimate(late + release.value, release.uncertainty),
-            )
+        begin, end = (
+            Estimate(late + edge.value, edge.uncertainty)
+            for edge in find_edges(bounce, drop.background)
         )
+        found.append((begin, end))
     return found
+
+
+def _peak_of(window: Window) -> float:
+    """Return the maximum of a pulse above its quiet, N."""
+    first, stop = window.contact
+    force = window.force
+    quiet = np.concatenate([force[:first], force[stop:]])
+    return float(force[first:stop].max() - np.median(quiet))
 
 
 def _impulse(contact: Contact) -> Estimate:

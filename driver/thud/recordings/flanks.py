@@ -3,55 +3,106 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
+from scipy.special import ndtri
+from scipy.stats import qmc
+
+from thud.contact_time import AVERAGED, THRESHOLD, average_within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-# Prior of a flank over the peak force, t in ms since the touch: a jump, a t**n, a parabola, and a
-# walk between knots.
-KNOTS = np.array(
-    [0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0]
-)
-# Powers n, the mean of a, and its standard deviation: lines, and the soft feet of bodies that touch
-# in a point (Hertz: 3/2 of a sphere) and roll off.
+    from thud.recordings.plate import Plate
+
+# Shapes of a flank, t in ms since the touch: a jump, a jump that a filter spreads, t**n, a steep
+# rise 1 - exp(-t / STEEP), a parabola, and a walk between knots.
 POWERS = np.array([1.0, 1.5, 1.75])
-MEAN = np.array([0.16, 0.055, 0.045])
-SPREAD = np.array([0.08, 0.02, 0.015])
-PARABOLA = 0.06
-# The steps of the walk of smooth flanks and feet deviate from those of the power, with the mean of
-# a, by a part; the walk of rough flanks is random, its deviation grows with the root of time.
-# Classes: power, jump, jump that a filter spreads, part, or walk in 1 ms.
-CLASSES = (
-    (0, 0.0, 0.0, 0.15),
-    (0, 0.2, 0.0, 0.15),
-    (0, 0.0, 0.2, 0.15),
-    (1, 0.0, 0.0, 0.3),
-    (2, 0.0, 0.0, 0.3),
-    (0, 0.0, 0.0, 0.12),
-    (0, 0.0, 0.0, 0.5),
+STEEP = 0.6
+KNOTS = np.array([
+    0.0, 0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5, 4.0, 6.0,
+    9.0,
+])  # fmt: skip
+N_JUMP = 2
+N_MEAN = len(POWERS) + 1
+
+
+class _Kind(NamedTuple):
+    """A kind of flank: how its shapes are distributed, over the peak force.
+
+    Attributes
+    ----------
+    mean, spread : tuple of float
+        Means and standard deviations of powers and steep rise.
+    walk : float
+        Standard deviation of the steps of the walk: of smooth kinds as a part of the steps of the
+        mean flank, of rough ones after 1 ms.
+    likely : tuple of float
+        Probability at touch and at release: a body strikes with a jump and lets go softly.
+    left : tuple of float
+        What the shapes leave of first touch, of release, and of begin and end of the contact, s.
+    rough : bool
+        Whether the force may fall again.
+    jump, filtered, parabola : float
+        Standard deviations of the other shapes.
+    """
+
+    mean: tuple[float, float, float, float]
+    spread: tuple[float, float, float, float]
+    walk: float
+    likely: tuple[float, float]
+    left: tuple[float, float, float]
+    rough: bool = False
+    jump: float = 0.0
+    filtered: float = 0.0
+    parabola: float = 0.0
+
+
+# Lines, the soft feet of bodies that touch in a point (Hertz: 3/2 of a sphere) and roll off, flanks
+# that ripple, and those of bodies of which a part is stopped at once. Smooth kinds come first.
+_LINE = (0.16, 0.0, 0.0, 0.0), (0.08, 0.0, 0.0, 0.0)
+_SMOOTH, _FOOT, _ROUGH = (5e-6, 60e-6, 5e-6), (30e-6, 60e-6, 20e-6), (40e-6, 140e-6, 20e-6)
+KINDS = (
+    _Kind(*_LINE, 0.15, (0.25, 0.38), _SMOOTH, parabola=0.06),
+    _Kind(*_LINE, 0.15, (0.15, 0.01), _SMOOTH, parabola=0.06, jump=0.2),
+    _Kind(*_LINE, 0.15, (0.10, 0.01), _SMOOTH, parabola=0.06, filtered=0.2),
+    _Kind((0.0, 0.055, 0.0, 0.0), (0.0, 0.02, 0.0, 0.0), 0.3, (0.05, 0.2), _FOOT),
+    _Kind((0.0, 0.0, 0.045, 0.0), (0.0, 0.0, 0.015, 0.0), 0.3, (0.05, 0.2), _FOOT),
+    _Kind(*_LINE, 0.12, (0.15, 0.15), _ROUGH, rough=True, parabola=0.06),
+    _Kind(*_LINE, 0.5, (0.1, 0.05), _ROUGH, rough=True, parabola=0.06),
+    _Kind((0.08, 0.0, 0.0, 0.45), (0.05, 0.0, 0.0, 0.15), 0.2, (0.15, 0.0), _ROUGH, rough=True),
 )
-SMOOTH = 5
-# Their probabilities at touch and at release: a body strikes with a jump and lets go softly.
-PRIOR = np.array([
-    [0.25, 0.15, 0.1, 0.05, 0.05, 0.25, 0.15],
-    [0.38, 0.01, 0.01, 0.2, 0.2, 0.15, 0.05],
-])  # fmt: skip
-# What these shapes leave of the time, s: errors of the method over the models, by class.
-LEFT = 1e-6 * np.array([
-    [5.0, 5.0, 5.0, 30.0, 30.0, 40.0, 40.0],
-    [60.0, 60.0, 60.0, 60.0, 60.0, 140.0, 140.0],
-])  # fmt: skip
-# What these shapes miss of a flank, as part of the force itself: of smooth classes and of rough.
+N_SMOOTH = sum(not kind.rough for kind in KINDS)
+with np.errstate(divide="ignore"):
+    PRIOR = np.log([kind.likely for kind in KINDS])
+LEFT = np.array([kind.left for kind in KINDS])
+# What the shapes miss of a flank, as part of the force itself: of smooth kinds and of rough.
 MISSED = (0.005, 0.1)
+# The force is nowhere negative, and that of smooth kinds nowhere falls, by more than this part of
+# the peak; it reaches the threshold within FOOT_TIME ms, and as long after that has left its foot,
+# a part of the peak.
+FALL = 0.002
+FOOT = 0.03
+FOOT_TIME = 1.0
 # Times of one search, each within REACH standard deviations of the one before.
 N_TIME = 33
 REACH = 6.0
+# Draws of each kind of flank that has more than this part of the probability.
+N_DRAW = 128
+LEAST = 1e-6
 # Samples are smoothed by these weights, which take the ringing of an anti-aliasing filter.
 SMOOTHING = np.array([0.25, 0.5, 0.25])
+# Times at which the shapes are tabulated, ms: distance, and reach before and after the touch.
+TICK = 1e-3
+BEFORE = 2.0
+BEHIND = 13.0
+# Length on both sides of them that a filter of the shapes may wrap around, ms.
+GUARD = 4.0
+# Times after the touch at which draws are looked at, ms.
+DELAY = np.concatenate([np.linspace(0, 0.5, 51), np.linspace(0.55, 4, 70)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +123,8 @@ class Flank:
         Sampling interval, s.
     release : bool
         Whether this is the end of a pulse.
+    plate : Plate, optional
+        The plate whose resonance was taken out.
     """
 
     time: NDArray[np.float64]
@@ -80,102 +133,213 @@ class Flank:
     peak: float
     interval: float
     release: bool
+    plate: Plate | None = None
 
 
-def find_touch(flank: Flank, low: float, high: float, searches: int) -> tuple[float, float]:
-    """Return the time of first touch between two times, s, and its standard deviation.
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What a flank tells of its first touch.
 
-    The mean over the posterior of the time, all classes of flanks together.
+    Attributes
+    ----------
+    time : ndarray, shape (n_time,)
+        Even times of first touch, s.
+    weight : ndarray, shape (n_kind, n_time)
+        Their probabilities by kind of flank.
+    factors : ndarray, shape (n_kind, n_time, n_column, n_column)
+        Factors of the information on the shapes, the last row of which holds the data.
+    release : bool
+        Whether this is the end of a pulse.
     """
+
+    time: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    factors: NDArray[np.float64]
+    release: bool
+
+    def touch(self) -> tuple[float, float]:
+        """Return first touch, s, and its standard deviation, flanks of any sign allowed."""
+        mean, deviation = _moments(self.time, self.weight.sum(axis=0))
+        left = self.weight.sum(axis=1) @ LEFT[:, int(self.release)] ** 2
+        return mean, float(np.hypot(deviation, np.sqrt(left)))
+
+    def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Return first touch and begin of the contact, s, with their standard deviations.
+
+        From draws of kind, time and shape; flanks that no force has are left out.
+        """
+        total = self.weight.sum(axis=1)
+        kinds = np.nonzero(total > LEAST)[0]
+        kind = np.repeat(kinds, N_DRAW)
+        places = (np.arange(N_DRAW) + 0.5) / N_DRAW
+        at = np.ravel([np.searchsorted(self.weight[k].cumsum(), places * total[k]) for k in kinds])
+        touch = self.time[np.minimum(at, len(self.time) - 1)]
+        path = self._paths(kind, np.minimum(at, len(self.time) - 1))
+        highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
+        delay = _crossing(path, THRESHOLD)
+        fast = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
+        chance = total[kind] * ((highest - path).max(axis=1) <= FALL) * fast
+        if not chance.any():
+            chance = total[kind]
+        chance /= chance.sum()
+        jumps = chance @ (delay == 0)
+        results = []
+        for value, cell, left in (
+            (touch, self._cell, LEFT[kind, int(self.release)]),
+            (touch + 1e-3 * delay, self._cell * jumps, LEFT[kind, 2]),
+        ):
+            mean = float(chance @ value)
+            results.append((mean, float(np.sqrt(chance @ ((value - mean) ** 2 + left**2) + cell))))
+        return results[0], results[1]
+
+    @property
+    def _cell(self) -> float:
+        """Variance of a time within its cell, s2."""
+        return float((self.time[1] - self.time[0]) ** 2 / 12)
+
+    def _paths(self, kind: NDArray[np.intp], at: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Return draws of the averaged force over the peak: [n, n_delay]."""
+        lower = self.factors[kind, at]
+        normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(kind) // N_DRAW, 1))
+        right = (lower[:, -1, :-1] + normal)[..., None]
+        units = np.linalg.solve(lower[:, :-1, :-1].swapaxes(1, 2), right)[..., 0]
+        shapes = units * SPREADS[kind] + MEANS[kind]
+        return np.asarray(shapes @ PATHS.T, dtype=np.float64)
+
+
+def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
+    """Return what a flank tells of its first touch, which lies between two times, s."""
     level = flank.force / flank.peak
     groups = []
-    for part, classes in zip(MISSED, (range(SMOOTH), range(SMOOTH, len(CLASSES))), strict=True):
+    for part, kinds in zip(MISSED, (slice(N_SMOOTH), slice(N_SMOOTH, None)), strict=True):
         covariance = flank.covariance / flank.peak**2 + np.diag((part * level) ** 2)
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
-        value = solve_triangular(factor, level, lower=True, check_finite=False)
-        size = float(np.log(np.diagonal(factor)).sum())
-        groups.append((factor, value, size, classes))
-    mean, deviation, left = (low + high) / 2, (high - low) / 2, 0.0
-    for _ in range(searches):
+        inverse = solve_triangular(factor, np.eye(len(level)), lower=True, check_finite=False)
+        groups.append((inverse, kinds))
+    table = _table(1e3 * flank.interval, flank.plate)
+    prior = PRIOR[:, int(flank.release), None]
+    for search in range(searches):
         time = np.linspace(low, high, N_TIME)
-        shape = _columns(1e3 * (flank.time - time[:, None]), 1e3 * flank.interval)
-        logarithm = np.concatenate([_evidence(shape, *group) for group in groups])
-        logarithm += np.log(PRIOR[int(flank.release)])[:, None]
+        columns = _columns(table, 1e3 * (flank.time - time[:, None]), level)
+        found = [_evidence(columns, *group) for group in groups]
+        logarithm = np.concatenate([one for one, _ in found]) + prior
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
-        mean = float(weight.sum(0) @ time)
-        deviation = float(
-            np.sqrt(weight.sum(0) @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12)
+        posterior = Posterior(
+            time, weight, np.concatenate([one for _, one in found]), flank.release
         )
-        left = float(weight.sum(1) @ LEFT[int(flank.release)] ** 2)
+        mean, deviation = _moments(time, weight.sum(axis=0))
         reach = REACH * deviation
-        if mean - reach <= low and mean + reach >= high:
+        if search + 1 == searches or (mean - reach <= low and mean + reach >= high):
             break
         low, high = max(low, mean - reach), min(high, mean + reach)
-    return mean, float(np.hypot(deviation, np.sqrt(left)))
+    return posterior
+
+
+def _moments(time: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[float, float]:
+    """Return mean and standard deviation of even times with weights."""
+    mean = float(weight @ time)
+    return mean, float(np.sqrt(weight @ (time - mean) ** 2 + (time[1] - time[0]) ** 2 / 12))
 
 
 def _evidence(
-    shape: NDArray[np.float64],
-    factor: NDArray[np.float64],
-    value: NDArray[np.float64],
-    size: float,
-    classes: range,
-) -> NDArray[np.float64]:
-    """Return the logarithm of the likelihood of times of first touch: [n_class, n_time].
+    columns: NDArray[np.float64], inverse: NDArray[np.float64], kinds: slice
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return logarithms of the likelihood by kind and time, and factors of the information.
 
-    Shapes: [n_time, n_cell, n_column]; the factor and the logarithm of the determinant's root are
-    those of the covariance of the noise, and the value is the whitened force.
+    Columns: [n_time, n_cell, n_column], the last the force; the inverse of the factor of the
+    covariance of the noise whitens them. With D of the spreads, the information on shapes X of unit
+    deviation and the force y less its mean is [X y]'[X y] + diag(1, ..., 1, 0), and the last
+    diagonal element of its factor the root of the sum of squares that the shapes leave.
     """
-    n_time, n_cell, n_column = shape.shape
-    flat = np.moveaxis(shape, 1, 0).reshape(n_cell, -1)
-    white = solve_triangular(factor, flat, lower=True, check_finite=False)
-    white = np.moveaxis(white.reshape(n_cell, n_time, n_column), 0, 1)
-    gram = np.swapaxes(white, 1, 2) @ white
-    result = np.empty((len(classes), n_time))
-    for row, k in enumerate(classes):
-        power = CLASSES[k][0]
-        spread = SPREADS[k]
-        used = spread > 0
-        spread = spread[used]
-        rest = value - MEAN[power] * white[:, :, 2 + power]
-        inner = gram[:, used][:, :, used] * spread[:, None] * spread + np.eye(len(spread))
-        right = (white[:, :, used] * spread).swapaxes(1, 2) @ rest[..., None]
-        lower = np.linalg.cholesky(inner)
-        solved = np.linalg.solve(lower, right)
-        fit = (rest**2).sum(1) - (solved**2).sum((1, 2))
-        spreads = np.log(np.diagonal(lower, axis1=1, axis2=2)).sum(1)
-        result[row] = -0.5 * fit - spreads - size
+    n_time, n_cell, n_column = columns.shape
+    flat = np.moveaxis(columns, 1, 0).reshape(n_cell, -1)
+    white = (inverse @ flat).reshape(n_cell, n_time, n_column).transpose(1, 2, 0)
+    turns = TURNS[kinds, None]
+    information = turns.swapaxes(2, 3) @ (white @ white.swapaxes(1, 2)) @ turns
+    shapes = np.arange(n_column - 1)
+    information[..., shapes, shapes] += 1
+    factors = np.asarray(np.linalg.cholesky(information), dtype=np.float64)
+    diagonal = np.diagonal(factors, axis1=2, axis2=3)
+    size = np.log(np.diagonal(inverse)).sum()
+    return size - 0.5 * diagonal[..., -1] ** 2 - np.log(diagonal[..., :-1]).sum(axis=-1), factors
+
+
+def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:
+    """Return the delays at which paths first reach a level, ms; the last where one does not."""
+    above = path >= level
+    rows = np.arange(len(path))
+    first = np.where(above.any(axis=1), np.argmax(above, axis=1), len(DELAY) - 1)
+    before = np.maximum(first - 1, 0)
+    rise = path[rows, first] - path[rows, before]
+    part = np.where(rise > 0, (level - path[rows, before]) / np.where(rise > 0, rise, 1), 1)
+    found = DELAY[before] + np.clip(part, 0, 1) * (DELAY[first] - DELAY[before])
+    return np.asarray(found, dtype=np.float64)
+
+
+@cache
+def _normal_draws(count: int) -> NDArray[np.float64]:
+    """Return normal draws: [N_DRAW, count]."""
+    points = qmc.Sobol(count, seed=0).random(N_DRAW)
+    # Their order must not follow that of the times.
+    return np.asarray(np.random.default_rng(0).permutation(ndtri(points)))
+
+
+@cache
+def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
+    """Return the smoothed shapes of a flank at ticks around the touch: [n_tick, n_column]."""
+    ticks = np.arange(-round((BEFORE + GUARD) / TICK), round((BEHIND + GUARD) / TICK))
+    tau = np.asarray(TICK * ticks, dtype=np.float64)
+    total = np.zeros((len(tau), SPREADS.shape[1]))
+    for weight, shift in zip(SMOOTHING, (-1, 0, 1), strict=True):
+        total += weight * _shapes(tau + shift * interval, interval)
+    if plate is not None:
+        frequency = np.asarray(np.fft.rfftfreq(len(tau), 1e-3 * TICK), dtype=np.float64)
+        spectrum = np.fft.rfft(total, axis=0) * plate.passed(frequency)[:, None]
+        total = np.fft.irfft(spectrum, len(tau), axis=0)
+    guard = round(GUARD / TICK)
+    return total[guard:-guard]
+
+
+def _columns(
+    table: NDArray[np.float64], tau: NDArray[np.float64], level: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the shapes at times since the touch, ms, and the force: [n_time, n_cell, n_column]."""
+    place = np.rint(tau / TICK).astype(int) + round(BEFORE / TICK)
+    result = np.empty((*tau.shape, table.shape[1] + 1))
+    result[..., :-1] = table[np.clip(place, 0, len(table) - 1)]
+    result[..., -1] = level
     return result
 
 
-def _spread(k: int) -> NDArray[np.float64]:
-    """Return the standard deviations of the shapes of a class, [n_column]."""
-    power, jump, filtered, walk = CLASSES[k]
-    powers = np.where(np.arange(len(POWERS)) == power, SPREAD, 0.0)
-    steps = MEAN[power] * np.diff(KNOTS ** POWERS[power]) if k < SMOOTH else np.sqrt(np.diff(KNOTS))
-    parabola = PARABOLA if power == 0 else 0.0
-    return np.array([jump, filtered, *powers, parabola, *(walk * steps)])
-
-
-SPREADS = np.array([_spread(k) for k in range(len(CLASSES))])
-
-
-def _columns(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
-    """Return the smoothed shapes of a flank at times since the touch, ms: [..., n_column]."""
-    parts = [
-        weight * _shapes(tau + shift * interval, interval)
-        for weight, shift in zip(SMOOTHING, (-1, 0, 1), strict=True)
-    ]
-    total: NDArray[np.float64] = parts[0] + parts[1] + parts[2]
-    return total
-
-
 def _shapes(tau: NDArray[np.float64], interval: float) -> NDArray[np.float64]:
-    """Return the shapes of a flank: jump, jump that a filter spreads, powers, parabola, walk."""
-    after = np.maximum(tau, 0)
-    filtered = np.clip(tau / interval + 0.5, 0, 1)
-    walk = np.clip((tau[..., None] - KNOTS[:-1]) / np.diff(KNOTS), 0, 1)
-    powers = after[..., None] ** POWERS
-    rest = np.stack([tau >= 0, filtered], axis=-1), powers, after[..., None] ** 2 / 2
-    return np.concatenate([*rest, walk], axis=-1)
+    """Return the shapes of a flank at times since the touch, ms: [n_time, n_column]."""
+    after = np.maximum(tau, 0)[:, None]
+    filtered = np.clip(tau / interval + 0.5, 0, 1) if interval else tau >= 0
+    walk = np.clip((tau[:, None] - KNOTS[:-1]) / np.diff(KNOTS), 0, 1)
+    jumps = np.stack([tau >= 0, filtered], axis=1)
+    return np.hstack([jumps, after**POWERS, 1 - np.exp(-after / STEEP), after**2 / 2, walk])
+
+
+def _spread(kind: _Kind) -> NDArray[np.float64]:
+    """Return the standard deviations of the shapes of a kind: [n_column]."""
+    mean = _shapes(KNOTS, 0)[:, N_JUMP : N_JUMP + N_MEAN] @ kind.mean
+    steps = np.sqrt(np.diff(KNOTS)) if kind.rough else np.diff(mean)
+    return np.array([kind.jump, kind.filtered, *kind.spread, kind.parabola, *(kind.walk * steps)])
+
+
+def _paths() -> NDArray[np.float64]:
+    """Return the averaged shapes at the delays: [n_delay, n_column]."""
+    time = np.arange(0, DELAY[-1] + 1, 2 * TICK)
+    return average_within(_shapes(time, 0), time, DELAY, 1e3 * AVERAGED)
+
+
+SPREADS = np.array([_spread(kind) for kind in KINDS])
+MEANS = np.zeros_like(SPREADS)
+MEANS[:, N_JUMP : N_JUMP + N_MEAN] = [kind.mean for kind in KINDS]
+# From shapes and force to shapes of unit deviation and the force less its mean, by kind.
+TURNS = np.zeros((len(KINDS), SPREADS.shape[1] + 1, SPREADS.shape[1] + 1))
+TURNS[:, np.arange(SPREADS.shape[1]), np.arange(SPREADS.shape[1])] = SPREADS
+TURNS[:, :-1, -1] = -MEANS
+TURNS[:, -1, -1] = 1
+PATHS = _paths()

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from thud._api import version
+from thud.errors import InputError
 from thud.files import replace_file
 from thud.recordings.estimates import Drop
 
@@ -35,7 +36,7 @@ class KeptDrops:
 
     Each file holds drops of one signal and one configuration, named by their digest. At the end
     those that were opened are removed, and so is the directory if it is empty; they stay where the
-    process is interrupted or killed.
+    process is interrupted or killed, or fails for another reason than its input.
 
     Parameters
     ----------
@@ -60,11 +61,12 @@ class KeptDrops:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Remove the files, or add what is not written yet after an interrupt."""
+        """Remove the files, or add what is not written yet where the same call may succeed."""
         if self.folder is None:
             return
-        if kind is not None and not issubclass(kind, Exception):
-            self._write()
+        if kind is not None and not issubclass(kind, InputError):
+            with suppress(OSError):
+                self._write()
             return
         # Those of other signals belong to another measurement.
         files = [p for one in self._digests for p in self._files(one)]

@@ -10,6 +10,7 @@ import numpy as np
 
 from thud.checks import refuse, require_choice
 from thud.levels import force_exposure_levels, get_bands
+from thud.recordings.band_noise import band_noise
 from thud.recordings.bank import filter_levels
 from thud.recordings.low_pass import attenuation, low_pass_force
 from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
@@ -112,18 +113,22 @@ class AverageLevels:
 
 
 def measure_levels(
-    drop: Drop, bands: BandSet = "octave", method: str = "exact", *, low_pass: bool = False
-) -> LevelEstimate:
-    """Return the levels of a drop, corrected for the background, with their uncertainty.
+    drops: Sequence[Drop],
+    bands: BandSet = "octave",
+    method: str = "exact",
+    *,
+    low_pass: bool = False,
+) -> list[LevelEstimate]:
+    """Return the levels of drops, corrected for the background, with their uncertainty.
 
-    The force within the gate of the drop is taken; outside, it is zero. All methods read this
+    The force within the gate of each drop is taken; outside, it is zero. All methods read this
     force: ``"exact"`` its band energy, ``"fft"`` the 1 Hz bins of a window of 1 s, ``"filter"`` the
     energy behind filters of class 1. The expected energy of the noise is subtracted.
 
     Parameters
     ----------
-    drop
-        Drop of a recording.
+    drops
+        Drops of recordings.
     bands
         ``"octave"`` or ``"third"``.
     method
@@ -137,14 +142,24 @@ def measure_levels(
         Where the method or the bands are not known.
     """
     require_choice("method", method, METHODS)
+    noise = band_noise(drops, get_bands(bands))
+    return [
+        _drop_levels(drop, bands, method, one, low_pass=low_pass)
+        for drop, one in zip(drops, noise, strict=True)
+    ]
+
+
+def _drop_levels(
+    drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64], *, low_pass: bool
+) -> LevelEstimate:
+    """Return the levels of a drop from the energies of its noise, [n_band, 2]."""
     force, steps = _gated(drop, low_pass=low_pass)
     rate, edges = drop.sample_rate, get_bands(bands)
     exact = _levels(force, rate, bands, "exact")
     measured = exact if method == "exact" else _levels(force, rate, bands, method)
-    bounds = zip(edges.lower, edges.upper, strict=True)
-    noise, deviation = np.array([drop.band_noise(*bound) for bound in bounds]).T
+    expected, deviation = noise.T
     with np.errstate(divide="ignore"):
-        background = 10 * np.log10(noise)
+        background = 10 * np.log10(expected)
     level, flag = _corrected(measured, background)
     contributions = {
         "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),

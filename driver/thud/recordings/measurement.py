@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from concurrent.futures import BrokenExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -17,22 +16,24 @@ from thud.checks import refuse
 from thud.errors import NumericalError
 from thud.processes import no_interrupt_in_processes, process_pool
 from thud.recordings.drops import find_windows
-from thud.recordings.estimates import Estimate, measure_drop
+from thud.recordings.estimates import measure_drop
 from thud.recordings.kept import KeptDrops
-from thud.recordings.plate import REACH
 from thud.recordings.plate_correction import correct_window
+from thud.recordings.ringing import tell_ringing
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable, Iterable, Iterator, Sequence
+    from concurrent.futures import ProcessPoolExecutor
 
     from thud.recordings.config import Config
     from thud.recordings.drops import Window
     from thud.recordings.estimates import Drop
     from thud.recordings.signal import Signal
 
-# Drops that are worth a process of their own, which takes about two seconds to start.
-WORTH = 20
+# Drops, and seconds of a signal, that are worth processes, which take a second to start.
+WORTH = 40
+LONG = 600.0
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ def measure_signals(
     *,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | None = None,
+    keep: str | os.PathLike[str] | KeptDrops | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
@@ -99,13 +100,16 @@ def measure_signals(
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     # Its many small products are slower by threads.
-    with threadpool_limits(1, "blas"), KeptDrops(keep) as kept:
+    keeping = nullcontext(keep) if isinstance(keep, KeptDrops) else KeptDrops(keep)
+    with _one_thread(), keeping as kept, _Processes(workers) as processes:
         for given in signals:
             signal = given
             if config.calibration_uncertainty is not None:
                 signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
+            # They start while the signal is searched.
+            processes.start(worth=signal.path and signal.n_sample > LONG * signal.sample_rate)
             windows = find_windows(signal, progress=progress)
-            drops += _measure(windows, config, kept, progress=progress, workers=workers)
+            drops += _measure(windows, config, kept, processes, progress=progress)
             uncertainties.append(signal.calibration_uncertainty)
             origins.append(Origin.of(signal, len(windows)))
     if not drops:
@@ -116,21 +120,25 @@ def measure_signals(
 
 
 def _measure(
-    windows: Sequence[Window], config: Config, kept: KeptDrops, *, progress: bool, workers: int
+    windows: Sequence[Window],
+    config: Config,
+    kept: KeptDrops,
+    processes: _Processes,
+    *,
+    progress: bool,
 ) -> list[Drop]:
     """Return the drops in the windows of one signal, those that are kept among them."""
     signal = windows[0].signal
     found = kept.open(signal, config)
     left = [window for window in windows if window.start not in found]
     # An array would go to the processes with each of its windows.
-    width = min(workers, len(left) // WORTH) if signal.path else 1
-    with (
-        tqdm(
-            total=len(windows), initial=len(windows) - len(left), unit="drop", desc=signal.name,
-            disable=not progress,
-        ) as bar,
-        _calls(partial(measure_window, config=config), left, width) as results,
-    ):  # fmt: skip
+    processes.start(worth=signal.path and len(left) >= WORTH)
+    call = partial(measure_window, config=config)
+    results = processes.map(call, left) if signal.path else map(call, left)
+    with tqdm(
+        total=len(windows), initial=len(windows) - len(left), unit="drop", desc=signal.name,
+        disable=not progress,
+    ) as bar:  # fmt: skip
         for window, drop in zip(left, results, strict=True):
             kept.add(window.start, drop)
             found[window.start] = drop
@@ -138,20 +146,33 @@ def _measure(
     return [found[window.start] for window in windows]
 
 
-@contextmanager
-def _calls(
-    measure: Callable[[Window], Drop], windows: Sequence[Window], width: int
-) -> Iterator[Iterator[Drop]]:
-    """Yield the results of calls in order, of more than one process where the width is larger."""
-    if width <= 1:
-        yield map(measure, windows)
-        return
-    with process_pool(width, partial(threadpool_limits, 1, "blas")) as pool:
+class _Processes(ExitStack):
+    """Processes that measure drops, started where that is worth it; a context manager."""
+
+    def __init__(self, workers: int) -> None:
+        super().__init__()
+        self.workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+
+    def start(self, *, worth: object) -> None:
+        """Start the processes where it is worth it, and wait for nothing."""
+        if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - one is this process
+            return
+        self._pool = self.enter_context(process_pool(self.workers, _one_thread))
         with no_interrupt_in_processes():
-            calls = deque(pool.submit(measure, window) for window in windows)
+            for _ in range(self.workers):
+                self._pool.submit(int)
+
+    def map(self, call: Callable[[Window], Drop], windows: Sequence[Window]) -> Iterator[Drop]:
+        """Yield the results of calls in order, here where no processes were started."""
+        if not self._pool:
+            yield from map(call, windows)
+            return
+        calls = deque(self._pool.submit(call, window) for window in windows)
         try:
-            # What was taken is dropped, so that it is not held twice.
-            yield (calls.popleft().result() for _ in windows)
+            while calls:
+                # What was taken is dropped, so that it is not held twice.
+                yield calls.popleft().result()
         except BrokenExecutor as error:
             message = (
                 f"{windows[0].signal.name}: a process that measured drops has died; allowed: "
@@ -159,8 +180,13 @@ def _calls(
             )
             raise NumericalError(message) from error
         finally:
-            for call in calls:
-                call.cancel()
+            for one in calls:
+                one.cancel()
+
+
+def _one_thread() -> threadpool_limits:
+    """Limit matrix products to one thread: also those of SciPy, which this module loads."""
+    return threadpool_limits(1, "blas")
 
 
 def measure_window(window: Window, config: Config) -> Drop:
@@ -179,15 +205,8 @@ def measure_window(window: Window, config: Config) -> Drop:
     )
     # Factors that the background has cached serve the fit alone, and are larger than all else.
     contact = replace(drop.contact, background=replace(drop.contact.background))
-    drop = replace(drop, contact=contact)
+    ringing = tell_ringing(contact, plate)
+    drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
     if plate is None:
         return drop
-    time = drop.contact_time
-    # The correction ends at its reach: an edge is spread over half a period of that.
-    spread = 1 / (2 * REACH * plate.resonance)
-    return replace(
-        drop,
-        contact_time=Estimate(time.value, math.hypot(time.uncertainty, spread)),
-        steps=(*steps, *drop.steps),
-        remarks=(*remarks, *drop.remarks),
-    )
+    return replace(drop, steps=(*steps, *drop.steps), remarks=(*remarks, *drop.remarks))

@@ -99,19 +99,23 @@ def noise_covariances(one: Cells, other: Cells) -> NDArray[np.float64]:
     sign = np.array([1, -1, -1, 1]) / ((b - a) * (d - c))[:, None]
     pink[near] = (sign * (size**2 * (0.75 - 0.5 * np.log(size))).T).sum(1)
     brown[near] = (sign * (-(np.pi**2) / 6 * size**3).T).sum(1)
-    hum = [_waves(one, mains) @ _waves(other, mains).T for mains in MAINS]
+    waves = _waves(one)
+    hum = waves @ (waves if other is one else _waves(other)).swapaxes(1, 2)
     return np.array([pink, brown, *hum])
 
 
-def _waves(cells: Cells, mains: float) -> NDArray[np.float64]:
-    """Return means of the waves of hum over cells; two frequencies stand for an uncertain one."""
+def _waves(cells: Cells) -> NDArray[np.float64]:
+    """Return means of the waves of each hum over cells; two frequencies stand for an uncertain one.
+
+    Shape (n_mains, n_cell, n_wave).
+    """
     middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
     order = np.arange(1, N_HARMONIC + 1)
-    frequency = np.multiply.outer(order, mains + np.array([-MAINS_DEVIATION, MAINS_DEVIATION]))
-    weight = np.sqrt(0.5) / order[:, None] * np.sinc(frequency * width[:, None, None])
-    phase = 2 * np.pi * frequency * middle[:, None, None]
-    waves = np.stack([weight * np.cos(phase), weight * np.sin(phase)], axis=-1)
-    return waves.reshape(len(middle), -1)
+    near = np.add.outer(MAINS, [-MAINS_DEVIATION, MAINS_DEVIATION])
+    frequency = (near[:, None] * order[:, None]).reshape(len(MAINS), 1, -1)
+    weight = np.repeat(np.sqrt(0.5) / order, 2) * np.sinc(frequency * width[:, None])
+    phase = 2 * np.pi * frequency * middle[:, None]
+    return np.concatenate([weight * np.cos(phase), weight * np.sin(phase)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +177,7 @@ class Background:
         means = np.empty((len(self.draws), len(cells[0])))
         for k, (draw, factor) in enumerate(zip(self.draws, self._factors, strict=True)):
             one = np.tensordot(draw[1:], across, 1) + trend
-            half = solve_triangular(factor, one, lower=True, check_finite=False)
+            half = _solve_lower(factor, one)
             means[k] = self._weights[k] @ one
             total -= half.T @ half / len(self.draws)
         mean = means.mean(axis=0)
@@ -193,10 +197,7 @@ class Background:
         """Drift, N/s, and its standard deviation."""
         prior = (self.peak * DRIFT) ** 2
         middle = (self.quiet[0] + self.quiet[1]) / 2
-        known = [
-            float(np.sum(solve_triangular(factor, middle, lower=True, check_finite=False) ** 2))
-            for factor in self._factors
-        ]
+        known = [float(np.sum(_solve_lower(factor, middle) ** 2)) for factor in self._factors]
         values = prior * np.array([middle @ weights for weights in self._weights])
         variance = max(prior - prior**2 * float(np.mean(known)), 0.0) + float(values.var())
         return float(values.mean()), float(np.sqrt(variance))
@@ -205,7 +206,7 @@ class Background:
     def hum(self) -> tuple[float, float, float]:
         """Frequency of the stronger hum, Hz, its amplitude and the deviation of that, N."""
         k = int(np.argmax(self.variances[3:]))
-        waves = _waves(self.quiet, MAINS[k])
+        waves = _waves(self.quiet)[k]
         part = (
             waves
             @ waves.T
@@ -215,6 +216,11 @@ class Background:
         )
         noise = np.mean(self.variances[0] / 2 / (self.quiet[1] - self.quiet[0]))
         return MAINS[k], float(np.sqrt(2 * np.mean(part**2))), float(np.sqrt(2 * noise / len(part)))
+
+
+def _solve_lower(factor: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the solution for a lower factor; the checks of SciPy's own would take longer."""
+    return np.asarray(lapack.dtrtrs(factor, right, lower=True)[0])
 
 
 def _trend(one: Cells, other: Cells, peak: float) -> NDArray[np.float64]:
@@ -277,7 +283,7 @@ class _Posterior:
         factor, failed = lapack.dpotrf(np.tensordot(theta, self.parts, 1) + self.fixed, lower=True)
         if failed:
             return -np.inf
-        white = solve_triangular(factor, self.mean, lower=True, check_finite=False)
+        white = _solve_lower(factor, self.mean)
         value = -np.log(np.diagonal(factor)).sum() - 0.5 * white @ white
         return float(value + SLOPE @ phi - np.log1p(theta / self.large).sum())
 

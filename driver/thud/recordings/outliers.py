@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -17,6 +16,8 @@ if TYPE_CHECKING:
 
 # Probability that any of several drops that differ by chance is marked.
 SIGNIFICANCE = 0.05
+# Expanded uncertainty of 95 % over the standard one.
+EXPANDED = 1.96
 # Deviation, in the unit of the values, that is rounding and marks no drop.
 ROUNDING = 1e-9
 
@@ -77,7 +78,7 @@ def find_outliers(
     """
     data = np.asarray(values, dtype=np.float64)
     own = np.zeros(data.shape) if uncertainty is None else np.nan_to_num(uncertainty)
-    rest = [int(i) for i in np.flatnonzero(np.isfinite(data))]
+    rest = np.flatnonzero(np.isfinite(data))
     removed: list[Outlier] = []
     last = 0
     for step in range(max(1, len(rest) // 5)):
@@ -85,16 +86,16 @@ def find_outliers(
         if count < 3:  # noqa: PLR2004 - two values lie at the same distance of their mean
             break
         mean, deviation = data[rest].mean(), data[rest].std(ddof=1)
-        worst = max(rest, key=lambda i: abs(data[i] - mean))
+        worst = int(rest[np.argmax(np.abs(data[rest] - mean))])
         distance = abs(data[worst] - mean)
         if distance <= ROUNDING:
             break
-        quantile = student.ppf(1 - significance / (2 * count), count - 2)
+        quantile = stdtrit(count - 2, 1 - significance / (2 * count))
         critical = (count - 1) / math.sqrt(count) * quantile / math.sqrt(count - 2 + quantile**2)
         score = distance / deviation
         removed.append(Outlier(names[worst], quantity, float(data[worst]), score, critical))
-        rest.remove(worst)
+        rest = rest[rest != worst]
         # Rosner: all up to the last that exceeds its critical value are outliers.
-        if score > critical and distance > norm.ppf(0.975) * own[worst]:
+        if score > critical and distance > EXPANDED * own[worst]:
             last = step + 1
     return tuple(removed[:last])

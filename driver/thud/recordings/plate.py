@@ -88,6 +88,11 @@ class Plate:
         quality = self.quality * math.sqrt(self.loading)
         return np.asarray(1 / (1 - ratio**2 + 1j * ratio / quality))
 
+    def passed(self, frequency: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the part of the force that its correction keeps, at frequencies in Hz."""
+        octaves = np.log2(np.maximum(frequency, 1e-9) / (REACH * self.resonance))
+        return np.asarray(np.cos(np.pi / 2 * np.clip(octaves, 0, 1)) ** 2)
+
     def correction(self, sample_rate: float) -> str:
         """Return a sentence on what `correct_plate` does at a rate, Hz."""
         highest = min(REACH * self.resonance, sample_rate / 2)
@@ -165,10 +170,10 @@ def correct_plate(
     padded = np.pad(force, room, mode="edge")
     length = next_fast_len(len(padded) + room, real=True)
     frequency = np.asarray(np.fft.rfftfreq(length, 1 / sample_rate), dtype=np.float64)
-    fall = np.cos(np.pi / 2 * np.clip(np.log2(np.maximum(frequency, 1e-9) / reach), 0, 1)) ** 2
     # About the first value, so that the end that wraps around is no step.
     origin = padded[0]
-    spectrum = np.fft.rfft(padded - origin, length) / plate.response(frequency) * fall
+    spectrum = np.fft.rfft(padded - origin, length) / plate.response(frequency)
+    spectrum *= plate.passed(frequency)
     corrected: NDArray[np.float64] = (
         np.fft.irfft(spectrum, length)[room : room + len(force)] + origin
     )

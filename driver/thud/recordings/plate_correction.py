@@ -33,9 +33,9 @@ def correct_window(window: Window, plate: Plate) -> tuple[Window, tuple[str, ...
     force, steps, remarks = repair(window)
     repaired = replace(window.signal, samples=_Repaired(window.signal, window.start, force))
     applied = replace(window.signal, samples=_Corrected(repaired, plate), full_scale=None)
-    bounces = tuple(replace(bounce, signal=applied) for bounce in window.bounces)
+    bounces = tuple(replace(bounce, signal=applied, plate=plate) for bounce in window.bounces)
     told = plate.correction(window.sample_rate)
-    return replace(window, signal=applied, bounces=bounces), (*steps, told), remarks
+    return replace(window, signal=applied, bounces=bounces, plate=plate), (*steps, told), remarks
 
 
 @dataclass(frozen=True, eq=False)

@@ -88,8 +88,8 @@ def average_restitution(drops: Sequence[Drop], fall: Fall) -> tuple[Quantity, Qu
     """Return the restitution, and impulse minus bounces, with their budgets; NaN where not known.
 
     Where the ways differ by more than the expanded uncertainty of the difference, one of them is
-    wrong and nobody knows which: half the difference is part of the uncertainty of their mean, so
-    that its interval holds both.
+    wrong and nobody knows which: a rectangle as wide on each side as the difference is part of the
+    uncertainty of their mean, so that its interval holds both.
     """
     known = [drop for drop in drops if drop.restitutions]
     names = dict.fromkeys(name for drop in known for name in drop.restitution_shared)
@@ -101,7 +101,7 @@ def average_restitution(drops: Sequence[Drop], fall: Fall) -> tuple[Quantity, Qu
     ]
     difference = _difference([d for d in known if {IMPULSE, BOUNCES} <= set(d.restitutions)], fall)
     if abs(difference.value) > difference.expanded:
-        shared.append(Contribution("impulse against bounces", abs(difference.value) / 2))
+        shared.append(Contribution("impulse against bounces", abs(difference.value) / math.sqrt(3)))
     return average_estimates([drop.restitution for drop in known], *shared), difference
 
 

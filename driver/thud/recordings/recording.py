@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from thud._schema import BandSet, LevelsForce, LimitsSource
     from thud.recordings.estimates import Drop
+    from thud.recordings.kept import KeptDrops
     from thud.recordings.levels import AverageLevels
     from thud.recordings.measurement import Origin
     from thud.recordings.outliers import Outlier
@@ -125,7 +126,7 @@ class Recording(Displayed):
         *,
         progress: bool = False,
         workers: int = 1,
-        keep: str | os.PathLike[str] | None = None,
+        keep: str | os.PathLike[str] | KeptDrops | None = None,
     ) -> Recording:
         """Measure the drops of signals; the other arguments are those of `read_recording`.
 
@@ -258,9 +259,8 @@ class Recording(Displayed):
         """
         known = self._averages
         if (bands, method) not in known:
-            low = self.config.low_pass
-            drops = [measure_levels(drop, bands, method, low_pass=low) for drop in self.drops]
-            known[bands, method] = average_levels(drops)
+            found = measure_levels(self.drops, bands, method, low_pass=self.config.low_pass)
+            known[bands, method] = average_levels(found)
         return known[bands, method]
 
     @cached_property

@@ -390,7 +390,8 @@ def new_weights(  # noqa: PLR0913 - what the noise of a record is made of
     slope = to_grid(drift * time[:, np.newaxis], count)
     predicted = grid_covariance(humming, count) + slope @ slope.T
     covariance = white * np.eye(count) + grid_covariance(coloured, count) + predicted
-    # Covariances of pink and brown noise hold up to a constant, that of an unknown offset.
-    covariance += 10 * np.abs(coloured).max()
+    # Covariances of pink and brown noise hold up to a constant, that of an unknown offset; one of
+    # the samples is root(n/count) times as large on the grid.
+    covariance += 10 * np.abs(coloured).max() * n / count
     columns = cell_waves((time, time + 1 / rate), tones)[:, 0 if offset else 1 :]
     return Weights(covariance, to_grid(columns, count), predicted)

@@ -1,0 +1,299 @@
+"""From a table of a measured mobility to a floor: reading, vector fit, errors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import f90nml
+import numpy as np
+
+from thud import _api
+from thud._schema import MeasuredMobility
+from thud.case import Case
+from thud.checks import refuse, require_choice
+from thud.columns import read_titled
+from thud.display import MAKERS, Displayed
+from thud.floors.mobility import mobility
+from thud.recordings.channel import guarded, library, require_small
+
+if TYPE_CHECKING:
+    import os
+
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+Quantity = Literal["mobility", "accelerance", "receptance"]
+# Powers of i omega that make a mobility of each.
+_POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
+# The same by the number of the response in universal files: displacement, velocity, acceleration.
+_RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
+_EXCITATION_FORCE = 13
+_REACTION_FORCE = 9
+_FREQUENCY_RESPONSE = 4
+_ALLOWED = (
+    "a table with the columns frequency, Hz, real and imaginary, or magnitude and phase, degrees; "
+    "or a universal file with one frequency response, data set 58"
+)
+_TITLES = {
+    "frequency": "frequency", "f": "frequency", "freq": "frequency",
+    "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
+    "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
+}  # fmt: skip
+# Numbers of poles that are tried; the library takes no more.
+_ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
+# Numbers without a gain after which no more are tried.
+_PATIENCE = 5
+# Error below which no more poles are tried: that of a table with eight digits.
+_EXACT = 1e-8
+# Error of the fit that is remarked, and of the change that makes it passive.
+_POOR = 0.1
+_CHANGED = 1.5
+# Octaves of the errors, exact mid frequencies, Hz.
+_OCTAVES = 1000 * 10 ** (0.3 * np.arange(-5, 0))
+
+
+@dataclass(frozen=True, repr=False)
+class MobilityFit(Displayed):
+    """A measured mobility and the passive sum of poles that stands for it.
+
+    Attributes
+    ----------
+    name : str
+        Name, such as that of the file.
+    frequency : ndarray, shape (n_line,)
+        Frequencies of the measurement, Hz.
+    measured : ndarray, shape (n_line,)
+        The measured mobility, m/(N s), complex.
+    floor : MeasuredMobility
+        The floor, for `solve` and cases.
+    free_error : float
+        Relative error before the fit was made passive, root of the mean square.
+    """
+
+    name: str
+    frequency: NDArray[np.float64]
+    measured: NDArray[np.complex128]
+    floor: MeasuredMobility
+    free_error: float
+
+    def mobility(self, frequency: ArrayLike) -> NDArray[np.complex128]:
+        """Return the mobility of the fit, m/(N s), at frequencies, Hz."""
+        return mobility(self.floor, frequency)
+
+    @property
+    def error(self) -> float:
+        """Relative error, root of the mean square over the lines."""
+        return float(np.sqrt(np.mean(self._errors() ** 2)))
+
+    @property
+    def max_error(self) -> float:
+        """Largest relative error of a line."""
+        return float(self._errors().max())
+
+    def band_errors(self) -> dict[float, tuple[float, float]]:
+        """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
+
+        By mid frequency, Hz: the relative error, root of the mean square, and the level of the real
+        part, hence of the energy that a flat force injects, against the measured one, dB.
+        """
+        found = {}
+        errors = self._errors()
+        fitted = self.mobility(self.frequency)
+        for mid, name in zip(_OCTAVES, (31.5, 63.0, 125.0, 250.0, 500.0), strict=True):
+            edges = mid * 10**-0.15, mid * 10**0.15
+            inside = (self.frequency >= edges[0]) & (self.frequency < edges[1])
+            if self.frequency[0] > edges[0] or self.frequency[-1] < edges[1] or not inside.any():
+                continue
+            real = [np.trapezoid(y.real[inside], self.frequency[inside])
+                    for y in (fitted, self.measured)]  # fmt: skip
+            level = 10 * np.log10(real[0] / real[1]) if min(real) > 0 else np.nan
+            found[name] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
+        return found
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader of the fit has to know."""
+        found = []
+        negative = np.mean(self.measured.real < 0)
+        if negative > 0:
+            found.append(
+                f"the measured real part is negative at {100 * negative:.2g} % of the lines, which "
+                "no passive floor has: the fit has none"
+            )
+        if self.error > _POOR:
+            found.append(f"the fit misses the measurement by {100 * self.error:.0f} %")
+        elif self.error > _CHANGED * self.free_error and self.error > _EXACT:
+            found.append(
+                f"to be passive the fit gave up accuracy: {100 * self.error:.2g} % instead of "
+                f"{100 * self.free_error:.2g} %"
+            )
+        return tuple(found)
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of a table of errors."""
+        body = [
+            (f"{band:g}", f"{100 * error:.2g}", f"{level:+.2f}")
+            for band, (error, level) in self.band_errors().items()
+        ]
+        return [("octave, Hz", "error, %", "real part, dB"), *body]
+
+    def namelist(self) -> str:
+        """Return the groups ``&floor`` and ``&measured_mobility`` as text for a case."""
+        case, groups = Case(floor=self.floor).to_namelist(), f90nml.Namelist()
+        for group in ("floor", self.floor.name):
+            groups[group] = case[group]
+        return f"! Mobility {self.name}, fitted: relative error {self.error:.2g}.\n{groups}\n"
+
+    def plot(self) -> Figure:
+        """Draw the measured mobility and the fit."""
+        figure: Figure = MAKERS["mobility_fit"](self)
+        return figure
+
+    def _errors(self) -> NDArray[np.float64]:
+        """Return the relative errors of the lines."""
+        errors: NDArray[np.float64] = np.abs(self.mobility(self.frequency) / self.measured - 1)
+        return errors
+
+    def __repr__(self) -> str:
+        """Show poles and error."""
+        pairs = sum(ratio < 1 for ratio in self.floor.damping_ratio)
+        order = len(self.floor.damping_ratio) + pairs
+        return f"<MobilityFit {self.name}: {order} poles, error {100 * self.error:.2g} %>"
+
+
+def fit_mobility(
+    table: str | os.PathLike[str] | tuple[ArrayLike, ArrayLike],
+    *,
+    quantity: Quantity | None = None,
+    order: int | None = None,
+) -> MobilityFit:
+    """Fit a passive sum of poles to a measured mobility.
+
+    Relaxed vector fitting (Gustavsen 2006) with errors relative to the magnitude, then the least
+    change of the residues that makes the real part nowhere negative.
+
+    Parameters
+    ----------
+    table
+        A file, or frequencies, Hz, and complex values. Files are tables with the columns
+        ``frequency``, Hz, ``real`` and ``imaginary`` (or ``magnitude`` and ``phase``, degrees),
+        SI units, or universal files with a frequency response (data set 58).
+    quantity
+        What the values are, response over force: ``"mobility"``, m/(N s), ``"accelerance"``, 1/kg,
+        or ``"receptance"``, m/N. Universal files say it themselves; the default of others is
+        mobility.
+    order
+        Number of poles, both of a pair counted; by default the number with the least Bayesian
+        information criterion.
+
+    Raises
+    ------
+    InputError
+        Names the file, and the line, the column or the argument that is not allowed.
+    """
+    if quantity is not None:
+        require_choice("quantity", quantity, get_args(Quantity))
+    if isinstance(table, tuple):
+        name = "measurement"
+        frequency, values = np.asarray(table[0], dtype=float), np.asarray(table[1], dtype=complex)
+        if frequency.ndim != 1 or frequency.shape != values.shape:
+            refuse(
+                f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
+                "one value for each frequency",
+            )
+    else:
+        name = Path(table).stem
+        frequency, values, known = _read(Path(table))
+        if quantity and known and quantity != known:
+            refuse(f"{table}: quantity = {quantity!r}, but the file holds an {known}", repr(known))
+        quantity = quantity or known
+    # A line at 0 Hz has no phase.
+    frequency, values = frequency[frequency != 0], values[frequency != 0]
+    values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
+    if values.size and not abs(values).min() > 0:
+        refuse(f"{name}: the value at {frequency[abs(values).argmin()]:g} Hz is 0", "not 0")
+    if order is not None:
+        return _fit(name, frequency, values, order)
+    return _chosen(name, frequency, values)
+
+
+def _chosen(
+    name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128]
+) -> MobilityFit:
+    """Return the fit with the least information criterion for relative errors of equal size."""
+    best, least, worse = None, np.inf, 0
+    for order in _ORDERS:
+        # Three values for each coefficient, or noise is fitted.
+        if best is not None and (worse == _PATIENCE or 3 * (2 * order + 1) > 2 * len(frequency)):
+            break
+        found = _fit(name, frequency, values, min(order, max(1, len(frequency) - 1)))
+        error = max(found.error, _EXACT)
+        count = 2 * len(frequency)
+        criterion = count * np.log(error**2) + (2 * order + 1) * np.log(count)
+        worse += 1
+        if criterion < least:
+            best, least, worse = found, criterion, 0
+        if error <= _EXACT:
+            break
+    if best is None:
+        refuse(f"{name}: no fit", _ALLOWED)
+    return best
+
+
+def _fit(
+    name: str, frequency: NDArray[np.float64], values: NDArray[np.complex128], order: int
+) -> MobilityFit:
+    """Return the fit with a number of poles."""
+    n = len(frequency)
+    routine = _api.mobility_api.fit_mobility
+    found: dict[str, Any] = _api.call(routine, frequency, values.real, values.imag, int(order), n)
+    lists: dict[str, Any] = {
+        key: value if isinstance(value, float) else tuple(map(float, value))
+        for key, value in found["floor"].items()
+    }
+    return MobilityFit(name, frequency, values, MeasuredMobility(**lists), found["free_error"])
+
+
+def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quantity | None]:
+    """Return frequencies, values and, where the file says it, what they are."""
+    if path.suffix.lower() in {".uff", ".unv", ".uf"}:
+        return _read_universal(path)
+    titles, table = read_titled(path, _ALLOWED)
+    words = [title.strip().strip('"').lower().split(",")[0].split()[0] for title in titles]
+    kinds = [_TITLES.get(word.split("_")[0], "") for word in words]
+    columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind}
+    if {"frequency", "real", "imaginary"} <= columns.keys():
+        values = columns["real"] + 1j * columns["imaginary"]
+    elif {"frequency", "magnitude", "phase"} <= columns.keys():
+        values = columns["magnitude"] * np.exp(1j * np.radians(columns["phase"]))
+    else:
+        refuse(f"{path}: the columns are {', '.join(titles) or 'without titles'}", _ALLOWED)
+    return columns["frequency"], values, None
+
+
+def _read_universal(
+    path: Path,
+) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quantity | None]:
+    """Return the frequency response of a universal file."""
+    with guarded(path, "universal"):
+        require_small(path, "a universal file")
+        file = library("pyuff", "universal").UFF(str(path))
+        kinds = [int(kind) for kind in file.get_set_types()]
+        sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]  # noqa: PLR2004
+    responses = [one for one in sets if one.get("func_type") == _FREQUENCY_RESPONSE]
+    if len(responses) != 1:
+        refuse(f"{path}: holds {len(responses)} frequency responses", "one")
+    (one,) = responses
+    response = one["ordinate_spec_data_type"]
+    force = one["orddenom_spec_data_type"]
+    if response not in _RESPONSES or force not in {_EXCITATION_FORCE, _REACTION_FORCE}:
+        refuse(
+            f"{path}: a response of type {response} over one of type {force}",
+            "displacement, velocity or acceleration (8, 11, 12) over force (13)",
+        )
+    # Directions of response and reference count with their signs.
+    sign = 1 if one["rsp_dir"] * one["ref_dir"] >= 0 else -1
+    known: Quantity = _RESPONSES[response]  # type: ignore[assignment]
+    return np.asarray(one["x"], dtype=float), sign * np.asarray(one["data"], dtype=complex), known

@@ -1,0 +1,106 @@
+!> From a table of a measured mobility to the floor that has it: vector fit, then the least change that makes it passive.
+module thud_mobility_fit
+   use thud_constants, only: pi
+   use thud_error, only: error_type, input_error, numerical_error
+   use thud_interrupt, only: check_interrupt
+   use thud_kinds, only: wp
+   use thud_measured_mobility_floor, only: measured_mobility_floor_type
+   use thud_passivity, only: make_passive
+   use thud_text, only: to_text
+   use thud_vector_fit, only: fit_rational
+   implicit none (type, external)
+   private
+
+   public :: fit_mobility
+
+   !> Maximum number of lines: the time of a fit grows with it.
+   integer, parameter :: max_lines = 10000
+
+   !> Least magnitude, over the largest, whose relative error counts in full.
+   real(wp), parameter :: least_magnitude = 1.0e-6_wp
+
+contains
+
+   !> Fits poles to a mobility; errors count relative to its magnitude.
+   subroutine fit_mobility(frequency, mobility, order, floor, free_error, error)
+      !> Frequencies, Hz, rising, above 0: [n_line].
+      real(wp), intent(in) :: frequency(:)
+      !> The mobility, m/(N s): [n_line].
+      complex(wp), intent(in) :: mobility(:)
+      !> Number of poles, both of a pair counted.
+      integer, intent(in) :: order
+      type(measured_mobility_floor_type), intent(out) :: floor
+      !> Relative error before the fit was made passive, root of the mean square.
+      real(wp), intent(out) :: free_error
+      !> There are too few lines or too many poles, or a line is not allowed.
+      type(error_type), allocatable, intent(out) :: error
+      complex(wp), allocatable :: pole(:), residue(:)
+      real(wp) :: weight(size(mobility))
+      logical :: failed
+
+      free_error = 0.0_wp
+      call check_table(frequency, mobility, order, size(floor%pole_frequency%values), error)
+      if (allocated(error)) return
+      weight = 1/max(abs(mobility), least_magnitude*maxval(abs(mobility)))
+      call fit_rational(2*pi*frequency, mobility, weight, order, pole, residue, floor%direct, free_error, failed)
+      call check_interrupt(error)
+      if (allocated(error)) return
+      if (.not. failed) call make_passive(2*pi*frequency, weight, pole, residue, floor%direct, failed)
+      if (failed) then
+         error = numerical_error('the mobility: no passive function of '//to_text(order)//' poles was found')
+      else if (size(pole) > size(floor%pole_frequency%values)) then
+         error = numerical_error('the mobility: too many of '//to_text(order)//' poles became real')
+      else
+         associate (n => size(pole))
+            floor%pole_frequency%count = n
+            floor%pole_frequency%values(:n) = abs(pole)/(2*pi)
+            floor%damping_ratio%count = n
+            floor%damping_ratio%values(:n) = min(1.0_wp, -pole%re/abs(pole))
+            floor%residue_real%count = n
+            floor%residue_real%values(:n) = residue%re
+            floor%residue_imaginary%count = n
+            floor%residue_imaginary%values(:n) = residue%im
+         end associate
+         floor%lowest_frequency = frequency(1)
+         floor%highest_frequency = frequency(size(frequency))
+         call floor%check(error)
+      end if
+   end subroutine fit_mobility
+
+   !> Refuses tables that cannot be fitted.
+   subroutine check_table(frequency, mobility, order, max_poles, error)
+      !> As in `fit_mobility`: [n_line].
+      real(wp), intent(in) :: frequency(:)
+      complex(wp), intent(in) :: mobility(:)
+      integer, intent(in) :: order
+      !> Length of a list.
+      integer, intent(in) :: max_poles
+      !> Names the line, or what is allowed.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: i
+
+      associate (n => size(frequency))
+         if (order < 1 .or. order > min(n - 1, max_poles)) then
+            error = input_error('order = '//to_text(order)//' is not allowed with '//to_text(n)//' lines; allowed: 1 to ' &
+               //to_text(min(n - 1, max_poles)))
+            return
+         end if
+         if (n > max_lines) then
+            error = input_error('the mobility has '//to_text(n)//' lines; allowed: up to '//to_text(max_lines))
+            return
+         end if
+         do i = 1, n
+            if (.not. (frequency(i) > frequency(max(1, i - 1)) .or. (i == 1 .and. frequency(1) > 0.0_wp)) &
+               .or. .not. abs(mobility(i)) < huge(1.0_wp) .or. .not. frequency(i) < huge(1.0_wp)) then
+               error = input_error('the mobility: line '//to_text(i)//' at '//to_text(frequency(i)) &
+                  //' Hz is not allowed; allowed: rising frequencies above 0, and finite values')
+               return
+            end if
+         end do
+         ! In the mean a passive structure takes power.
+         if (.not. sum(real(mobility)) > 0.0_wp) error = input_error('the mobility: the mean of its real part is ' &
+            //to_text(sum(real(mobility))/n)//' m/(N s); allowed: above 0, force and response in one direction at one point')
+      end associate
+   end subroutine check_table
+
+end module thud_mobility_fit

@@ -1,0 +1,200 @@
+"""Floors of measured mobilities: tables, universal files, errors, what is refused."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import pytest
+
+import thud
+from thud.cli import main
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+FREQUENCY = np.linspace(10, 1000, 300)
+S = 2j * np.pi * FREQUENCY
+# Frequency, Hz, modal mass, kg, damping ratio.
+MODES = [(18, 400, 0.03), (47, 300, 0.02), (120, 350, 0.03), (310, 250, 0.02)]
+MOBILITY = 2e-6 + sum(
+    S / m / (S**2 + 2 * z * 2 * np.pi * f * S + (2 * np.pi * f) ** 2) for f, m, z in MODES
+)
+# Noise of 3 % of each part.
+NOISY = MOBILITY * (1 + 0.03 * np.random.default_rng(1).normal(size=(2, 300)).T.dot([1, 1j]))
+
+
+def write_table(path: Path, titles: str, *columns: np.ndarray) -> Path:
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=titles, comments="")
+    return path
+
+
+def write_universal(path: Path, response: int, values: np.ndarray, **words: int) -> Path:
+    pyuff = pytest.importorskip("pyuff")
+    one: dict[str, Any] = {
+        "type": 58, "binary": 0, **{f"id{i}": "NONE" for i in range(1, 6)}, "func_type": 4,
+        "rsp_ent_name": "floor", "rsp_node": 1, "rsp_dir": -3, "ref_ent_name": "floor",
+        "ref_node": 1, "ref_dir": -3, "abscissa_spacing": 1, "abscissa_spec_data_type": 18,
+        "ordinate_spec_data_type": response, "orddenom_spec_data_type": 13,
+        "z_axis_spec_data_type": 0, "x": FREQUENCY, "data": values, **words,
+    }  # fmt: skip
+    pyuff.UFF(str(path)).write_sets([one], "overwrite")
+    return path
+
+
+@pytest.fixture(scope="module")
+def exact() -> thud.MobilityFit:
+    return thud.fit_mobility((FREQUENCY, MOBILITY))
+
+
+def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
+    order = np.argsort(exact.floor.pole_frequency)
+    np.testing.assert_allclose(
+        np.column_stack([exact.floor.pole_frequency, exact.floor.damping_ratio])[order],
+        [(f, z) for f, _, z in MODES],
+        rtol=1e-8,
+    )
+    assert exact.floor.direct == pytest.approx(2e-6, rel=1e-6)
+    assert exact.error < 1e-10
+    assert not exact.remarks
+    assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
+
+
+def test_noise_is_not_fitted() -> None:
+    found = thud.fit_mobility((FREQUENCY, NOISY))
+    # 3 % of both parts: 4.2 %, less by the freedom of 17 coefficients in 600 parts.
+    assert found.error == pytest.approx(0.03 * np.sqrt(2), rel=0.1)
+    assert len(found.floor.pole_frequency) == len(MODES)
+    assert abs(found.mobility(FREQUENCY) / MOBILITY - 1).mean() < 0.01
+
+
+@pytest.mark.parametrize(("quantity", "power"), [("accelerance", 1), ("receptance", -1)])
+def test_other_quantities_are_the_same_floor(
+    tmp_path: Path,
+    exact: thud.MobilityFit,
+    quantity: Literal["accelerance", "receptance"],
+    power: int,
+) -> None:
+    values = MOBILITY * S**power
+    table = write_table(
+        tmp_path / "point.csv", "frequency_Hz,magnitude,phase_deg",
+        FREQUENCY, abs(values), np.degrees(np.angle(values)),
+    )  # fmt: skip
+    found = thud.fit_mobility(table, quantity=quantity, order=8)
+    np.testing.assert_allclose(found.mobility(FREQUENCY), exact.mobility(FREQUENCY), rtol=1e-8)
+
+
+@pytest.mark.parametrize(("response", "power"), [(8, -1), (11, 0), (12, 1)])
+def test_universal_files_say_what_they_hold(tmp_path: Path, response: int, power: int) -> None:
+    path = write_universal(tmp_path / "point.uff", response, MOBILITY * S**power)
+    found = thud.fit_mobility(path, order=8)
+    # Five digits of text.
+    np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
+    with pytest.raises(thud.InputError, match="but the file holds an"):
+        thud.fit_mobility(path, quantity="mobility" if power else "receptance")
+
+
+def test_opposite_directions_change_the_sign(tmp_path: Path) -> None:
+    path = write_universal(tmp_path / "point.uff", 11, -MOBILITY, rsp_dir=3)
+    found = thud.fit_mobility(path, order=8)
+    np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        ({"func_type": 1}, "holds 0 frequency responses"),
+        ({"orddenom_spec_data_type": 12}, "response of type 11 over one of type 12"),
+    ],
+)
+def test_other_universal_files_are_refused(
+    tmp_path: Path, words: dict[str, int], sentence: str
+) -> None:
+    path = write_universal(tmp_path / "point.uff", 11, MOBILITY, **words)
+    with pytest.raises(thud.InputError, match=sentence):
+        thud.fit_mobility(path)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "values", "sentence"),
+    [
+        (FREQUENCY, -MOBILITY, "mean of its real part is -"),
+        (FREQUENCY[::-1], MOBILITY, "line 2 at .* rising"),
+        (FREQUENCY, np.where(S.imag > 900, np.nan, MOBILITY), "finite|not 0"),
+        (FREQUENCY, np.where(S.imag > 900, 0, MOBILITY), "is 0; allowed: not 0"),
+        (FREQUENCY[:1], MOBILITY[:1], "with 1 lines"),
+        (FREQUENCY, MOBILITY[:5], "one value for each"),
+        (-FREQUENCY[::-1], MOBILITY, "line 1"),
+    ],
+)
+def test_tables_of_no_floor_are_refused(
+    frequency: np.ndarray, values: np.ndarray, sentence: str
+) -> None:
+    with pytest.raises(thud.InputError, match=sentence):
+        thud.fit_mobility((frequency, values), order=4)
+
+
+@pytest.mark.parametrize("order", [0, 65, 300])
+def test_orders_that_cannot_be_are_refused(order: int) -> None:
+    with pytest.raises(thud.InputError, match=r"order = .* allowed: 1 to 64"):
+        thud.fit_mobility((FREQUENCY, MOBILITY), order=order)
+
+
+def test_titles_are_needed(tmp_path: Path) -> None:
+    table = write_table(tmp_path / "t.csv", "frequency,real", FREQUENCY, MOBILITY.real)
+    with pytest.raises(thud.InputError, match="the columns are frequency, real; allowed: a table"):
+        thud.fit_mobility(table)
+
+
+def test_negative_lines_are_remarked_and_left_out() -> None:
+    values = MOBILITY - 2 * MOBILITY.real * (np.arange(300) % 10 == 0)
+    found = thud.fit_mobility((FREQUENCY, values), order=8)
+    assert "negative at 10 % of the lines" in found.remarks[0]
+    assert found.mobility(np.geomspace(0.1, 1e6, 5000)).real.min() >= 0
+
+
+def test_namelist_is_the_floor(tmp_path: Path, exact: thud.MobilityFit) -> None:
+    path = tmp_path / "case.nml"
+    path.write_text("&ball /\n&drop /\n&model /\n" + exact.namelist())
+    assert thud.read_case(path).floor == exact.floor
+
+
+def test_command_saves_the_floor(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = write_table(
+        tmp_path / "point.csv", "frequency,real,imaginary", FREQUENCY, NOISY.real, NOISY.imag
+    )
+    folder = tmp_path / "out"
+    arguments = ["mobility", str(table), "--order", "8", "-o", str(folder), "--no-figures"]
+    assert main(arguments) == 0
+    printed = capsys.readouterr().out
+    assert "MobilityFit point: 8 poles" in printed
+    assert "octave, Hz" in printed
+    text = (folder / "measured_mobility.nml").read_text()
+    assert "name = 'measured_mobility'" in text
+
+
+def test_figure_shows_measurement_and_fit(exact: thud.MobilityFit) -> None:
+    upper, lower = exact.plot().axes
+    for axes, of in ((upper, abs), (lower, lambda y: np.degrees(np.angle(y)))):
+        measured, fitted = axes.get_lines()
+        np.testing.assert_array_equal(measured.get_ydata(), of(exact.measured))
+        line = np.asarray(fitted.get_xdata())
+        np.testing.assert_array_equal(fitted.get_ydata(), of(exact.mobility(line)))
+        assert line[[0, -1]] == pytest.approx(FREQUENCY[[0, -1]])
+    assert upper.get_ylabel() == "Mobility, m/(N s)"
+
+
+def test_ball_feels_a_noisy_measured_floor_as_the_floor() -> None:
+    joists = thud.JoistFloor(source_x=0.4, source_y=0.35)
+    frequency = np.linspace(10, 1000, 496)
+    noise = 0.03 * np.random.default_rng(2).normal(size=(496, 2)).dot([1, 1j])
+    values = thud.mobility(joists, frequency) * (1 + noise)
+    measured = thud.fit_mobility((frequency, values), order=32)
+    with pytest.warns(thud.PlausibilityWarning, match="joist_floor: above 134 Hz"):
+        expected = thud.solve(floor=joists).on_floor
+    found = thud.solve(floor=measured.floor).on_floor
+    assert expected is not None
+    assert found is not None
+    # 3 % at 496 lines shared by 65 coefficients: 1 % of differences of up to 0.9 dB.
+    np.testing.assert_allclose(found.difference(), expected.difference(), atol=0.02)
+    assert abs(expected.difference()).max() > 0.5
