@@ -343,7 +343,7 @@ def test_advice_for_a_heavily_damped_contact_helps(run: Run, case_file: CaseFile
         if done.returncode == 0:
             break
         # No rate is named before the steps give the contact its true time.
-        advice.append(re.sub(r": the (balance|motion).*|[\d.e-]+", "", done.stderr))
+        advice.append(re.sub(r": the (balance|motion).*", "", done.stderr))
         substeps *= 4
     assert done.returncode == 0
     assert len(set(advice)) == 1
