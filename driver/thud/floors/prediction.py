@@ -229,7 +229,10 @@ def predict_level(
     found = call(api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
     bands = found["bands"]
     if moved and isinstance(source, Impact):
-        change = 20 * math.log10(moved.peak("floor") / source.peak("floor"))
+        blocked = (
+            source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
+        )
+        change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
         mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
         change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
@@ -251,10 +254,12 @@ def predict_level(
 
 def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
     """Return the impact on the floor of a case; None where its force is the blocked one."""
+    known = source if isinstance(source, FloorImpact) else source.on_floor
     if source.case.floor == case.floor:
-        return source.on_floor
+        return known
     plain = replace(case, compression=None)
-    return new_floor_impact(case, call(api.drop_on_floor, case_text(plain)), source.floor_force)
+    blocked = source.blocked_force if isinstance(source, FloorImpact) else source.floor_force
+    return new_floor_impact(case, call(api.drop_on_floor, case_text(plain)), blocked)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:
