@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import thud
+from thud.outcomes import FURTHER
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,6 +50,7 @@ def single(parameters: dict[str, np.ndarray], i: int, **options: object) -> thud
 def results(ensemble: thud.Ensemble) -> dict[object, np.ndarray]:
     """Return everything that an ensemble computes but the forces, levels by force and bands."""
     left_out = {"case", "parameters", "sample_rate", "elastic_force", "floor_force", "levels"}
+    left_out |= {"contact_levels", *FURTHER}
     names = [f.name for f in dataclasses.fields(ensemble) if f.name not in left_out]
     return {name: getattr(ensemble, name) for name in names} | ensemble.levels
 
