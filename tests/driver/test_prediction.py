@@ -246,3 +246,11 @@ def test_impact_on_the_floor_itself_is_of_the_contact_force() -> None:
 def test_tapping_level_of_an_orthotropic_plate_is_refused() -> None:
     with pytest.raises(thud.InputError, match="isotropic"):
         thud.tapping_level(thud.Plate(stiffness_ratio=0.1))
+
+
+def test_floor_radiates_no_more_than_it_loses(impact: thud.Impact) -> None:
+    # So light a plate loses less to the laboratory than it radiates.
+    light = thud.Plate(length=6, width=4, thickness=0.1, density=45, wave_speed=4600)
+    share = thud.predict_level(impact, light, thud.Room()).radiated_share
+    assert (share > 0.4).any()
+    assert (share <= 0.5).all()

@@ -109,7 +109,10 @@ class RoomPrediction(Displayed):
         """Share of the floor's losses that it radiates into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
         omega = 2 * np.pi * self.frequency
-        return air * self.radiation_factor / (self.surface_mass * omega * self.loss_factor)
+        radiated = air * self.radiation_factor / (self.surface_mass * omega)
+        # The floor loses at least what it dissipates and radiates to both sides.
+        internal = getattr(self.floor, "loss_factor", 0.0)
+        return radiated / np.maximum(self.loss_factor, internal + 2 * radiated)
 
     @property
     def octave_rating(self) -> Rating:
