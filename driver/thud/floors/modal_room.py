@@ -248,19 +248,25 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
 
 def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     """Return natural frequencies of a simply supported plate, Hz, by numbers of half-waves."""
-    # sqrt(B'/m'') = c_L h/sqrt(12).
-    square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
-    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * square.sum(-1) / (2 * np.pi)
+    # sqrt(B'/m'') = c_L h/sqrt(12); B_x = B'/r and B_y = B' r with the root r of their ratio.
+    along, across = ((np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2).T
+    root = math.sqrt(floor.stiffness_ratio)
+    square = along**2 / root + 2 * floor.torsion_ratio * along * across + across**2 * root
+    speed = floor.wave_speed * floor.thickness / math.sqrt(12)
+    found: Array = speed * np.sqrt(square) / (2 * np.pi)
     return found
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
-    # f = c (k1**2 + k2**2): half-waves along one side at the highest frequency.
+    # f >= c k1**2 and f >= c k2**2: half-waves along one side at the highest frequency.
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
-    numbers = _grid(
-        [1 + int(side * math.sqrt(HIGHEST / unit)) for side in (floor.length, floor.width)]
-    )
+    root = floor.stiffness_ratio**0.25
+    most = [
+        1 + int(side * math.sqrt(HIGHEST / unit * softness))
+        for side, softness in ((floor.length, root**2), (floor.width, root**-2))
+    ]
+    numbers = _grid(most)
     numbers += 1
     frequency = plate_frequencies(floor, numbers)
     keep = frequency <= HIGHEST
@@ -269,7 +275,7 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
             f"floor: its first natural frequency is {frequency.min():.0f} Hz",
             f"a floor with modes below {HIGHEST:g} Hz",
         )
-    _require_modes("floor: the plate", int(keep.sum()))
+    _require_modes("floor: the plate has", int(keep.sum()))
     return numbers[keep], frequency[keep]
 
 
