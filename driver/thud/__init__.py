@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from thud.compression_fit import fit_compression as fit_compression
     from thud.floors.floor_comparison import FloorComparison as FloorComparison
     from thud.floors.floor_comparison import compare_floors as compare_floors
+    from thud.floors.impedance import BallImpedance as BallImpedance
+    from thud.floors.impedance import ball_impedance as ball_impedance
     from thud.floors.mobility_fit import MobilityFit as MobilityFit
     from thud.floors.mobility_fit import fit_mobility as fit_mobility
     from thud.floors.modal_room import ModalRoom as ModalRoom
@@ -87,6 +89,8 @@ __version__ = version()
 # What is imported at first use, by its module; modules themselves have none.
 _LATE = {
     "plot": "",
+    "BallImpedance": "floors.impedance",
+    "ball_impedance": "floors.impedance",
     "comparison": "",
     "Comparison": "comparison",
     "compare": "comparison",
@@ -179,6 +183,7 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
     floor=_maker("plot.floor", "draw_floor"),
+    impedance=_maker("plot.impedance", "ball_impedances"),
     compression=_maker("plot.compression", "compression"),
     compression_table=_maker("export", "compression_table"),
     dataset=_maker("export", "dataset"),

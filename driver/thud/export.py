@@ -11,9 +11,17 @@ import xarray as xr
 
 from thud._schema import SCALARS
 from thud.impact import FloorImpact, Impact
-from thud.keys import find_key
+from thud.keys import find_key, users
 from thud.levels import BANDWIDTHS
-from thud.studies.dataset import MEANINGS, band_coordinates, coordinate, origin
+from thud.outcomes import FURTHER, ROOM_LEVEL
+from thud.studies.dataset import (
+    MEANINGS,
+    ROOM_BAND,
+    band_coordinates,
+    coordinate,
+    origin,
+    room_coordinates,
+)
 from thud.studies.evaluation import LEVELS
 from thud.studies.parameter import Parameter
 
@@ -91,7 +99,7 @@ def _of_ensemble(ensemble: Ensemble) -> xr.Dataset:
     assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
     for name, values in ensemble.parameters.items():
-        key, _ = find_key(name, ensemble.case.model.name)
+        key, _ = find_key(name, users(ensemble.case))
         words = _attributes(key.unit, key.meaning)
         coordinates[coordinate(Parameter(name=name, key=key))] = ("set", values, words)
     variables: dict[str, Any] = {}
@@ -101,6 +109,14 @@ def _of_ensemble(ensemble: Ensemble) -> xr.Dataset:
         elif LEVELS[name] in ensemble.levels:
             values = ensemble.levels[LEVELS[name]]
             variables[name] = (("set", LEVELS[name][1]), values, _attributes(*entry))
+    for bands, level in ensemble.contact_levels.items():
+        words = _attributes("dB", "force exposure level on the floor that moves, re 1 N and 1 s")
+        variables[f"contact_{bands}_level"] = (("set", bands), level, words)
+    for name, (unit, meaning) in FURTHER.items():
+        if (values := getattr(ensemble, name)) is not None:
+            dimensions = ("set", ROOM_BAND) if name == ROOM_LEVEL else ("set",)
+            variables[name] = (dimensions, values, _attributes(unit, meaning))
+            coordinates |= room_coordinates() if name == ROOM_LEVEL else {}
     for force in ("elastic", "floor"):
         if (values := getattr(ensemble, f"{force}_force")) is not None:
             seconds = np.arange(values.shape[1]) / ensemble.sample_rate

@@ -28,31 +28,48 @@ DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
 
 
+def users(case: Case) -> tuple[str, ...]:
+    """Return what of a case has keys of its own: its model, its floor, its room."""
+    floor = case.floor.name if case.floor else ""
+    found = (case.model.name if case.model else "", floor, "room" if case.room else "")
+    return tuple(filter(None, found))
+
+
 @cache
-def known_keys(model: str) -> Mapping[str, Key]:
-    """Return the keys in which sets of a model may differ, by name."""
+def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
+    """Return the keys in which sets may differ, by name; see `users`.
+
+    Those of floor and room have names that begin with their group, such as ``"plate.thickness"``,
+    and their own where no other key has it.
+    """
+    model, *others = owners
     known = {
         key.name: key
         for key in KEYS
         if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != OF_FILES
     }
-    return MappingProxyType(known | {key.name: key for key in (DENSITY, TEMPERATURE)})
+    known |= {key.name: key for key in (DENSITY, TEMPERATURE)}
+    for key in KEYS:
+        if key.owner in others:
+            known.setdefault(key.name, key)
+            known[f"{key.group}.{key.name}"] = key
+    return MappingProxyType(known)
 
 
-def find_key(name: str, model: str) -> tuple[Key, int | None]:
-    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2.
+def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
+    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `users`.
 
     Raises
     ------
     InputError
-        Where the model has no such key; lists its keys.
+        Where there is no such key; lists the keys.
     """
-    known = known_keys(model)
-    match = re.fullmatch(r"(\w+)(?:\(([1-9]\d{0,3})\))?", str(name))
+    known = known_keys(owners)
+    match = re.fullmatch(r"(\w+(?:\.\w+)?)(?:\(([1-9]\d{0,3})\))?", str(name))
     key = known.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
         hint = suggestion(str(name).partition("(")[0], known)
-        refuse(f"{name!r} is not a key of {model}{hint}", ", ".join(known))
+        refuse(f"{name!r} is not a key of {' and '.join(owners)}{hint}", ", ".join(known))
     return key, int(match[2]) if match[2] else None
 
 
@@ -61,13 +78,15 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
     groups: dict[str, dict[str, object]] = {}
     for name, value in values.items():
-        key, entry = find_key(name, case.model.name)
-        group = key.group if key.group in GROUPS else "model"
+        key, entry = find_key(name, users(case))
+        group = key.group if key.group in {*GROUPS, "room"} else "model"
+        if case.floor and key.owner == case.floor.name:
+            group = "floor"
         place = groups.setdefault(group, {})
         if entry is None:
             place[key.name] = value
         else:
-            entries = list(place.get(key.name, getattr(case.model, key.name)))  # type: ignore[call-overload]
+            entries = list(place.get(key.name, getattr(getattr(case, group), key.name)))  # type: ignore[call-overload]
             if entry > len(entries):
                 message = f"{name} does not exist; allowed: entries 1 to {len(entries)} of the case"
                 raise InputError(message)

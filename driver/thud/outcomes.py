@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,17 @@ if TYPE_CHECKING:
 
     from thud._schema import BandSet, LevelsForce
     from thud.case import Case
+
+
+ROOM_LEVEL = "room_level"
+RATING = "standardised_rating"
+# Unit and meaning of what drops on a floor have in addition, levels of the contact force apart.
+FURTHER = {
+    "floor_work": ("J", "energy that the source gives to the floor"),
+    ROOM_LEVEL: ("dB", "maximum Fast level in the room, re 20 uPa"),
+    "room_rating": ("dB", "A-weighted maximum Fast level in the room, re 20 uPa"),
+    RATING: ("dB", "A-weighted maximum Fast level, standardised, re 20 uPa"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +67,15 @@ class Ensemble(Displayed):
         Forces, N; None unless requested.
     sample_rate : float
         Samples per second, Hz.
+    contact_levels : dict of bands to ndarray, shape (n_set, n_band)
+        Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
+        know no other, those of the force there.
+    floor_work : ndarray, shape (n_set,), or None
+        Likewise the energy that the source gives to the floor, J.
+    room_level : ndarray, shape (n_set, 12), or None
+        Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
+    room_rating, standardised_rating : ndarray, shape (n_set,), or None
+        Their A-weighted sum L_iA,Fmax, dB, and that of the standardised levels; see `rating`.
     """
 
     case: Case
@@ -76,6 +96,11 @@ class Ensemble(Displayed):
     elastic_force: NDArray[np.float64] | None
     floor_force: NDArray[np.float64] | None
     sample_rate: float
+    contact_levels: dict[BandSet, NDArray[np.float64]] = field(default_factory=dict)
+    floor_work: NDArray[np.float64] | None = None
+    room_level: NDArray[np.float64] | None = None
+    room_rating: NDArray[np.float64] | None = None
+    standardised_rating: NDArray[np.float64] | None = None
 
     def __len__(self) -> int:
         """Return the number of sets."""
@@ -94,8 +119,12 @@ class Ensemble(Displayed):
         """Return header and rows of text."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         units = {name: SCALARS[name][0] for name in OUTCOMES} | {"margin": "dB"}
+        units |= {name: unit for name, (unit, _) in FURTHER.items() if name != ROOM_LEVEL}
         for name, unit in units.items():
-            known = getattr(self, name)[self.status == 0]
+            values = getattr(self, name)
+            if values is None:
+                continue
+            known = values[self.status == 0]
             known = known[np.isfinite(known)]
             if not known.size:
                 continue

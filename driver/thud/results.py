@@ -7,6 +7,7 @@ import fcntl
 import re
 import warnings
 import zlib
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -101,8 +102,10 @@ class _Files:
 
 def _new_impact(files: _Files) -> Impact:
     """Return the impact of a result directory."""
-    case = Case.from_namelist(f90nml.reads(files.read("effective.nml")))
-    numbers = f90nml.reads(files.read("summary.nml"))
+    # The parser prints its tables where a text ends too early.
+    with redirect_stdout(None):
+        case = Case.from_namelist(f90nml.reads(files.read("effective.nml")))
+        numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
     remarks = _texts(numbers.get("remarks", {}).get("remark", []))
     if not files.checksums:

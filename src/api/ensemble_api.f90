@@ -44,13 +44,15 @@ contains
          call bundle%add_number('force', real(force_count, wp))
          call bundle%add_number('sample', real(get_sample_count(case%sampling), wp))
          call bundle%add_number('cost', many%cost)
+         call bundle%add_number('further', real(size(many%further_name), wp))
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine size_many
 
    !> Outcomes, levels and verdicts of drops of a case that differ in some keys.
    subroutine drop_many(text, names, n_column, n_drop, values, threads, judged, n_outcome, n_band, n_force, n_sample, &
-      n_kept, drop_status, outcome, level, conforms, margin, verdict, force, status, handle, n_byte, n_value)
+      n_kept, drop_status, outcome, level, conforms, margin, verdict, n_further, &
+      further, force, status, handle, n_byte, n_value)
       !f2py threadsafe
       !> Text of a namelist file; names of the keys, with commas between.
       character(len=*), intent(in) :: text, names
@@ -78,6 +80,10 @@ contains
       real(wp), intent(out) :: margin(n_drop)
       !> 1 where the source conforms by the judged force, else 0: [n_drop].
       integer, intent(out) :: verdict(n_drop)
+      !> Number of further results, from `size_many`, at least 1.
+      integer, intent(in) :: n_further
+      !> Further results, of cases with a floor: [n_further, n_drop].
+      real(wp), intent(out) :: further(n_further, n_drop)
       !> Forces, N: [n_sample, n_force, n_kept].
       real(wp), intent(out) :: force(n_sample, n_force, n_kept)
       !> Status, handle and sizes as in `leave`.
@@ -106,6 +112,8 @@ contains
          conforms = merge(1, 0, many%conforms)
          margin = many%margin
          verdict = merge(1, 0, many%verdict)
+         further = 0.0_wp
+         if (size(many%further) > 0) further = many%further
          if (size(many%force) > 0) force = many%force
          call join_reasons(many, reasons)
          call bundle%add_text('reasons', reasons)

@@ -165,8 +165,14 @@ contains
       end if
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
-      run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)
       contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
+      if (sampling%duration <= options%flight_before + contacts%quiet) then
+         error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
+            //'after '//to_text(contacts%quiet)//' s without touch, in which shear waves cross the ball; allowed: ' &
+            //'above '//to_text(options%flight_before + contacts%quiet)//' s')
+         return
+      end if
+      run = new_impact_run(ball, options, material, drop%gravity, gap, speed, receiver)
       history%motion = new_motion(run%position, get_frame_count(options, sampling))
       call march(run, get_mean_height(run) - gap, contacts, options, sampling, history, error)
       if (.not. allocated(error)) call finish_record(ball, run, sampling, speed, history, error)

@@ -13,8 +13,11 @@ module thud_progress_line
    !> Time without a line, at the beginning and between two lines, s.
    real(wp), parameter :: patience = 0.5_wp
 
-   !> Clock at the beginning or at the latest line, and its ticks in a second.
-   integer(int64) :: latest = 0, rate = 1
+   !> Clock at the beginning, at the beginning or at the latest line, and its ticks in a second.
+   integer(int64) :: first = 0, latest = 0, rate = 1
+
+   !> Length of a line.
+   integer, parameter :: line_length = 80
 
    !> A line is on the screen.
    logical :: shown = .false.
@@ -25,6 +28,7 @@ contains
    subroutine begin_progress()
       if (.not. is_terminal(standard_error)) return
       call system_clock(latest, rate)
+      first = latest
       shown = .false.
       call set_progress_handler(print_line)
    end subroutine begin_progress
@@ -34,7 +38,7 @@ contains
       integer :: status
 
       call set_progress_handler()
-      if (shown) call write_text(standard_error, achar(13)//repeat(' ', 60)//achar(13), status)
+      if (shown) call write_text(standard_error, achar(13)//repeat(' ', line_length)//achar(13), status)
       shown = .false.
    end subroutine end_progress
 
@@ -45,15 +49,19 @@ contains
       !> Upper bound of the whole; 0 where unknown.
       real(wp), intent(in) :: whole
       character(len=*), intent(in) :: unit
+      character(len=line_length) :: line
       integer(int64) :: now
+      real(wp) :: left
       integer :: status
 
       call system_clock(now)
       if (real(now - latest, wp) < patience*real(rate, wp)) return
       latest = now
-      if (whole > 0.0_wp) then
-         call write_text(standard_error, achar(13)//'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit &
-            //' computed', status)
+      if (whole > 0.0_wp .and. done > 0.0_wp) then
+         left = real(now - first, wp)/real(rate, wp)*(whole - done)/done
+         line = 'thud: '//fixed(done, 1)//' of at most '//fixed(whole, 1)//' '//unit//' computed, at most '//fixed(left, 0) &
+            //' s left'
+         call write_text(standard_error, achar(13)//line, status)
       else
          call write_text(standard_error, achar(13)//'thud: '//fixed(done, 0)//' '//unit//' computed', status)
       end if

@@ -37,6 +37,9 @@ contains
       do j = 1, force_count
          text = text//','//trim(force_names(j))//'_conforms'
       end do
+      do i = 1, size(many%further_name)
+         text = text//','//trim(many%further_name(i))
+      end do
       text = text//',margin_dB,conforms,status,reason'//newline
    end subroutine get_set_header
 
@@ -54,7 +57,7 @@ contains
       !> Width of a number with its comma.
       integer, parameter :: number_width = 26
       character(len=*), parameter :: numbers_form = '(*(:,",",es24.16e3))'
-      character(len=number_width*(size(table%names) + outcome_count + size(many%level(:, :, 1))) &
+      character(len=number_width*(size(table%names) + outcome_count + size(many%level(:, :, 1)) + size(many%further_name)) &
          + get_rest_width(many)) :: row
       integer :: i, j, at, end_of_text
 
@@ -78,10 +81,12 @@ contains
             do j = 1, force_count
                row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%conforms(j, i)))
             end do
+            if (size(many%further_name) > 0) write (row(len_trim(row) + 1:), numbers_form) many%further(:, i)
             write (row(len_trim(row) + 1:), numbers_form) many%margin(i)
             row(len_trim(row) + 1:) = ','//trim(merge('yes', 'no ', many%verdict(i)))//',0,'//newline
          else
-            row(at:) = repeat(',', outcome_count + size(many%level(many%first_band:, :, i)) + force_count + 3) &
+            row(at:) = repeat(',', outcome_count + size(many%level(many%first_band:, :, i)) + force_count &
+               + size(many%further_name) + 3) &
                //to_text(many%status(i))//','//trim(in_quotes(many%reason(i)%text))//newline
          end if
          at = index(row, newline)

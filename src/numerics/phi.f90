@@ -5,7 +5,19 @@ module thud_phi
    implicit none (type, external)
    private
 
-   public :: get_phi
+   public :: get_phi, max_phi
+
+   !> Number of the last function that is offered.
+   integer, parameter :: max_phi = 8
+
+   !> Terms of the series of phi_n below |z| = 1: 1/18! is left.
+   integer, parameter :: n_term = 18
+
+   !> Runs through the next constant.
+   integer :: number
+   !> Reciprocals of the factorials, from that of 0 on.
+   real(wp), parameter :: inverse_factorial(0:max_phi + n_term) = &
+      [(1/gamma(real(number + 1, wp)), number=0, max_phi + n_term)]
 
 contains
 
@@ -13,31 +25,27 @@ contains
    pure function get_phi(z, highest) result(phi)
       !> Argument, its real part not large.
       complex(wp), intent(in) :: z
-      !> Number of the last function.
+      !> Number of the last function, up to `max_phi`.
       integer, intent(in) :: highest
       !> Their values: [0:highest].
       complex(wp) :: phi(0:highest)
-      ! Terms of the series of phi_n below |z| = 1: 1/20! is left.
-      integer, parameter :: n_term = 20
-      real(wp) :: factorial
+      complex(wp) :: reciprocal
       integer :: k, n
 
-      if (abs(z) < 1.0_wp) then
+      if (real(z, wp)**2 + aimag(z)**2 < 1.0_wp) then
          ! The recursion divides by z, which is stable downwards only.
-         phi(highest) = 1.0_wp
-         do k = n_term, 1, -1
-            phi(highest) = 1 + phi(highest)*z/(highest + k)
+         phi(highest) = inverse_factorial(highest + n_term)
+         do k = highest + n_term - 1, highest, -1
+            phi(highest) = inverse_factorial(k) + phi(highest)*z
          end do
-         phi(highest) = phi(highest)/gamma(real(highest + 1, wp))
          do n = highest - 1, 0, -1
-            phi(n) = z*phi(n + 1) + 1/gamma(real(n + 1, wp))
+            phi(n) = inverse_factorial(n) + z*phi(n + 1)
          end do
       else
+         reciprocal = 1/z
          phi(0) = exp(z)
-         factorial = 1.0_wp
          do n = 0, highest - 1
-            phi(n + 1) = (phi(n) - 1/factorial)/z
-            factorial = factorial*(n + 1)
+            phi(n + 1) = (phi(n) - inverse_factorial(n))*reciprocal
          end do
       end if
    end function get_phi

@@ -92,9 +92,12 @@ contains
       !> What shows it.
       character(len=*), intent(in) :: finding
       type(error_type) :: error
+      character(len=:), allocatable :: shown
 
-      error = numerical_error('&sampling: substeps is too low for this source: '//finding &
-         //'; allowed: more substeps, or a source of lower stiffness over mass')
+      shown = finding
+      if (index(finding, 'NaN') > 0) shown = 'the motion leaves the range of numbers'
+      error = numerical_error('&sampling: substeps is too low for this source: '//shown &
+         //'; allowed: more substeps, a higher sample_rate, or a source of lower stiffness over mass')
    end function coarse_error
 
 end module thud_contact_source

@@ -75,8 +75,9 @@ contains
          call march(source, drop, sampling, history, state, error)
       end if
       if (allocated(error)) return
-      call check_contact_samples(sampling, history%contact_time, error)
-      if (.not. allocated(error)) call finish(source%mass, state, history, error)
+      ! The contact time of a motion whose balances do not close would give a wrong advice.
+      call finish(source%mass, state, history, error)
+      if (.not. allocated(error)) call check_contact_samples(sampling, history%contact_time, error)
    end subroutine solve_lumped
 
    !> Marches from first touch to release on a rigid floor.

@@ -113,24 +113,22 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(mode_type) :: modes(options%frequency%count)
       real(wp) :: step, time, force, deflection, velocity, v0
-      integer :: i, j, n_sample, substeps
+      integer :: i, j, substeps
       logical :: released
 
       modes = new_mode(options%frequency%values(:size(modes)), options%damping_ratio%values(:size(modes)), &
          options%effective_mass%values(:size(modes)))
       v0 = get_impact_velocity(drop)
-      n_sample = get_sample_count(sampling)
       step = 1/sampling%sample_rate
-      history = new_force_history(sampling%sample_rate, n_sample, ['modal_force'])
+      history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['modal_force'])
       history%impact_velocity = v0
       ! Sixteen checks per shortest period find the first zero.
       substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
       released = .false.
-      march: do i = 1, n_sample
+      march: do i = 1, size(history%floor_force)
          call check_interrupt(error)
          if (allocated(error)) return
-         time = (i - 1)*step
-         call get_motion(modes, v0, time, history%deflection(i), history%velocity(i), history%part(i, 1))
+         call get_motion(modes, v0, (i - 1)*step, history%deflection(i), history%velocity(i), history%part(i, 1))
          do j = 1, substeps
             time = (i - 1 + real(j, wp)/substeps)*step
             call get_motion(modes, v0, time, deflection, velocity, force)

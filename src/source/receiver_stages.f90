@@ -10,6 +10,12 @@ module thud_receiver_stages
 
    public :: advance_stages, get_free_motion, new_receiver_stages, receiver_stages_type
 
+   !> Run through the next constant.
+   integer :: power, stage
+   !> Factors m! c**m of the powers m of time at the stages: [n_stage, n_stage].
+   real(wp), parameter :: weight(n_stage, n_stage) = reshape([((gamma(real(power + 1, wp))*radau_node(stage)**power, &
+      power=0, n_stage - 1), stage=1, n_stage)], [n_stage, n_stage])
+
    !> Factors of one step.
    type :: receiver_stages_type
       !> Length of the step, s.
@@ -32,7 +38,7 @@ contains
       type(receiver_stages_type) :: stages
       complex(wp) :: phi(0:n_stage + 1), gain(n_stage), travel(n_stage)
       real(wp) :: time
-      integer :: i, k, m, n
+      integer :: i, k, n
 
       n = 0
       if (allocated(receiver%pole)) n = size(receiver%pole)
@@ -48,15 +54,14 @@ contains
          time = radau_node(i)*interval
          do k = 1, n
             phi = get_phi(receiver%pole(k)*time, n_stage + 1)
-            stages%decay(k) = phi(0)
+            if (i == n_stage) stages%decay(k) = phi(0)
             stages%free_velocity(k, i) = receiver%residue(k)*phi(0)
             stages%free_displacement(k, i) = receiver%residue(k)*time*phi(1)
             ! The force (t/h)**m gives x_k = m! c**m (c h) phi_(m+1), its integral has one c h and one number more.
-            gain = [(gamma(real(m, wp))*radau_node(i)**(m - 1)*time*phi(m), m=1, n_stage)]
-            travel = [(gamma(real(m, wp))*radau_node(i)**(m - 1)*time**2*phi(m + 1), m=1, n_stage)]
-            stages%gain(k, :) = matmul(gain, radau_monomial)
-            travel = matmul(travel, radau_monomial)
-            stages%velocity(i, :) = stages%velocity(i, :) + real(receiver%residue(k)*stages%gain(k, :), wp)
+            gain = matmul(phi(1:n_stage)*weight(:, i), radau_monomial)*time
+            travel = matmul(phi(2:n_stage + 1)*weight(:, i), radau_monomial)*time**2
+            if (i == n_stage) stages%gain(k, :) = gain
+            stages%velocity(i, :) = stages%velocity(i, :) + real(receiver%residue(k)*gain, wp)
             stages%displacement(i, :) = stages%displacement(i, :) + real(receiver%residue(k)*travel, wp)
          end do
       end do
@@ -69,11 +74,20 @@ contains
       type(receiver_motion_type), intent(in) :: motion
       !> Velocity, m/s, and displacement, m, downwards: [n_stage].
       real(wp), intent(out) :: velocity(:), displacement(:)
-      integer :: i
+      real(wp) :: v, w
+      integer :: i, k
 
+      ! Sums in several parts at once; bound by the flow of the factors.
       do i = 1, n_stage
-         velocity(i) = sum(real(stages%free_velocity(:, i)*motion%amplitude, wp))
-         displacement(i) = motion%displacement + sum(real(stages%free_displacement(:, i)*motion%amplitude, wp))
+         v = 0.0_wp
+         w = motion%displacement
+         !$omp simd reduction(+:v, w)
+         do k = 1, size(motion%amplitude)
+            v = v + real(stages%free_velocity(k, i)*motion%amplitude(k), wp)
+            w = w + real(stages%free_displacement(k, i)*motion%amplitude(k), wp)
+         end do
+         velocity(i) = v
+         displacement(i) = w
       end do
    end subroutine get_free_motion
 
@@ -83,10 +97,17 @@ contains
       !> The force downwards at the stages, N: [n_stage].
       real(wp), intent(in) :: force(:)
       type(receiver_motion_type), intent(inout) :: motion
+      real(wp) :: w
+      integer :: k
 
-      motion%displacement = motion%displacement + dot_product(stages%displacement(n_stage, :), force) &
-         + sum(real(stages%free_displacement(:, n_stage)*motion%amplitude, wp))
-      motion%amplitude = stages%decay*motion%amplitude + matmul(stages%gain, force)
+      w = motion%displacement + dot_product(stages%displacement(n_stage, :), force)
+      !$omp simd reduction(+:w)
+      do k = 1, size(motion%amplitude)
+         w = w + real(stages%free_displacement(k, n_stage)*motion%amplitude(k), wp)
+         motion%amplitude(k) = stages%decay(k)*motion%amplitude(k) + stages%gain(k, 1)*force(1) &
+            + stages%gain(k, 2)*force(2) + stages%gain(k, 3)*force(3)
+      end do
+      motion%displacement = w
    end subroutine advance_stages
 
 end module thud_receiver_stages

@@ -16,6 +16,7 @@ from distributed import Client, LocalCluster
 
 import thud
 from thud import cli
+from thud.studies import backends
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks
 from thud.studies.evaluation import Block, evaluate
@@ -102,6 +103,29 @@ def test_killed_worker_of_dask_loses_nothing(cluster: LocalCluster) -> None:
     for found in kept.values():
         for name, values in expected.items():
             np.testing.assert_array_equal(found[name], values)
+
+
+def test_stopped_worker_of_dask_does_not_hold_the_study(
+    cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backends, "SILENCE", 3.0)
+    monkeypatch.setattr(backends, "LOOK", 0.5)
+    blocks = modal_blocks()
+    with Client(cluster, set_as_default=False) as client:
+        pids = list(client.run(os.getpid).values())
+    kept: dict[int, dict[str, Any]] = {}
+
+    def keep(block: Block, found: dict[str, Any]) -> None:
+        if not kept:
+            os.kill(pids[0], signal.SIGSTOP)
+        kept[block.start] = found
+
+    try:
+        with pytest.warns(RuntimeWarning, match=r"was not heard of for 3 s; others compute"):
+            run_blocks(blocks, keep, scheduler=cluster.scheduler_address)
+    finally:
+        os.kill(pids[0], signal.SIGKILL)
+    assert sorted(kept) == [block.start for block in blocks]
 
 
 @pytest.mark.parametrize("written", ["netcdf", "zarr"])

@@ -323,3 +323,28 @@ def test_memory_that_is_short_is_told_in_one_sentence(
         if done.returncode != 0:
             assert (done.returncode, done.stderr.count("\n")) == (2, 1)
             assert re.match(r"thud: .*\d bytes.*; allowed: ", done.stderr)
+
+
+def test_sentence_of_a_diverged_motion_has_no_nan(run: Run, case_file: CaseFile) -> None:
+    case_file("&ball mass = 1e-300 / &drop / &model /")
+    result = run("case.nml")
+    assert result.returncode == 2
+    assert "substeps is too low for this source: the motion leaves the range" in result.stderr
+
+
+def test_advice_for_a_heavily_damped_contact_helps(run: Run, case_file: CaseFile) -> None:
+    substeps, advice = 1, []
+    while substeps < 1000:
+        case_file(
+            "&ball / &drop / &model name = 'hunt_crossley' / &sampling substeps = "
+            f"{substeps} / &hunt_crossley damping = 100 stiffness = 1e12 /"
+        )
+        done = run("case.nml")
+        if done.returncode == 0:
+            break
+        # No rate is named before the steps give the contact its true time.
+        advice.append(re.sub(r": the (balance|motion).*", "", done.stderr))
+        substeps *= 4
+    assert done.returncode == 0
+    assert len(set(advice)) == 1
+    assert "substeps is too low" in advice[0]

@@ -105,7 +105,10 @@ def test_threads_do_not_disturb_each_other() -> None:
         ({"ball": {}}, r"ball = {} is not allowed; allowed: an object of Ball"),
         ({"drop": 0.0}, r"drop = 0.0 is not allowed; allowed: an object of Drop"),
         ({"ball": thud.Ball(mass=10**5000)}, r"&ball: mass = a very large number"),
-        ({"ball": thud.Ball(youngs_modulus=7e10)}, r"&sampling: sample_rate = .* too few samples"),
+        (
+            {"ball": thud.Ball(youngs_modulus=7e10), "substeps": 64},
+            r"&sampling: sample_rate = .* too few samples",
+        ),
     ],
 )
 def test_bad_arguments_are_told(arguments: dict[str, object], words: str) -> None:

@@ -62,6 +62,7 @@ def test_examples_are_measured_as_they_were_made(
         assert drop.restitution.value == pytest.approx(made["restitution"], abs=0.01)
         assert drop.peak_force.value == pytest.approx(made["peak_force"], rel=2e-3)
         assert drop.onset == pytest.approx(made["onset"], abs=1e-3)
+        np.testing.assert_allclose(drop.levels(), made["levels"], atol=0.05)
         assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=1e-4)
     with (tmp_path / "out/levels.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]

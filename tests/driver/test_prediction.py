@@ -183,12 +183,6 @@ def test_floors_and_rooms_that_cannot_be_are_refused(
     assert "allowed: " in done.stderr
 
 
-def test_many_drops_refuse_a_room() -> None:
-    case = thud.Case(floor=thud.Plate(), room=thud.Room())
-    with pytest.raises(thud.InputError, match="many drops have no floor"):
-        thud.solve_many({"mass": [2.4, 2.5]}, case=case)
-
-
 def test_prediction_without_floor_or_room_is_refused(impact: thud.Impact) -> None:
     with pytest.raises(thud.InputError, match="floor is not given"):
         thud.predict_level(impact)

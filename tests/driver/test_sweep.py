@@ -360,7 +360,7 @@ def test_blocks_take_about_half_a_second() -> None:
         return thud.read_study({**HEIGHTS, "fixed": fixed}).block_size
 
     assert size() > size(model="modal_ball") > 10
-    assert size(model="finite_element", viscosity="kelvin_voigt") == 2
+    assert size(model="finite_element", viscosity="kelvin_voigt") == 3
     assert size(model="finite_element", viscosity="fractional") == 1
 
 

@@ -66,6 +66,7 @@ light: thud.Impact = thud.solve(ball, floor=floors[1])
 point: thud.MobilityFit = thud.fit_mobility(([10.0, 20.0, 40.0], [1e-5, 2e-5, 1e-5]), order=1)
 moved: thud.FloorImpact | None = light.on_floor
 assert moved is not None
+impedance: thud.BallImpedance = thud.ball_impedance(light, [1e4, 1e5])
 portions: thud.FloorEnergy = moved.injected_energy("third")
 print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]), moved.difference())
 name: thud.FloorName = chosen

@@ -15,6 +15,7 @@ from pathlib import Path
 from campaign import Part, Report
 from directories import check_calls, check_damage, check_races, plan
 from memory import check_memory
+from namelists import check_namelists
 
 
 def parts() -> dict[str, Part]:
@@ -24,6 +25,7 @@ def parts() -> dict[str, Part]:
         "races": Part(80, 8, check_races),
         "damage": Part(10_000, 60, check_damage, share=100),
         "memory": Part(1000, 12, check_memory),
+        "namelists": Part(1_000_000, 400, check_namelists, share=400),
     }
 
 

@@ -23,6 +23,7 @@ from thud.plot.floor import draw_floor as draw_floor
 from thud.plot.floor_mobilities import floor_mobilities as floor_mobilities
 from thud.plot.force_history import force_history as force_history
 from thud.plot.history import draw_history as draw_history
+from thud.plot.impedance import ball_impedances as ball_impedances
 from thud.plot.level_changes import level_changes as level_changes
 from thud.plot.levels import levels as levels
 from thud.plot.look import COLOURS as COLOURS

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
+from thud.outcomes import RATING
 from thud.plot.look import FORCE_WORDS, SIZE, empty_axes, legend_above
 from thud.plot.parameter_axis import show_parameter
 
@@ -28,7 +29,8 @@ _TINY = 0.05
 def draw_design_map(result: DesignMap) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the sets that conform.
 
-    The margin is positive where all octave levels lie within their limits.
+    The margin is positive where all octave levels lie within their limits. Of a case with a room
+    draw the rating of the standardised levels there.
     """
     dataset = result.dataset
     figure, axes = empty_axes(2.9)
@@ -37,6 +39,12 @@ def draw_design_map(result: DesignMap) -> Figure:
         show_parameter(axes, w, dataset[name]) for w, name in zip(which, result.axes, strict=True)
     ]
     x, y = (dataset[name].values * scale for name, scale in zip(result.axes, scales, strict=True))
+    if RATING in dataset:
+        rating = np.ma.masked_invalid(dataset[RATING].transpose(*result.axes).values.T)
+        _draw_rating(figure, axes, (x, y), rating)
+        axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
+        axes.grid(visible=False)
+        return figure
     margin = np.ma.masked_invalid(dataset["margin"].transpose(*result.axes).values.T)
     conforms = dataset["conforms"].transpose(*result.axes).values.T
     if margin.count():
@@ -67,6 +75,22 @@ def draw_design_map(result: DesignMap) -> Figure:
     if axes.get_legend_handles_labels()[0]:
         legend_above(axes)
     return figure
+
+
+def _draw_rating(
+    figure: Figure, axes: Axes, place: tuple[Values, Values], rating: np.ma.MaskedArray[Any, Any]
+) -> None:
+    """Draw the rating as colours, with lines at round values."""
+    steps = np.asarray(MaxNLocator(8).tick_values(float(rating.min()), float(rating.max())))
+    fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
+    filled = axes.contourf(*place, rating, levels=fine, cmap="cividis_r")
+    inside = steps[(steps > rating.min()) & (steps < rating.max())]
+    if inside.size:
+        lines = axes.contour(*place, rating, inside, colors="black", linewidths=0.5)
+        axes.clabel(lines, fontsize=SIZE - 2, fmt=StrMethodFormatter("{x:g}"))
+    bar = figure.colorbar(filled, ax=axes, ticks=steps)
+    bar.ax.tick_params(labelsize=SIZE)
+    bar.set_label("Standardised L_iA,Fmax, dB re 20 µPa", fontsize=SIZE)
 
 
 def _draw_margin(

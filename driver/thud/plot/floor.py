@@ -68,7 +68,7 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     for i, (name, force) in enumerate(forces.items()):
         recorded = 1e-3 * record_force(force, impact.sample_rate)
         history.plot(time[shown], recorded[shown], label=name, **line_style(i))
-    history.set_ylabel("Force below\n1.25 kHz, kN", fontsize=SIZE)
+    history.set_ylabel("Force on the floor\nbelow 1.25 kHz, kN", fontsize=SIZE)
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLOURS[2], linewidth=1)
     motion.set_ylabel("Velocity of\nthe floor, mm/s", fontsize=SIZE)
     motion.set_xlabel(TIME_LABEL, fontsize=SIZE)

@@ -264,14 +264,21 @@ def find_posteriors(
                 find_edge(force, edges, ahead, likely, rate, middle, searches, window.plate)
             )
         if last + 1 < passes:
-            (t0, s0), (t1, s1) = (one.touch() for one in found)
-            room0, room1 = (5 * s + 3 / rate + 1e-4 for s in (s0, s1))
-            touch, release = (t0 - room0, t0 + room0), (-t1 - room1, -t1 + room1)
+            touch, back = (_reach(one.edge(), 3 / rate + 1e-4) for one in found)
+            release = (-back[1], -back[0])
             # What a filter spreads is no quiet.
             beyond = _spread(rate, window.plate)
             left = max(int(touch[0] * rate) - beyond, first // 2)
             right = min(int(release[1] * rate) + 1 + beyond, (stop + len(force) + 1) // 2)
     return Edges(found[0], found[1], background, offset, (left, right))
+
+
+def _reach(
+    edge: tuple[tuple[float, float], tuple[float, float]], room: float
+) -> tuple[float, float]:
+    """Return times between which first touch and begin lie, with room, s."""
+    ends = np.array([(mean - 5 * spread, mean + 5 * spread) for mean, spread in edge])
+    return float(ends.min()) - room, float(ends.max()) + room
 
 
 def even_edges(start: int, stop: int, rate: float) -> NDArray[np.intp]:

@@ -16,12 +16,14 @@ from thud.levels import RECORDED_BAND, record_force
 from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
+from thud.recordings.levels import measure_levels
 from thud.recordings.noise import Noise
 from thud.recordings.restitution import Fall
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud._schema import BandSet
     from thud.recordings.drops import Window
 
 __all__ = ["Drop", "Estimate", "measure_drop"]
@@ -106,6 +108,16 @@ class Drop:
         """Time since first touch, s, shape (n,)."""
         time: NDArray[np.float64] = self.begin + np.arange(len(self.force)) / self.sample_rate
         return time
+
+    def levels(
+        self, bands: BandSet = "octave", method: str = "exact", *, low_pass: bool = False
+    ) -> NDArray[np.float64]:
+        """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
+
+        The arguments are those of `thud.recordings.levels.measure_levels`, which has their
+        uncertainties too.
+        """
+        return measure_levels([self], bands, method, low_pass=low_pass)[0].level
 
     def band_values(
         self, lower: float, upper: float

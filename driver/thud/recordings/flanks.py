@@ -90,7 +90,7 @@ FOOT_TIME = 1.0
 # Times of one search, each within REACH standard deviations of the one before.
 N_TIME = 33
 REACH = 6.0
-# Draws of each kind of flank that has more than this part of the probability.
+# Draws of each kind of flank; those that have less than a part of the probability are left out.
 N_DRAW = 128
 LEAST = 1e-6
 # Samples are smoothed by these weights, which take the ringing of an anti-aliasing filter.
@@ -144,8 +144,10 @@ class Posterior:
     ----------
     time : ndarray, shape (n_time,)
         Even times of first touch, s.
+    kinds : ndarray, shape (n_kind,)
+        Kinds of flanks that it may be, as places in `KINDS`.
     weight : ndarray, shape (n_kind, n_time)
-        Their probabilities by kind of flank.
+        Probabilities of the times by kind.
     factors : ndarray, shape (n_kind, n_time, n_column, n_column)
         Factors of the information on the shapes, the last row of which holds the data.
     release : bool
@@ -153,34 +155,29 @@ class Posterior:
     """
 
     time: NDArray[np.float64]
+    kinds: NDArray[np.intp]
     weight: NDArray[np.float64]
     factors: NDArray[np.float64]
     release: bool
-
-    def touch(self) -> tuple[float, float]:
-        """Return first touch, s, and its standard deviation, flanks of any sign allowed."""
-        mean, deviation = _moments(self.time, self.weight.sum(axis=0))
-        left = self.weight.sum(axis=1) @ LEFT[:, int(self.release)] ** 2
-        return mean, float(np.hypot(deviation, np.sqrt(left)))
 
     def edge(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return first touch and begin of the contact, s, with their standard deviations.
 
         From draws of kind, time and shape; flanks that no force has are left out.
         """
-        total = self.weight.sum(axis=1)
-        kinds = np.nonzero(total > LEAST)[0]
-        kind = np.repeat(kinds, N_DRAW)
+        kind = np.repeat(self.kinds, N_DRAW)
+        total = np.repeat(self.weight.sum(axis=1), N_DRAW)
         places = (np.arange(N_DRAW) + 0.5) / N_DRAW
-        at = np.ravel([np.searchsorted(self.weight[k].cumsum(), places * total[k]) for k in kinds])
-        touch = self.time[np.minimum(at, len(self.time) - 1)]
-        path = self._paths(kind, np.minimum(at, len(self.time) - 1))
+        at = np.ravel([np.searchsorted(one.cumsum(), places * one.sum()) for one in self.weight])
+        at = np.minimum(at, len(self.time) - 1)
+        touch = self.time[at]
+        path = self._paths(kind, at)
         highest = np.where(kind[:, None] < N_SMOOTH, np.maximum.accumulate(path, axis=1), 0.0)
         delay = _crossing(path, THRESHOLD)
         fast = (delay <= FOOT_TIME) & (_crossing(path, FOOT) <= delay + FOOT_TIME)
-        chance = total[kind] * ((highest - path).max(axis=1) <= FALL) * fast
+        chance = total * ((highest - path).max(axis=1) <= FALL) * fast
         if not chance.any():
-            chance = total[kind]
+            chance = total
         chance /= chance.sum()
         jumps = chance @ (delay == 0)
         results = []
@@ -199,10 +196,13 @@ class Posterior:
 
     def _paths(self, kind: NDArray[np.intp], at: NDArray[np.intp]) -> NDArray[np.float64]:
         """Return draws of the averaged force over the peak: [n, n_delay]."""
-        lower = self.factors[kind, at]
-        normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(kind) // N_DRAW, 1))
-        right = (lower[:, -1, :-1] + normal)[..., None]
-        units = np.linalg.solve(lower[:, :-1, :-1].swapaxes(1, 2), right)[..., 0]
+        row = np.repeat(np.arange(len(self.kinds)), N_DRAW)
+        cells, cell = np.unique(row * len(self.time) + at, return_inverse=True)
+        lower = self.factors.reshape(-1, *self.factors.shape[2:])[cells]
+        inverse = np.linalg.inv(lower[:, :-1, :-1])
+        normal = np.tile(_normal_draws(lower.shape[-1] - 1), (len(self.kinds), 1))
+        right = lower[cell, -1, :-1] + normal
+        units = (right[:, None] @ inverse[cell])[:, 0]
         shapes = units * SPREADS[kind] + MEANS[kind]
         return np.asarray(shapes @ PATHS.T, dtype=np.float64)
 
@@ -210,24 +210,32 @@ class Posterior:
 def find_touch(flank: Flank, low: float, high: float, searches: int) -> Posterior:
     """Return what a flank tells of its first touch, which lies between two times, s."""
     level = flank.force / flank.peak
-    groups = []
-    for part, kinds in zip(MISSED, (slice(N_SMOOTH), slice(N_SMOOTH, None)), strict=True):
+    whitening = []
+    for part in MISSED:
         covariance = flank.covariance / flank.peak**2 + np.diag((part * level) ** 2)
         factor = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
         inverse = solve_triangular(factor, np.eye(len(level)), lower=True, check_finite=False)
-        groups.append((inverse, kinds))
+        whitening.append(inverse)
     table = _table(1e3 * flank.interval, flank.plate)
-    prior = PRIOR[:, int(flank.release), None]
+    kinds = np.arange(len(KINDS))
     for search in range(searches):
         time = np.linspace(low, high, N_TIME)
         columns = _columns(table, 1e3 * (flank.time - time[:, None]), level)
-        found = [_evidence(columns, *group) for group in groups]
-        logarithm = np.concatenate([one for one, _ in found]) + prior
+        found = [
+            _evidence(columns, inverse, members)
+            for inverse, members in zip(
+                whitening, (kinds[kinds < N_SMOOTH], kinds[kinds >= N_SMOOTH]), strict=True
+            )
+            if members.size
+        ]
+        logarithm = np.concatenate([one for one, _ in found])
+        logarithm += PRIOR[kinds, int(flank.release), None]
         weight = np.exp(logarithm - logarithm.max())
         weight /= weight.sum()
-        posterior = Posterior(
-            time, weight, np.concatenate([one for _, one in found]), flank.release
-        )
+        likely = weight.sum(axis=1) > LEAST
+        kinds, weight = kinds[likely], weight[likely]
+        factors = np.concatenate([one for _, one in found])[likely]
+        posterior = Posterior(time, kinds, weight, factors, flank.release)
         mean, deviation = _moments(time, weight.sum(axis=0))
         reach = REACH * deviation
         if search + 1 == searches or (mean - reach <= low and mean + reach >= high):
@@ -243,7 +251,7 @@ def _moments(time: NDArray[np.float64], weight: NDArray[np.float64]) -> tuple[fl
 
 
 def _evidence(
-    columns: NDArray[np.float64], inverse: NDArray[np.float64], kinds: slice
+    columns: NDArray[np.float64], inverse: NDArray[np.float64], kinds: NDArray[np.intp]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return logarithms of the likelihood by kind and time, and factors of the information.
 

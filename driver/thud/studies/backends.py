@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import os
+import time
+import warnings
 from concurrent.futures import (
     FIRST_COMPLETED,
     Executor,
@@ -32,6 +34,11 @@ if TYPE_CHECKING:
 BACKENDS = ("threads", "processes", "dask")
 # Time limit for a scheduler to answer, s.
 PATIENCE = 5
+# Time after which a worker that is not heard of has its blocks taken away, s; they are heard of
+# several times in that, also while they compute.
+SILENCE = 60.0
+# Time between two looks at the workers, s.
+LOOK = 5.0
 
 
 def run_blocks(
@@ -47,16 +54,16 @@ def run_blocks(
     the backend loses a block.
     """
     backend, workers, scheduler = checked_backend(backend, workers, scheduler)
-    with _open(backend, workers, scheduler) as (executor, width):
+    with _open(backend, workers, scheduler) as (executor, width, look):
         running: dict[Future[dict[str, NDArray[Any]]], Block] = {}
         try:
             for block in blocks:
                 if len(running) >= 2 * width:
-                    _collect(running, keep)
+                    _collect(running, keep, look)
                 with no_interrupt_in_processes():
                     running[executor.submit(evaluate, block)] = block
             while running:
-                _collect(running, keep)
+                _collect(running, keep, look)
         except BaseException as error:
             # Running blocks are waited for and kept. After an interrupt the backend ends them.
             interrupted = isinstance(error, KeyboardInterrupt)
@@ -90,8 +97,14 @@ def checked_backend(
     return backend, workers, scheduler
 
 
-def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) -> None:
-    done, _ = wait(running, return_when=FIRST_COMPLETED)
+def _collect(
+    running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep, look: Callable[[], None]
+) -> None:
+    """Keep the blocks that are done, at least one; look after the workers meanwhile."""
+    done, _ = wait(running, LOOK, FIRST_COMPLETED)
+    while not done:
+        look()
+        done, _ = wait(running, LOOK, FIRST_COMPLETED)
     for future in done:
         try:
             found = future.result()
@@ -112,8 +125,8 @@ def _collect(running: dict[Future[dict[str, NDArray[Any]]], Block], keep: Keep) 
 @contextmanager
 def _open(
     backend: str, workers: int | None, scheduler: str | None
-) -> Iterator[tuple[Executor, int]]:
-    """Open a backend; yield its executor and how many blocks run at once.
+) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
+    """Open a backend; yield its executor, how many blocks run at once, and what looks after it.
 
     An interrupt ends the blocks that are running.
     """
@@ -125,18 +138,22 @@ def _open(
     if backend == "threads":
         with ThreadPoolExecutor(width) as threads:
             try:
-                yield threads, width
+                yield threads, width, _no_look
             except KeyboardInterrupt:
                 threads.shutdown(wait=False, cancel_futures=True)
                 api.end_calls()
                 raise
         return
     with process_pool(width) as processes:
-        yield processes, width
+        yield processes, width, _no_look
+
+
+def _no_look() -> None:
+    """Threads and processes of this machine are waited for."""
 
 
 @contextmanager
-def _dask(address: str) -> Iterator[tuple[Executor, int]]:
+def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
     with require_extra("dask"):
         from distributed import Client  # noqa: PLC0415 - an optional package
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
@@ -164,10 +181,47 @@ def _dask(address: str) -> Iterator[tuple[Executor, int]]:
         width = sum(client.nthreads().values())
         with client.get_executor() as executor:
             try:
-                yield executor, width
+                yield executor, width, lambda: _drop_silent_workers(client)
             except KeyboardInterrupt:
                 executor.shutdown(wait=False)
                 raise
+
+
+def _drop_silent_workers(client: Any) -> None:  # noqa: ANN401 - of an optional package
+    """Take the blocks of workers that are not heard of away from them, for others to compute.
+
+    Raise NumericalError where none is left, or the scheduler does not answer.
+    """
+    limit = SILENCE
+
+    # Sent as it stands: the scheduler may have no thud.
+    async def drop(dask_scheduler: Any) -> tuple[list[str], int]:  # noqa: ANN401
+        workers = dask_scheduler.workers
+        heard = {address: worker.last_seen for address, worker in workers.items()}
+        silent = [address for address in heard if time.time() - heard[address] > limit]
+        for address in silent:
+            await dask_scheduler.remove_worker(address, stimulus_id="silent")
+        return silent, len(workers)
+
+    try:
+        silent, left = client.sync(client._run_on_scheduler, drop, callback_timeout=limit)  # noqa: SLF001 - the public one waits for ever
+    except (TimeoutError, OSError) as error:
+        message = (
+            f"the scheduler does not answer within {limit:g} s; what was finished is kept; "
+            "allowed: run the study again"
+        )
+        raise NumericalError(message) from error
+    for address in silent:
+        message = (
+            f"the worker {address} was not heard of for {limit:g} s; others compute its blocks"
+        )
+        warnings.warn(message, RuntimeWarning, stacklevel=2)
+    if silent and not left:
+        message = (
+            "no worker of the scheduler is heard of; what was finished is kept; "
+            "allowed: run the study again"
+        )
+        raise NumericalError(message)
 
 
 @contextmanager

@@ -11,7 +11,9 @@ import numpy as np
 import xarray as xr
 
 from thud._api import compiler, version
+from thud.floors.rating import rated_bands
 from thud.levels import BANDWIDTHS, get_bands
+from thud.outcomes import FURTHER, ROOM_LEVEL
 from thud.studies.designs import makers
 from thud.studies.evaluation import LEVELS, SCALARS, level_names
 
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from thud.studies.sets import Columns, SetStudy
 
 _LEVEL = "force exposure level of the {} force, re 1 N and 1 s"
+# Dimensions that are bands: those of the levels, and the thirds in a room.
+BANDS = (*BANDWIDTHS, ROOM_BAND := "room_third")
 MEANINGS = {
     **SCALARS,
     **{name: ("dB", _LEVEL.format(force)) for name, (force, _) in LEVELS.items()},
@@ -34,9 +38,12 @@ MEANINGS = {
     "status": ("1", "0: computed; otherwise the exit code of the error"),
     "reason": ("1", "why there are no results"),
 }
-# Those and what only sets of a surrogate, and of its training, have.
+# Those and what only sets on floors, of a surrogate, and of its training, have.
+_CONTACT = {f"contact_{bands}_level": bands for bands in BANDWIDTHS}
 _ALL = {
     **MEANINGS,
+    **dict.fromkeys(_CONTACT, ("dB", "force exposure level on the floor that moves, re 1 N, 1 s")),
+    **FURTHER,
     "doubtful": ("1", "the verdict could change by the errors of the surrogate"),
     "peaks": ("1", "number of peaks of the judged force"),
 }
@@ -55,7 +62,7 @@ def disk_space(study: SetStudy) -> int:
 
 def coordinate(parameter: Parameter) -> str:
     """Return the name of a parameter's coordinate; some keys are named as results are."""
-    name = parameter.name.replace("(", "_").rstrip(")")
+    name = parameter.name.replace("(", "_").replace(".", "_").rstrip(")")
     return f"{parameter.key.group}_{name}" if name in _ALL else name
 
 
@@ -65,14 +72,18 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
     `columns` holds their parameters by name, `found` what `evaluate` returns.
     """
     levels = level_names(study.case)
+    dimension: dict[str, str] = {**{name: bands for name, (_, bands) in levels.items()}, **_CONTACT}
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in levels.values())
+    if ROOM_LEVEL in found:
+        dimension[ROOM_LEVEL] = ROOM_BAND
+        coordinates |= room_coordinates()
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
         coordinates[coordinate(parameter)] = ("set", values, _attributes(study, parameter))
     variables = {}
     for name, values in found.items():
         unit, meaning = _ALL[name]
-        dimensions = ("set", levels[name][1]) if name in levels else ("set",)
+        dimensions = ("set", dimension[name]) if name in dimension else ("set",)
         attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
         if study.surrogate and name in study.surrogate.outputs:
             attributes["surrogate_error"] = study.surrogate.error_of(name)
@@ -84,6 +95,12 @@ def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:
     """Return the nominal frequencies of bands by the names of their dimensions."""
     attributes = {"units": "Hz", "long_name": "nominal frequency"}
     return {bands: (bands, get_bands(bands).nominal, attributes) for bands in kinds}
+
+
+def room_coordinates() -> dict[str, Any]:
+    """Return the nominal frequencies of the thirds in a room by the name of their dimension."""
+    attributes = {"units": "Hz", "long_name": "nominal frequency"}
+    return {ROOM_BAND: (ROOM_BAND, rated_bands(BANDWIDTHS[1]), attributes)}
 
 
 def _attributes(study: SetStudy, parameter: Parameter) -> dict[str, Any]:
@@ -139,7 +156,7 @@ def origin(case: Case) -> dict[str, str]:
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset with variables in their order, which Zarr does not keep."""
     results = {name: dataset.variables[name] for name in _ALL if name in dataset.data_vars}
-    names = [*BANDWIDTHS, *dataset.attrs["parameters"].split()]
+    names = [*BANDS, *dataset.attrs["parameters"].split()]
     coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
     return xr.Dataset(results, coordinates, dataset.attrs)
 
@@ -148,7 +165,7 @@ def grid_of(study: SetStudy, dataset: xr.Dataset) -> xr.Dataset:
     """Return the dataset of a complete grid with one dimension per parameter instead of ``set``."""
     if study.design != "grid":
         return dataset
-    coordinates = {name: dataset[name] for name in BANDWIDTHS if name in dataset.coords}
+    coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}
     names = [coordinate(parameter) for parameter in study.parameters]
     axes = {
         name: (name, _objects(parameter.grid()), dataset[name].attrs)

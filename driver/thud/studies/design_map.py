@@ -10,6 +10,7 @@ from thud.case import Case
 from thud.checks import refuse
 from thud.display import Displayed
 from thud.keys import DENSITY
+from thud.outcomes import RATING
 from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume
@@ -38,7 +39,8 @@ class DesignMap(Displayed):
     ----------
     dataset : Dataset
         Every set, on a grid of the two parameters in ascending order; ``margin`` is the minimum
-        distance of an octave level to its limits, dB, and ``conforms`` the whole verdict.
+        distance of an octave level to its limits, dB, and ``conforms`` the whole verdict; of a case
+        with a room ``standardised_rating`` is drawn, dB.
     axes : tuple of str
         The two parameters.
     mark : tuple of float or None
@@ -70,9 +72,12 @@ class DesignMap(Displayed):
         rows.append(("all criteria conform", f"{int(self.dataset['conforms'].sum())}"))
         if "doubtful" in self.dataset:
             rows.append(("in doubt by the surrogate", f"{int(self.dataset['doubtful'].sum())}"))
-        if margin.notnull().any():
-            best = margin.isel(margin.argmax(...))
-            rows.append(("largest margin, dB", f"{float(best):z.2f}"))
+        words, sign, quantity = "largest margin, dB", 1, margin
+        if RATING in self.dataset:
+            words, sign, quantity = "lowest standardised rating, dB", -1, self.dataset[RATING]
+        if quantity.notnull().any():
+            best = quantity.isel((sign * quantity).argmax(...))
+            rows.append((words, f"{float(best):z.2f}"))
             for name in self.axes:
                 power = self.dataset[name].attrs["shown_power"]
                 unit = self.dataset[name].attrs["shown_unit"]

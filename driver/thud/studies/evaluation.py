@@ -13,6 +13,7 @@ from thud.checks import refuse
 from thud.ensemble import solve_many
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, peak_count
+from thud.outcomes import FURTHER
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,7 +56,8 @@ def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
     Returns the `SCALARS`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
-    ``conforms``; ``status`` and ``reason``; of a surrogate ``doubtful``; where they are counted,
+    ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and the like, and
+    `FURTHER`; of a surrogate ``doubtful``; where they are counted,
     the ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
@@ -70,6 +72,8 @@ def evaluate(block: Block) -> Columns:
     columns: Columns = {name: getattr(found, name) for name in SCALARS}
     for name, (force, bands) in level_names(block.case).items():
         columns[name] = found.levels[force, bands]
+    columns |= {f"contact_{bands}_level": level for bands, level in found.contact_levels.items()}
+    columns |= {n: v for n in FURTHER if (v := getattr(found, n)) is not None}
     if block.counts_peaks:
         forces = getattr(found, f"{block.case.levels.force}_force")
         columns["peaks"] = np.array(

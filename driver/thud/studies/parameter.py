@@ -161,10 +161,10 @@ def _in_unit(value: Value, power: int) -> Value:
     return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
 
 
-def varied(name: str, given: object, model: str, centre: Value | None) -> Parameter:
+def varied(name: str, given: object, owners: tuple[str, ...], centre: Value | None) -> Parameter:
     """Return a parameter that varies; `centre`, its value in the case, is the default mean."""
     words = [word for form in FORMS.values() for word in form]
-    place, key, given, power = _begin(name, given, model, words)
+    place, key, given, power = _begin(name, given, owners, words)
     form = next((form for form in FORMS if form in given), None)
     if form is None:
         refuse(
@@ -192,7 +192,7 @@ def varied(name: str, given: object, model: str, centre: Value | None) -> Parame
     return Parameter(**found, unit=given.get("unit"), name=name, key=key)
 
 
-def fitted(name: str, given: object, model: str) -> Parameter:
+def fitted(name: str, given: object, owners: tuple[str, ...]) -> Parameter:
     """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
     if isinstance(given, Parameter):
         given = given.given
@@ -200,7 +200,7 @@ def fitted(name: str, given: object, model: str) -> Parameter:
         given = {}
     elif not isinstance(given, Mapping):
         given = {"start": given}
-    place, key, given, power = _begin(name, given, model, FITTED)
+    place, key, given, power = _begin(name, given, owners, FITTED)
     numbers: dict[str, Any] = {}
     for word, value in given.items():
         if word != "unit" and value is not None:
@@ -210,11 +210,11 @@ def fitted(name: str, given: object, model: str) -> Parameter:
 
 
 def _begin(
-    name: str, given: object, model: str, words: Sequence[str]
+    name: str, given: object, owners: tuple[str, ...], words: Sequence[str]
 ) -> tuple[str, Key, Mapping[str, Any], int]:
     """Return place, key, table and power of ten of the unit of a parameter."""
     place = f"[parameters] {name}"
-    key, entry = find_key(name, model)
+    key, entry = find_key(name, owners)
     if key.kind == "list" and entry is None:
         refuse(f"{place} is a list", f"one entry of it, such as {name + '(1)'!r}")
     if not isinstance(given, Mapping):

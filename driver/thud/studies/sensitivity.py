@@ -11,6 +11,7 @@ import xarray as xr
 from thud.checks import refuse
 from thud.display import Displayed
 from thud.levels import get_bands
+from thud.outcomes import FURTHER
 from thud.studies.dataset import coordinate
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind
@@ -148,6 +149,9 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
     peak = "peak_elastic_force" if force == "elastic" else "peak_force"
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)}
+    # On a floor, what comes below it.
+    further = (name for name in FURTHER if name in dataset and dataset[name].ndim == 1)
+    outputs |= {name.replace("_", " "): dataset[name].values for name in further}
     dimension = len(study.parameters)
     usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_SAMPLES:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
 from thud._schema import KEYS
 from thud.checks import refuse, require_choice
-from thud.keys import OF_FILES
+from thud.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
@@ -47,6 +47,12 @@ MAX_SETS = 100_000
 _FILE_FORMATS = ("auto", "netcdf", "zarr")
 
 
+def _require_no_floor(case: Case) -> None:
+    """Raise InputError where a surrogate would have to know a floor."""
+    if case.floor:
+        refuse("[surrogate] knows no floors", "a case without &floor")
+
+
 class DropsKind(Kind[SetStudy, R]):
     """A kind of study that needs drops around its case."""
 
@@ -60,7 +66,7 @@ class DropsKind(Kind[SetStudy, R]):
         """Return a parameter that varies."""
         if name == "bands":
             refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all sets")
-        return varied(name, given, case.model.name, centre)  # type: ignore[union-attr]
+        return varied(name, given, users(case), centre)
 
     def complete(self, study: Study, given: Mapping[str, Any], folder: Path) -> SetStudy:
         """Return a study with its design."""
@@ -79,6 +85,7 @@ class DropsKind(Kind[SetStudy, R]):
         found = SetStudy(**head, **design, temperature=temperature, format=written)
         if "surrogate" not in given:
             return found
+        _require_no_floor(case)
         plan = read_plan(table_of(given, "surrogate"), folder)
         if isinstance(plan, Surrogate):
             return self.with_surrogate(found, plan)
@@ -88,6 +95,7 @@ class DropsKind(Kind[SetStudy, R]):
         self, study: SetStudy, given: Surrogate | str | os.PathLike[str]
     ) -> SetStudy:
         """Return a study whose sets a surrogate answers. Raises InputError where it cannot."""
+        _require_no_floor(study.case)
         surrogate = given if isinstance(given, Surrogate) else read_surrogate(given)
         surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
         return replace(study, plan=None, surrogate=surrogate)

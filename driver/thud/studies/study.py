@@ -20,7 +20,7 @@ from thud._schema import MODELS
 from thud.case import Case, check_case, new_model, read_case
 from thud.checks import refuse, refuse_value, require_kind, require_words
 from thud.errors import InputError
-from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put
+from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ def fix_keys(
         if name == "model":
             continue
         place = f"{table} {name}"
-        key, place_in_list = find_key(name, case.model.name)  # type: ignore[union-attr]
+        key, place_in_list = find_key(name, users(case))
         if key == TEMPERATURE:
             refuse(f"{place} is not allowed", "temperature in [parameters]")
         value = quantity(place, entry, key.unit)
@@ -265,8 +265,14 @@ def wall_volume(outer_radius: Any, wall_thickness: Any) -> Any:  # noqa: ANN401 
 
 def value_in(case: Case, name: str) -> Value | None:
     """Return the value of a key in a case; None where it has none, or a list of them."""
-    groups = (case.ball, case.drop, case.sampling, case.levels, case.limits, case.model)
-    key, _, entry = name.partition("(")
+    groups: tuple[object, ...] = (
+        case.ball, case.drop, case.sampling, case.levels, case.limits, case.model, case.floor,
+        case.room,
+    )  # fmt: skip
+    group, dot, rest = name.rpartition(".")
+    if dot:
+        groups = (case.room if group == "room" else case.floor,)
+    key, _, entry = rest.partition("(")
     values = (getattr(group, key, None) for group in groups)
     found = next((value for value in values if value is not None), None)
     if isinstance(found, tuple) and entry:

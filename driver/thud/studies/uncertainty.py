@@ -12,6 +12,7 @@ from scipy.stats import binomtest
 from thud.checks import refuse
 from thud.display import Displayed
 from thud.levels import get_bands, octave_limits
+from thud.outcomes import RATING
 from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:
@@ -103,6 +104,11 @@ class Uncertainty(Displayed):
             share = np.mean((level >= lower[i]) & (level <= upper[i]))
             spread = f"{level.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
             rows.append((f"{band:g}", f"{level.mean():.2f}", *spread, f"{100 * share:.1f} %"))
+        if RATING in self.dataset:
+            rating = self.dataset[RATING].values[self.dataset["status"].values == 0]
+            low, high = np.quantile(rating, [0.025, 0.975])
+            spread = f"{rating.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
+            rows.append(("rating, standardised", f"{rating.mean():.2f}", *spread, ""))
         low, high = self.interval
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
         interval = f"{100 * low:.1f} to {100 * high:.1f} %"

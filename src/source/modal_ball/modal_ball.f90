@@ -284,10 +284,13 @@ contains
       type(ball_motion_type), intent(in) :: state
       !> The ball touches, or may touch again.
       type(error_type), allocatable, intent(out) :: error
+      character(len=64) :: allowed
 
       if (.not. left) then
+         allowed = 'longer than that'
+         if (state%floor_moves) allowed = 'longer than that, and a floor from which the ball rebounds'
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s ends less than ' &
-            //to_text(quiet)//' s after the last contact; allowed: longer than that')
+            //to_text(quiet)//' s after the last contact; allowed: '//trim(allowed))
       else if (state%floor_moves) then
          if (can_strike(state%floor, state%floor_motion, minval(state%gap(::contact%n_way)), state%speed)) then
             error = input_error('&sampling: duration = '//to_text(sampling%duration) &

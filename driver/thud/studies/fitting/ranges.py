@@ -11,7 +11,7 @@ import numpy as np
 from thud._schema import KEYS
 from thud.checks import refuse, require_kind, suggestion
 from thud.errors import InputError
-from thud.keys import limits, put
+from thud.keys import limits, put, users
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def fitted_parameter(name: str, given: object, case: Case) -> Parameter:
             f"{suggestion(name, known)}",
             ", ".join(known),
         )
-    return fitted(name, given, case.model.name)  # type: ignore[union-attr]
+    return fitted(name, given, users(case))
 
 
 def bound_parameters(

@@ -1,0 +1,271 @@
+"""Impedance of a source during its impact, from the force on floors that are resistances."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud._api import api, call
+from thud._schema import BandSet, InfinitePlate
+from thud.case import Case, case_text
+from thud.checks import refuse, refuse_value, require_array, require_kind, require_real
+from thud.display import MAKERS, Displayed
+from thud.impact import Impact, new_floor_impact
+from thud.levels import force_exposure_levels, get_bands
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud._schema import FloorOptions
+
+# From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
+RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
+# Lines in a band of one third octave at 25 Hz.
+_DENSITY = 64
+# Part of the impact velocity below which the motion counts as that at maximum deflection.
+_SLOW = 0.25
+
+
+@dataclass(frozen=True, repr=False)
+class BallImpedance(Displayed):
+    """Impedance of a source during its impact, and the floors on which it matters.
+
+    A linear source that stays in contact acts on a floor of the impedance Z as a force F_b, that on
+    a rigid floor, over its own impedance Z_B: F = F_b/(1 + Z_B/Z). An impact is neither linear nor
+    without end; its Z_B is what this equation gives for the forces F on a resistance Z and F_b, in
+    bands, and tends to a limit as Z grows.
+
+    Attributes
+    ----------
+    case : Case
+        Case of the impact on a rigid floor.
+    bands : str
+        Kind of the bands.
+    frequency : ndarray, shape (n_band,)
+        Rounded mid frequencies, Hz.
+    resistance : ndarray, shape (n_floor,)
+        Resistances of the floors, ascending, N s/m.
+    change : ndarray, shape (n_floor, n_band)
+        Level of the contact force less that of the blocked force, dB.
+    estimate : ndarray, shape (n_floor, n_band)
+        Complex impedance by the force on each floor, N s/m.
+    tangent_mass, tangent_stiffness, tangent_damping : float
+        Mass, kg, stiffness, N/m, and damping, N s/m, of the source at maximum deflection on a rigid
+        floor.
+    """
+
+    case: Case
+    bands: BandSet
+    frequency: NDArray[np.float64]
+    resistance: NDArray[np.float64]
+    change: NDArray[np.float64]
+    estimate: NDArray[np.complex128]
+    tangent_mass: float
+    tangent_stiffness: float
+    tangent_damping: float
+
+    def __repr__(self) -> str:
+        """Return the tangent and the range of the impedance."""
+        size = np.abs(self.impedance)
+        return (
+            f"<BallImpedance: {size.min():.0f} to {size.max():.0f} N s/m in bands; at maximum "
+            f"deflection {self.tangent_mass:.2f} kg, {self.tangent_stiffness / 1e3:.1f} kN/m, "
+            f"loss factor {self.tangent_loss_factor:.2f}>"
+        )
+
+    @property
+    def impedance(self) -> NDArray[np.complex128]:
+        """Complex impedance in bands, N s/m, shape (n_band,): that on the heaviest floor."""
+        last: NDArray[np.complex128] = self.estimate[-1]
+        return last
+
+    @property
+    def tangent_loss_factor(self) -> float:
+        """Loss factor at the natural frequency of tangent mass and stiffness."""
+        return self.tangent_damping / math.sqrt(self.tangent_stiffness * self.tangent_mass)
+
+    def tangent(self, frequency: ArrayLike) -> NDArray[np.complex128]:
+        """Return the impedance of tangent mass behind spring and damper, N s/m, shape (n,).
+
+        That of steady vibration about the maximum deflection, which no impact has time for.
+
+        Parameters
+        ----------
+        frequency : array_like, shape (n,)
+            Frequencies above 0, Hz.
+        """
+        values = require_real("frequency", require_array("frequency", frequency, dimensions=(1,)))
+        if not (values > 0).all():
+            refuse_value("frequency", float(values.min()), "above 0")
+        s = 2j * np.pi * values
+        spring = self.tangent_damping + self.tangent_stiffness / s
+        return np.asarray(1 / (1 / (s * self.tangent_mass) + 1 / spring))
+
+    def limit(self, decibels: float = 1.0) -> NDArray[np.float64]:
+        """Return the resistance below which a floor changes the level, N s/m, shape (n_band,).
+
+        As the change goes with one over the resistance, it is interpolated between the floors with
+        a power of it. NaN where no floor changes the level so much.
+
+        Parameters
+        ----------
+        decibels
+            Change of the level, dB, above 0.
+        """
+        if not 0 < decibels < math.inf:
+            refuse_value("decibels", decibels, "above 0")
+        size = np.log10(np.maximum(np.abs(self.change), 1e-12))
+        wanted = math.log10(decibels)
+        place = np.log10(self.resistance)
+        found = np.full(len(self.frequency), np.nan)
+        for band, column in enumerate(size.T):
+            above = np.flatnonzero(column >= wanted)
+            if len(above) == 0:
+                continue
+            i = above[-1]
+            if i == len(place) - 1:
+                refuse_value(
+                    "decibels", decibels, f"above {10 ** column[i]:.2g}, the change by the heaviest"
+                )
+            part = (column[i] - wanted) / (column[i] - column[i + 1])
+            found[band] = 10 ** (place[i] + part * (place[i + 1] - place[i]))
+        return found
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text, a band each."""
+        head = ("band, Hz", "impedance, N s/m", "phase, degrees", "1 dB below, N s/m")
+        lines = zip(self.frequency, self.impedance, self.limit(), strict=True)
+        cells = [
+            (f"{f:g}", f"{abs(z):.0f}", f"{np.angle(z, deg=True):.0f}",
+             f"{self.resistance[0]:.0f} or less" if np.isnan(limit) else f"{limit:.0f}")
+            for f, z, limit in lines
+        ]  # fmt: skip
+        return [head, *cells]
+
+    def plot(self, floors: Mapping[str, FloorOptions] | None = None) -> Figure:
+        """Draw the impedances of source and floors, and the change of the levels by floors.
+
+        Parameters
+        ----------
+        floors
+            Floors by their names in the legend.
+        """
+        figure: Figure = MAKERS["impedance"]({"": self}, floors or {})
+        return figure
+
+
+def ball_impedance(
+    source: Impact, resistance: ArrayLike | None = None, bands: BandSet = "octave"
+) -> BallImpedance:
+    """Return the impedance of a source during its impact.
+
+    The source is dropped on floors that are resistances, as infinite plates are, and the forces are
+    compared with that on a rigid floor. Estimates on one floor and the next tell how far the source
+    is from a linear one.
+
+    Parameters
+    ----------
+    source
+        Impact of a model that feels a moving floor. Its record must last until the source has left
+        the lightest floor.
+    resistance : array_like, shape (n_floor,)
+        Resistances, ascending, N s/m; by default 14 from 562 to 1e6.
+    bands
+        ``"octave"`` or ``"third"``.
+
+    Raises
+    ------
+    InputError
+        Where the model does not feel the floor, a resistance is out of range, or the source stays
+        on a floor.
+
+    Examples
+    --------
+    >>> import thud
+    >>> ball = thud.ball_impedance(thud.solve(), resistance=[1e5, 1e6])
+    >>> ball.impedance[:2].real.round()
+    array([311., 436.])
+    """
+    require_kind("source", source, Impact)
+    values = RESISTANCES if resistance is None else resistance
+    floors = require_real("resistance", require_array("resistance", values, dimensions=(1,)))
+    if len(floors) == 0 or not (np.diff(floors) > 0).all():
+        refuse("resistance: the values do not ascend", "one value or more, ascending")
+    edges = get_bands(bands)
+    blocked = source.levels(bands, force="floor")
+    spectrum = _band_spectra(source.floor_force, source.sample_rate, bands)
+    changes, estimates = [], []
+    for value in floors:
+        force = _force_on(source, float(value))
+        changes.append(
+            force_exposure_levels(force, source.sample_rate, bands, source.level_method) - blocked
+        )
+        pairs = zip(spectrum, _band_spectra(force, source.sample_rate, bands), strict=True)
+        estimates.append([value * np.vdot(f, fb - f) / np.vdot(f, f) for fb, f in pairs])
+    mass, stiffness, damping = _tangent(source)
+    return BallImpedance(
+        case=source.case,
+        bands=bands,
+        frequency=edges.nominal,
+        resistance=np.array(floors, dtype=np.float64),
+        change=np.array(changes),
+        estimate=np.array(estimates),
+        tangent_mass=mass,
+        tangent_stiffness=stiffness,
+        tangent_damping=damping,
+    )
+
+
+def _force_on(source: Impact, resistance: float) -> NDArray[np.float64]:
+    """Return the force of the same drop on a resistance, N, shape (n_sample,)."""
+    case = replace(
+        source.case, modes=None, compression=None, room=None, floor=InfinitePlate(resistance)
+    )
+    moved = new_floor_impact(case, call(api.drop_on_floor, case_text(case)), source.floor_force)
+    if moved is None:
+        refuse(
+            "source: its model has one force on all floors", "an impact of a model that feels them"
+        )
+    return moved.floor_force
+
+
+def _band_spectra(
+    force: NDArray[np.float64], sample_rate: float, bands: BandSet
+) -> list[NDArray[np.complex128]]:
+    """Return the spectrum of a force in each band, at the same density of lines per band."""
+    edges = get_bands(bands)
+    time = np.arange(len(force)) / sample_rate
+    used = np.flatnonzero(force)
+    end = used[-1] + 1 if len(used) else 1
+    found: list[NDArray[np.complex128]] = []
+    for low, high in zip(edges.lower, edges.upper, strict=True):
+        lines = low + (np.arange(_DENSITY) + 0.5) * (high - low) / _DENSITY
+        waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(lines, time[:end]))
+        found.append(waves @ force[:end])
+    return found
+
+
+def _tangent(source: Impact) -> tuple[float, float, float]:
+    """Return mass, stiffness and damping about the maximum deflection, by least squares.
+
+    F - F_max = k (d - d_max) + c d' and F = -m d'' where d' is below a quarter of its first value.
+    """
+    deepest = int(np.argmax(source.deflection))
+    slow = np.abs(source.velocity) < _SLOW * source.impact_velocity
+    first = deepest - int(np.argmin(slow[deepest::-1])) + 1
+    last = deepest + int(np.argmin(slow[deepest:]))
+    part = slice(first, last)
+    columns = np.stack(
+        [np.ones(last - first), source.deflection[part], source.velocity[part]], axis=1
+    )
+    scale = np.abs(columns).max(axis=0)
+    solution = np.linalg.lstsq(columns / scale, source.floor_force[part], rcond=None)[0] / scale
+    acceleration = np.gradient(source.velocity, 1 / source.sample_rate)[part]
+    mass = -float(source.floor_force[part] @ acceleration / (acceleration @ acceleration))
+    return mass, float(solution[1]), float(solution[2])

@@ -1,0 +1,120 @@
+"""Impedance of a source during its impact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import thud
+
+STIFFNESS = 6e4
+MASS = 2.5
+
+
+@pytest.fixture(scope="module")
+def linear() -> thud.BallImpedance:
+    """Return the impedance of a mass on a spring."""
+    impact = thud.solve(
+        thud.Ball(mass=MASS), model="hunt_crossley", stiffness=STIFFNESS, exponent=1.0
+    )
+    return thud.ball_impedance(impact, resistance=[1e3, 1e4, 1e5])
+
+
+def closed_spectrum(frequency: np.ndarray, resistance: float) -> np.ndarray:
+    """Return the spectrum of the force of the linear source, by its closed form.
+
+    F = k v0/w exp(-b t) sin w t up to pi/w, b = k/(2 Z), w**2 = k/M - b**2 (physics of a mass on a
+    spring on a resistance).
+    """
+    decay = STIFFNESS / (2 * resistance)
+    rate = np.sqrt(STIFFNESS / MASS - decay**2)
+    s = decay + 2j * np.pi * frequency
+    speed = np.sqrt(2 * 9.81)
+    return STIFFNESS * speed * (1 + np.exp(-s * np.pi / rate)) / (s**2 + rate**2)
+
+
+def test_linear_source_has_its_closed_form(linear: thud.BallImpedance) -> None:
+    bands = thud.get_bands()
+    for i, resistance in enumerate(linear.resistance):
+        for j, (low, high) in enumerate(zip(bands.lower, bands.upper, strict=True)):
+            lines = low + (np.arange(2000) + 0.5) * (high - low) / 2000
+            blocked, moved = closed_spectrum(lines, 1e15), closed_spectrum(lines, resistance)
+            expected = resistance * np.vdot(moved, blocked - moved) / np.vdot(moved, moved)
+            change = 10 * np.log10(np.vdot(moved, moved).real / np.vdot(blocked, blocked).real)
+            # 64 lines in a band, and samples of a force that ends with an edge.
+            assert abs(linear.estimate[i, j] - expected) < 3e-3 * abs(expected)
+            assert linear.change[i, j] == pytest.approx(change, abs=2e-3)
+
+
+def test_all_levels_of_a_linear_source_change_alike(linear: thud.BallImpedance) -> None:
+    # To the first order in 1/Z the force is that on a rigid floor times exp(-b t), and about the
+    # middle of a symmetric pulse the factor is exp(-b pi/(2 w)) in each band: pi/4 sqrt(k M)/Z.
+    expected = np.pi / 4 * np.sqrt(STIFFNESS * MASS)
+    # What is left of the second order is 304/1e5.
+    np.testing.assert_allclose(linear.impedance.real, expected, rtol=5e-3)
+    np.testing.assert_allclose(linear.change[-1], -20 / np.log(10) * expected / 1e5, rtol=5e-3)
+
+
+def test_tangent_of_a_linear_source_is_its_mass_and_spring(linear: thud.BallImpedance) -> None:
+    assert linear.tangent_mass == pytest.approx(MASS, rel=1e-4)
+    assert linear.tangent_stiffness == pytest.approx(STIFFNESS, rel=1e-6)
+    assert abs(linear.tangent_loss_factor) < 1e-6
+    # Low frequencies feel the mass, high ones the spring.
+    low, high = linear.tangent([0.01, 1e4])
+    assert low == pytest.approx(2j * np.pi * 0.01 * MASS, rel=1e-5)
+    assert high == pytest.approx(STIFFNESS / (2j * np.pi * 1e4), rel=1e-4)
+
+
+def test_tangent_mass_of_the_shell_is_that_outside_its_cap() -> None:
+    impact = thud.solve()
+    found = thud.ball_impedance(impact, resistance=[1e5])
+    expected = 2.5 * (1 - impact.max_deflection / (2 * 0.089))
+    assert found.tangent_mass == pytest.approx(expected, rel=0.01)
+
+
+def test_limit_is_where_the_level_changes_by_1_db() -> None:
+    impact = thud.solve()
+    limit = thud.ball_impedance(impact).limit()
+    for band in (0, 2):
+        floor = thud.InfinitePlate(resistance=float(limit[band]))
+        moved = thud.solve(floor=floor).on_floor
+        assert moved is not None
+        assert moved.difference()[band] == pytest.approx(-1.0, abs=0.02)
+
+
+def test_level_not_reached_is_nan_and_told() -> None:
+    found = thud.ball_impedance(thud.solve(), resistance=[1e5, 1e6])
+    assert np.isnan(found.limit()).all()
+    assert found.rows()[1][-1] == "100000 or less"
+    with pytest.raises(thud.InputError, match="decibels = 1e-06"):
+        found.limit(1e-6)
+    with pytest.raises(thud.InputError, match="decibels = 0"):
+        found.limit(0)
+
+
+def test_bad_input_is_refused() -> None:
+    impact = thud.solve()
+    blocked = thud.solve(
+        model="measured_modes", frequency=[24.0], damping_ratio=[0.05], effective_mass=[2.5]
+    )
+    with pytest.raises(thud.InputError, match="do not ascend"):
+        thud.ball_impedance(impact, resistance=[1e5, 1e4])
+    with pytest.raises(thud.InputError, match="resistance"):
+        thud.ball_impedance(impact, resistance=[0.0])
+    with pytest.raises(thud.InputError, match="resistance"):
+        thud.ball_impedance(impact, resistance=[np.nan])
+    with pytest.raises(thud.InputError, match="still in contact"):
+        thud.ball_impedance(impact, resistance=[10.0])
+    with pytest.raises(thud.InputError, match="one force on all floors"):
+        thud.ball_impedance(blocked, resistance=[1e4])
+    with pytest.raises(thud.InputError, match="frequency = 0"):
+        thud.ball_impedance(impact, resistance=[1e4]).tangent([0.0])
+
+
+def test_figure_draws_sources_and_floors(linear: thud.BallImpedance) -> None:
+    figure = linear.plot({"chipboard": thud.InfinitePlate(resistance=1600.0)})
+    (axes,) = figure.axes
+    assert len(axes.lines) == 3
+    np.testing.assert_allclose(axes.lines[0].get_ydata(), 1600.0)
+    np.testing.assert_allclose(axes.lines[1].get_ydata(), np.abs(linear.impedance))
+    assert axes.get_ylabel() == "Impedance, N s/m"

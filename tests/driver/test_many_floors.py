@@ -1,0 +1,140 @@
+"""Many drops on floors and in rooms: the numbers of single ones, parameters, studies, files."""
+
+from __future__ import annotations
+
+import csv
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import thud
+
+if TYPE_CHECKING:
+    import subprocess
+    from collections.abc import Callable
+    from pathlib import Path
+
+CASE = thud.Case(floor=thud.Plate(), room=thud.Room(), levels=thud.Levels(bands="both"))
+TEXT = "&model /\n&floor name = 'plate' /\n&room /\n"
+THICKNESSES = [0.1, 0.2]
+
+
+@pytest.fixture(scope="module")
+def many() -> thud.Ensemble:
+    """Return drops on plates of two thicknesses, from two heights."""
+    parameters = {"height": [0.5, 0.5, 1.0, 1.0], "thickness": 2 * THICKNESSES}
+    return thud.solve_many(parameters, CASE, threads=2)
+
+
+@pytest.mark.parametrize("model", ["hollow_sphere", "modal_ball"])
+def test_each_floor_has_the_numbers_of_a_single_prediction(model: thud.ModelName) -> None:
+    many = thud.solve_many({"plate.thickness": THICKNESSES}, CASE, model=model)
+    blocked = thud.solve(model=model)
+    for i, thickness in enumerate(THICKNESSES):
+        floor = thud.Plate(thickness=thickness)
+        found = thud.predict_level(blocked, floor, thud.Room())
+        assert many.room_level is not None
+        assert many.room_rating is not None
+        assert many.standardised_rating is not None
+        assert many.floor_work is not None
+        assert many.room_level[i] == pytest.approx(found.level, abs=1e-9)
+        assert many.room_rating[i] == pytest.approx(found.rating.a_weighted, abs=1e-9)
+        expected = found.standardised_rating.a_weighted
+        assert many.standardised_rating[i] == pytest.approx(expected, abs=1e-9)
+        moved = thud.solve(model=model, floor=floor).on_floor
+        assert moved is not None
+        assert many.floor_work[i] == pytest.approx(moved.floor_work, rel=1e-12)
+        for bands in ("octave", "third"):
+            levels = moved.levels(bands, force="floor")
+            assert many.contact_levels[bands][i] == pytest.approx(levels, abs=1e-9)
+        assert many.peak_force[i] == pytest.approx(blocked.peak_force)
+
+
+def test_blocked_drop_is_kept_only_while_it_is_the_same(many: thud.Ensemble) -> None:
+    """It is kept from drop to drop and from call to call; no number hangs on what came before."""
+    order = [3, 0, 2, 1]
+    parameters = {name: values[order] for name, values in many.parameters.items()}
+    again = thud.solve_many(parameters, CASE, threads=1)
+    assert again.room_level is not None
+    assert many.room_level is not None
+    assert np.array_equal(again.room_level, many.room_level[order])
+    assert np.array_equal(again.peak_force, many.peak_force[order])
+    alone = thud.solve_many({"height": [1.0]}, CASE, threads=1)
+    assert alone.peak_force[0] == again.peak_force[0]
+    heavy = thud.Case(ball=thud.Ball(mass=2.6), floor=CASE.floor, room=CASE.room)
+    assert thud.solve_many({"height": [1.0]}, heavy).peak_force[0] > 1.01 * alone.peak_force[0]
+
+
+def test_failed_floors_have_a_reason_and_no_numbers() -> None:
+    found = thud.solve_many({"thickness": [0.1, -1.0]}, CASE)
+    assert found.status.tolist() == [0, 1]
+    assert "&plate: thickness = -1.0 is not allowed" in found.reason[1]
+    assert found.room_level is not None
+    assert np.isnan(found.room_level[1]).all()
+    assert np.isfinite(found.room_level[0]).all()
+
+
+def test_keys_of_one_name_are_told_apart_by_their_group() -> None:
+    case = thud.Case(floor=thud.Oscillator())
+    bare = thud.solve_many({"mass": [2.4]}, case)
+    named = thud.solve_many({"oscillator.mass": [50.0]}, case)
+    assert bare.floor_work is not None
+    assert named.floor_work is not None
+    assert bare.peak_force[0] < 0.99 * named.peak_force[0]
+    assert named.floor_work[0] > 1.1 * bare.floor_work[0]
+    for name in ("plate.mass", "oscillator.volume", ".mass", "oscillator."):
+        with pytest.raises(thud.InputError, match=r"is not a key of hollow_sphere and oscillator"):
+            thud.solve_many({name: [1.0]}, case)
+
+
+def test_table_of_floors_has_the_same_numbers(
+    run: Callable[..., subprocess.CompletedProcess[str]],
+    case_file: Callable[[str], Path],
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "sets.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
+    done = run(case_file(TEXT), "--sets", "sets.txt", "-o", "out")
+    assert done.returncode in {0, 2}, done.stderr
+    with (tmp_path / "out" / "sets.csv").open(encoding="utf-8") as file:
+        first, second = csv.DictReader(file)
+    case = thud.Case(floor=thud.Plate(), room=thud.Room())
+    found = thud.solve_many({"thickness": [0.1], "plate.loss_factor": [0.01]}, case)
+    assert found.room_rating is not None
+    assert found.floor_work is not None
+    assert float(first["room_rating_dB"]) == found.room_rating[0]
+    assert float(first["floor_work_J"]) == found.floor_work[0]
+    assert float(first["contact_octave_63_Hz_dB"]) == found.contact_levels["octave"][0, 1]
+    assert second["room_rating_dB"] == ""
+    assert "thickness" in second["reason"]
+
+
+def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> None:
+    path = tmp_path / "case.nml"
+    path.write_text(TEXT, encoding="utf-8")
+    axes = {"thickness": {"values": THICKNESSES}, "volume": {"values": [40.0, 60.0]}}
+    study = {"case": str(path), "parameters": axes}
+    found = thud.design_map(study)
+    rating = found.dataset["standardised_rating"]
+    assert many.standardised_rating is not None
+    # The volume is standardised away but for what flows back into the floor.
+    assert rating.values[:, 0] == pytest.approx(rating.values[:, 1], abs=0.1)
+    assert rating.values[:, 0] == pytest.approx(many.standardised_rating[2:], abs=0.1)
+    assert ("lowest standardised rating, dB", f"{float(rating.min()):.2f}") in found.rows()
+    thud.plot.save(thud.plot.draw_design_map(found), tmp_path / "map.png")
+    assert found.dataset["room_level"].dims[-1] == "room_third"
+    draws = {"kind": "random", "size": 4}
+    parameters = {"reverberation_time": {"low": 0.4, "high": 0.6}}
+    spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
+    assert any(row[0] == "rating, standardised" for row in spread.rows())
+    dataset = many.to_xarray()
+    assert dataset["room_level"].shape == (4, 12)
+    assert dataset["contact_third_level"].shape == (4, 15)
+
+
+def test_surrogates_refuse_floors(tmp_path: Path) -> None:
+    path = tmp_path / "case.nml"
+    path.write_text(TEXT, encoding="utf-8")
+    study = {"case": str(path), "parameters": {"height": {"low": 0.5, "high": 1.0, "count": 3}}}
+    with pytest.raises(thud.InputError, match="knows no floors"):
+        thud.sweep({**study, "surrogate": {}})
