@@ -19,6 +19,7 @@ module thud_api
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_progress, only: latest_progress
    use thud_progress_line, only: begin_progress, end_progress
+   use thud_remarks, only: add_floor_remark, remark_length
    use thud_room, only: get_room_bands, room_level_type
    use thud_run, only: load_case, outcome_type, run_case
    use thud_system, only: begin_call, end_call, end_all_calls => end_calls
@@ -375,8 +376,9 @@ contains
       type(case_type), target :: case
       type(room_level_type) :: prediction
       type(band_type), allocatable :: bands(:)
+      character(len=remark_length), allocatable :: remarks(:)
       type(error_type), allocatable :: error
-      integer :: n(1)
+      integer :: n(1), i
 
       allocate (bundle)
       call read_case(text, 'python', case, error)
@@ -401,6 +403,11 @@ contains
          call bundle%add_array('octaves.time', shape(prediction%octave_level), prediction%octave_time)
          call bundle%add_array('history.time', shape(prediction%history_time), prediction%history_time)
          call bundle%add_array('history.level', shape(prediction%history), prediction%history)
+         allocate (remarks(0))
+         call add_floor_remark(case, remarks)
+         do i = 1, size(remarks)
+            call bundle%add_text('remarks.'//to_text(i), trim(remarks(i)))
+         end do
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine predict_room

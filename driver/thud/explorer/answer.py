@@ -65,7 +65,8 @@ def answer_case(case: Case) -> Answer:
     found["motion"] = _motion(impact)
     if case.room is not None and case.floor is not None:
         found["room"] = _room(impact)
-        found["remarks"] += found["room"].pop("remarks")
+        further = found["room"].pop("remarks")
+        found["remarks"] += [remark for remark in further if remark not in found["remarks"]]
     found["seconds"] = time.perf_counter() - start
     return found
 
