@@ -47,9 +47,7 @@ def test_tapping_levels_are_those_of_the_published_example() -> None:
 
 
 def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
-    found = thud.predict_level(
-        thud.solve(sampling=thud.Sampling(duration=0.1)), thud.JoistFloor(), thud.Room()
-    )
+    found = thud.predict_level(thud.solve(), thud.JoistFloor(), thud.Room())
     remarks = thud.compare_floors({"joists": found}).remarks
     assert any("above 13" in one and "cannot be smeared" in one for one in remarks)
 

@@ -138,7 +138,8 @@ def _draw_classes(axes: Axes, found: FloorComparison) -> None:
         )  # fmt: skip
     names = [literal(name) for name in found.predictions]
     axes.set_xticks(place, names)
-    if max(map(len, names)) * len(names) > _LETTERS * axes.figure.get_figwidth():
+    width = axes.bbox.width / axes.figure.dpi
+    if max(map(len, names)) * len(names) > _LETTERS * width:
         axes.tick_params(axis="x", labelrotation=20)
     axes.set_ylabel("L_iA,Fmax, dB", fontsize=SIZE)
     axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *after]) - 5)
