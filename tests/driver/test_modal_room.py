@@ -54,6 +54,18 @@ def test_frequencies_are_those_of_the_closed_forms(found: thud.ModalRoom) -> Non
     assert plate_frequencies(FLOOR, (1, 1)) == pytest.approx(closed[0])
 
 
+def test_orthotropic_plate_has_the_modes_that_the_source_feels() -> None:
+    floor = thud.Plate(
+        thickness=0.2, density=470, wave_speed=3180, stiffness_ratio=0.293, torsion_ratio=0.25,
+        loss_factor=0.002, edges="absorption", source_x=0.31, source_y=0.27,
+    )  # fmt: skip
+    for numbers in ((1, 1), (2, 1), (1, 2)):
+        natural = float(plate_frequencies(floor, numbers))
+        near = natural * np.linspace(0.97, 1.03, 601)
+        peak = near[np.argmax(abs(thud.mobility(floor, near)))]
+        assert peak == pytest.approx(natural, rel=3e-3)
+
+
 def test_energies_given_are_those_that_are_lost(impact: thud.Impact) -> None:
     found = thud.modal_room(impact, FLOOR, ROOM, balls=3, microphones=1)
     assert found.plate_energy[:, 0] == pytest.approx(found.plate_energy[:, 1], rel=1e-9)

@@ -248,25 +248,27 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
 
 def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     """Return natural frequencies of a simply supported plate, Hz, by numbers of half-waves."""
-    # sqrt(B'/m'') = c_L h/sqrt(12); B_x = B'/r and B_y = B' r with the root r of their ratio.
-    along, across = ((np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2).T
+    # sqrt(B'/m'') = c_L h/sqrt(12); over B' the stiffnesses are 1/root along the length, and root.
+    along, across = np.moveaxis(
+        (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2, -1, 0
+    )
     root = math.sqrt(floor.stiffness_ratio)
-    square = along**2 / root + 2 * floor.torsion_ratio * along * across + across**2 * root
-    speed = floor.wave_speed * floor.thickness / math.sqrt(12)
-    found: Array = speed * np.sqrt(square) / (2 * np.pi)
+    wave = np.sqrt(along**2 / root + 2 * floor.torsion_ratio * along * across + across**2 * root)
+    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * wave / (2 * np.pi)
     return found
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
-    # f >= c k1**2 and f >= c k2**2: half-waves along one side at the highest frequency.
+    # f >= c k**2 of each side alone: half-waves along it at the highest frequency.
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
-    root = floor.stiffness_ratio**0.25
-    most = [
-        1 + int(side * math.sqrt(HIGHEST / unit * softness))
-        for side, softness in ((floor.length, root**2), (floor.width, root**-2))
-    ]
-    numbers = _grid(most)
+    softer = floor.stiffness_ratio**0.125
+    numbers = _grid(
+        [
+            1 + int(side * math.sqrt(HIGHEST / unit))
+            for side in (floor.length * softer, floor.width / softer)
+        ]
+    )
     numbers += 1
     frequency = plate_frequencies(floor, numbers)
     keep = frequency <= HIGHEST
@@ -275,7 +277,7 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
             f"floor: its first natural frequency is {frequency.min():.0f} Hz",
             f"a floor with modes below {HIGHEST:g} Hz",
         )
-    _require_modes("floor: the plate has", int(keep.sum()))
+    _require_modes("floor: the plate", int(keep.sum()))
     return numbers[keep], frequency[keep]
 
 
