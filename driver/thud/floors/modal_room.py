@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
-from thud._api import api, call
+from thud._api import call, floor_api
 from thud._schema import Plate, Room
 from thud.case import Case, case_text
 from thud.checks import (
@@ -193,7 +193,9 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     orders, room_frequency = _room_modes(size, room.sound_speed)
     time = float(np.max(prediction.reverberation_time))
     found = call(
-        api.get_radiator, case_text(Case(floor=floor, room=room)), np.maximum(plate_frequency, 1.0)
+        floor_api.get_radiator,
+        case_text(Case(floor=floor, room=room)),
+        np.maximum(plate_frequency, 1.0),
     )
     losses = 2 * np.pi * plate_frequency * found["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import call, floor_api
 from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
@@ -226,7 +226,7 @@ def predict_level(
         else source.levels(THIRDS)
     )
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    found = call(api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
+    found = call(floor_api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
     bands = found["bands"]
     if moved and isinstance(source, Impact):
         change = 20 * math.log10(moved.peak("floor") / source.peak("floor"))
@@ -254,7 +254,9 @@ def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
     if source.case.floor == case.floor:
         return source.on_floor
     plain = replace(case, compression=None)
-    return new_floor_impact(case, call(api.drop_on_floor, case_text(plain)), source.floor_force)
+    return new_floor_impact(
+        case, call(floor_api.drop_on_floor, case_text(plain)), source.floor_force
+    )
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:
