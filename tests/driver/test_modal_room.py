@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,6 +52,19 @@ def test_frequencies_are_those_of_the_closed_forms(found: thud.ModalRoom) -> Non
     )
     assert found.floor_frequency == pytest.approx([f for f in closed if f <= 400])
     assert plate_frequencies(FLOOR, (1, 1)) == pytest.approx(closed[0])
+
+
+def test_modes_of_an_orthotropic_plate_are_those_of_the_floor(impact: thud.Impact) -> None:
+    plate = replace(FLOOR, stiffness_ratio=0.2, torsion_ratio=0.6, edges="absorption",
+                    edge_absorption=0.001, loss_factor=1e-4, source_x=0.43, source_y=0.39)  # fmt: skip
+    found = thud.modal_room(impact, plate, ROOM, balls=[BALL], microphones=[MICROPHONE])
+    modes = found.floor_frequency
+    peak, beside = (np.abs(thud.mobility(plate, modes * factor)) for factor in (1.0, 1.002))
+    apart = np.diff(modes, append=np.inf) > 5
+    assert apart.sum() > 10
+    assert (peak > 1.1 * beside)[apart].all()
+    numbers = list(itertools.product(range(1, 60), repeat=2))
+    assert len(modes) == (plate_frequencies(plate, numbers) <= 400).sum()
 
 
 def test_energies_given_are_those_that_are_lost(impact: thud.Impact) -> None:

@@ -250,19 +250,21 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
 
 def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     """Return natural frequencies of a simply supported plate, Hz, by numbers of half-waves."""
-    # sqrt(B'/m'') = c_L h/sqrt(12).
+    # omega**2 m'' = Bx kx**4 + 2 H kx**2 ky**2 + By ky**4, sqrt(B'/m'') = c_L h/sqrt(12).
     square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
-    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * square.sum(-1) / (2 * np.pi)
+    x, y, ratio = square[..., 0], square[..., 1], math.sqrt(floor.stiffness_ratio)
+    root = np.sqrt(x**2 / ratio + 2 * floor.torsion_ratio * x * y + ratio * y**2)
+    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
     return found
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
-    # f = c (k1**2 + k2**2): half-waves along one side at the highest frequency.
+    # Half-waves along one side alone at the highest frequency.
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
-    numbers = _grid(
-        [1 + int(side * math.sqrt(HIGHEST / unit)) for side in (floor.length, floor.width)]
-    )
+    stretch = floor.stiffness_ratio**0.125
+    sides = floor.length * stretch, floor.width / stretch
+    numbers = _grid([1 + int(side * math.sqrt(HIGHEST / unit)) for side in sides])
     numbers += 1
     frequency = plate_frequencies(floor, numbers)
     keep = frequency <= HIGHEST
