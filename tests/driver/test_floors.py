@@ -160,7 +160,7 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
     assert "contact, dB" in moved._repr_html_()
     figure = moved.plot()
     assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
-        "Force below", "Velocity of", "Contact less", "Energy into", "Mobility Y,",
+        "Force on the floor", "Velocity of", "Contact less", "Energy into", "Mobility Y,",
     ]  # fmt: skip
     thud.plot.save(figure, tmp_path / "floor.png")
     dataset = moved.to_xarray()
