@@ -55,7 +55,9 @@ def test_frequencies_are_those_of_the_closed_forms(found: thud.ModalRoom) -> Non
 
 
 def test_modes_of_an_orthotropic_plate_are_those_of_the_floor(impact: thud.Impact) -> None:
-    orthotropic = replace(FLOOR, stiffness_ratio=0.2, torsion_ratio=0.6, source_x=0.43, source_y=0.39)
+    orthotropic = replace(
+        FLOOR, stiffness_ratio=0.2, torsion_ratio=0.6, source_x=0.43, source_y=0.39
+    )
     plate = replace(orthotropic, loss_factor=1e-4, edges="absorption", edge_absorption=0.001)
     found = thud.modal_room(impact, plate, ROOM, balls=[BALL], microphones=[MICROPHONE])
     modes = found.floor_frequency

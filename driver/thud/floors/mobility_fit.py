@@ -86,11 +86,6 @@ class MobilityFit(Displayed):
         """Relative error, root of the mean square over the lines."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
 
-    @property
-    def max_error(self) -> float:
-        """Largest relative error of a line."""
-        return float(self._errors().max())
-
     def band_errors(self) -> dict[float, tuple[float, float]]:
         """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
 
