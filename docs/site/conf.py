@@ -22,7 +22,7 @@ myst_heading_anchors = 4
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 templates_path = ["docs/site/templates"]
 suppress_warnings = ["misc.highlighting_failure"]  # lines of a CMake list
-exclude_patterns = ["README.md", "inputs/**", "docs/site/**"]
+exclude_patterns = ["README.md", "inputs/**", "docs/paper/**", "docs/site/**"]
 
 autodoc_typehints = "none"  # the sections of parameters say more
 autosummary_generate = True

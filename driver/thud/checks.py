@@ -88,6 +88,14 @@ def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
+def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
+    """Return two finite numbers; raise InputError for anything else."""
+    array = require_real(name, require_array(name, values, dimensions=(1,)))
+    if array.shape != (2,) or not np.isfinite(array).all():
+        refuse_value(name, values, "two finite numbers")
+    return float(array[0]), float(array[1])
+
+
 def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
     """Raise InputError where a value is not a whole number from low to high."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)

@@ -12,7 +12,7 @@ import numpy as np
 from thud._api import api, call, floor_api, text
 from thud._schema import Ball, Drop, Sampling
 from thud.case import Case, case_text, new_model
-from thud.checks import require_choice, require_kind
+from thud.checks import require_choice, require_kind, require_pair
 from thud.contact_time import contact_span
 from thud.display import MAKERS, Displayed
 from thud.errors import InputError, PlausibilityWarning
@@ -346,7 +346,7 @@ class FloorImpact(Impact):
         """
         found = call(
             floor_api.point_velocity, case_text(Case(floor=self.floor)), self.floor_force,
-            self.sample_rate, x, y,
+            self.sample_rate, *require_pair("point", (x, y)),
         )  # fmt: skip
         velocity: NDArray[np.float64] = found["velocity"]
         return velocity

@@ -43,7 +43,8 @@ contains
       time = 0.0_wp
       do i = 1, nint(search_time/search_step)
          next = matmul(step, state)
-         if (get_rise(weight, state) > 0.0_wp .and. get_rise(weight, next) <= 0.0_wp) then
+         ! At the start the detector is at rest, and may turn within the first step.
+         if ((i == 1 .or. get_rise(weight, state) > 0.0_wp) .and. get_rise(weight, next) <= 0.0_wp) then
             call refine(loss, weight, state, (i - 1)*search_step, maximum, time)
             ! What is left can raise the detector no more.
             if (maxval(abs(weight))*sum(next(:size(start))) < maximum) return

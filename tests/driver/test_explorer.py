@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 import tomllib
@@ -207,3 +208,21 @@ def test_unusable_port_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> No
         port = taken.getsockname()[1]
         assert cli.main(["explore", "--port", str(port), "--no-browser"]) == 1
     assert "cannot be listened on; allowed: a free port" in capsys.readouterr().err
+
+
+def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> None:
+    async def leave() -> dict[str, Any]:
+        return {"type": "http.disconnect"}
+
+    sent: list[Any] = []
+
+    async def send(message: Any) -> None:  # noqa: ANN401 - as the interface has it
+        sent.append(message)
+
+    scope = {
+        "type": "http", "method": "POST", "path": "/solve", "query_string": b"", "scheme": "http",
+        "server": ("127.0.0.1", 80), "root_path": "",
+        "headers": [(b"host", b"127.0.0.1"), (server.TOKEN.encode(), TOKEN.encode())],
+    }  # fmt: skip
+    asyncio.run(client.app(scope, leave, send))  # type: ignore[arg-type]
+    assert sent[0]["status"] == 400

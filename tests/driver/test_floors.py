@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import warnings
 from dataclasses import fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -166,3 +166,20 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
     dataset = moved.to_xarray()
     assert dataset["floor_velocity"].attrs["units"] == "m/s"
     assert float(dataset["floor_work"]) == moved.floor_work
+
+
+@pytest.mark.parametrize("point", [0, (1.0,), (1, 2, 3), "ab", (1j, 1), (None, 1), (np.nan, 1)])
+def test_points_that_are_no_pair_are_refused(point: Any) -> None:  # noqa: ANN401
+    with pytest.raises(thud.InputError, match="point"):
+        thud.mobility(thud.Plate(), [31.5], point)
+
+
+@pytest.mark.parametrize("frequency", [np.nan, np.inf])
+def test_mobility_at_no_frequency_is_refused(frequency: float) -> None:
+    with pytest.raises(thud.InputError, match="not finite"):
+        thud.mobility(thud.Plate(), [31.5, frequency])
+
+
+def test_point_may_be_an_array() -> None:
+    near = thud.mobility(thud.Plate(), [31.5], np.array([1.0, 1.0]))  # type: ignore[arg-type]
+    assert near == thud.mobility(thud.Plate(), [31.5], (1.0, 1.0))

@@ -226,3 +226,31 @@ def test_run_draws_the_chain(tmp_path: Path) -> None:
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
     for name in ("room", "room_decay", "room_positions", "floor_modes"):
         assert (tmp_path / "out" / f"{name}.png").exists()
+
+
+def test_impact_on_the_floor_itself_is_of_the_contact_force() -> None:
+    floor = thud.Plate(thickness=0.02, density=600, wave_speed=2500)
+    impact = thud.solve(floor=floor)
+    assert impact.on_floor is not None
+    room = thud.Room()
+    wanted = thud.predict_level(impact, floor, room)
+    found = thud.predict_level(impact.on_floor, floor, room)
+    assert (found.force, found.remarks) == ("contact", wanted.remarks)
+    assert found.force_change == pytest.approx(wanted.force_change, abs=1e-4)
+    # On another floor the change is against the rigid one as well.
+    other = thud.Plate(thickness=0.03, density=600, wave_speed=2500)
+    change = thud.predict_level(impact.on_floor, other, room).force_change
+    assert change == pytest.approx(thud.predict_level(impact, other, room).force_change, abs=1e-4)
+
+
+def test_tapping_level_of_an_orthotropic_plate_is_refused() -> None:
+    with pytest.raises(thud.InputError, match="isotropic"):
+        thud.tapping_level(thud.Plate(stiffness_ratio=0.1))
+
+
+def test_floor_radiates_no_more_than_it_loses(impact: thud.Impact) -> None:
+    # So light a plate loses less to the laboratory than it radiates.
+    light = thud.Plate(length=6, width=4, thickness=0.1, density=45, wave_speed=4600)
+    share = thud.predict_level(impact, light, thud.Room()).radiated_share
+    assert (share > 0.4).any()
+    assert (share <= 0.5).all()

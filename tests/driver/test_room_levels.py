@@ -144,3 +144,21 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     lines = (folder / "room_levels.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 13
     assert "standardised_dB" in lines[0]
+
+
+@pytest.mark.parametrize("title", ["mean_dB", "std dev", "Standardised, dB", "EDT"])
+def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
+    rows = "".join(f"{f},60,55\n" for f in (63, 125, 250, 500))
+    (tmp_path / "levels.csv").write_text(f"frequency,first,{title.replace(',', '')}\n{rows}")
+    with pytest.raises(thud.InputError, match="is no position"):
+        thud.read_room_levels(tmp_path / "levels.csv")
+
+
+def test_column_that_hardly_is_a_position_is_remarked(tmp_path: Path) -> None:
+    rows = "".join(f"{f},60,1.2\n" for f in (63, 125, 250, 500))
+    (tmp_path / "levels.csv").write_text(f"frequency,first,Nachhallzeit\n{rows}")
+    assert any("59 dB" in one for one in thud.read_room_levels(tmp_path / "levels.csv").remarks)
+    # A known title is no position.
+    (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
+    found = thud.read_room_levels(tmp_path / "levels.csv", volume=50.0)
+    assert (len(found.positions), found.standardised is None) == (1, False)

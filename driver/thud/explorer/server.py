@@ -12,6 +12,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
@@ -88,7 +89,8 @@ def new_application(
         ],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
         # Values of wrong types stop where they are first used.
-        exception_handlers=dict.fromkeys((ThudError, TypeError, ValueError, KeyError), _refuse),
+        exception_handlers=dict.fromkeys((ThudError, TypeError, ValueError, KeyError), _refuse)
+        | {ClientDisconnect: _forget},
     )
     application.state.about = {"form": form(), "slow": SLOW, "version": version(), "start": start}
     application.state.token = token
@@ -156,6 +158,11 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
 
 async def _refuse(request: Request, error: Exception) -> Response:  # noqa: ARG001 - what is given
     return PlainTextResponse(str(error), 400, headers=HEADERS)
+
+
+async def _forget(request: Request, error: Exception) -> Response:  # noqa: ARG001 - what is given
+    """Answer a page that left while it sent: nobody reads it, and it is no fault."""
+    return Response(status_code=400)
 
 
 def _stream(reports: AsyncIterator[dict[str, Any]]) -> Response:

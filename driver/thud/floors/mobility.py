@@ -9,7 +9,7 @@ import numpy as np
 from thud._api import call, floor_api
 from thud._schema import FloorOptions
 from thud.case import Case, case_text
-from thud.checks import require_array, require_kind, require_real
+from thud.checks import refuse, require_array, require_kind, require_pair, require_real
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -47,7 +47,10 @@ def mobility(
     """
     require_kind("floor", floor, FloorOptions)
     values = require_real("frequency", require_array("frequency", frequency, dimensions=(0, 1)))
-    x, y = point or (0.0, 0.0)
+    if not np.isfinite(values).all():
+        refuse("frequency has a value that is not finite", "finite numbers, Hz")
+    place = (0.0, 0.0) if point is None else point
+    x, y = require_pair("point", place)
     text = case_text(Case(floor=floor))
     asked = np.ascontiguousarray(np.atleast_1d(values))
     found = call(floor_api.floor_mobility, text, asked, int(point is not None), x, y)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -12,7 +14,14 @@ import numpy as np
 from thud._api import call, mobility_api
 from thud._schema import MeasuredMobility
 from thud.case import Case
-from thud.checks import refuse, require_choice
+from thud.checks import (
+    refuse,
+    refuse_value,
+    require_array,
+    require_choice,
+    require_real,
+    require_whole,
+)
 from thud.columns import read_titled
 from thud.display import MAKERS, Displayed
 from thud.floors.mobility import mobility
@@ -20,8 +29,6 @@ from thud.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
 
 if TYPE_CHECKING:
-    import os
-
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -41,6 +48,11 @@ _TITLES = {
     "frequency": "frequency", "f": "frequency", "freq": "frequency",
     "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
     "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
+}  # fmt: skip
+# What stands in a title where another unit is meant.
+_OTHERS = {
+    "khz", "mhz", "ghz", "rpm", "rad", "radian", "radians", "db", "mm", "cm", "um", "nm", "inch",
+    "ft", "kn", "mn", "lbf", "lb", "g", "mg", "percent",
 }  # fmt: skip
 # Numbers of poles that are tried; the library takes no more.
 _ORDERS = (2, 4, 6, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64)
@@ -190,27 +202,47 @@ def fit_mobility(
     if quantity is not None:
         require_choice("quantity", quantity, get_args(Quantity))
     if isinstance(table, tuple):
-        name = "measurement"
-        frequency, values = np.asarray(table[0], dtype=float), np.asarray(table[1], dtype=complex)
-        if frequency.ndim != 1 or frequency.shape != values.shape:
-            refuse(
-                f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
-                "one value for each frequency",
-            )
+        name, (frequency, values) = "measurement", _checked(table)
+    elif not isinstance(table, str | os.PathLike):
+        refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
     else:
         name = Path(table).stem
         frequency, values, known = _read(Path(table))
         if quantity and known and quantity != known:
-            refuse(f"{table}: quantity = {quantity!r}, but the file holds an {known}", repr(known))
+            refuse(f"{table}: quantity = {quantity!r}, but the file holds {known!r}", repr(known))
         quantity = quantity or known
     # A line at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
-    if values.size and not abs(values).min() > 0:
-        refuse(f"{name}: the value at {frequency[abs(values).argmin()]:g} Hz is 0", "not 0")
+    if (n_line := len(frequency)) <= 1:
+        refuse(f"{name}: {n_line} lines above 0 Hz", "two or more")
+    if not (good := np.isfinite(values) & (values != 0)).all():
+        line = good.argmin()
+        refuse(
+            f"{name}: the value at {frequency[line]:g} Hz is {abs(values[line]):g}", "finite, not 0"
+        )
     if order is not None:
+        require_whole("order", order, 1, _ORDERS[-1])
         return _fit(name, frequency, values, order)
     return _chosen(name, frequency, values)
+
+
+def _checked(
+    table: tuple[ArrayLike, ...],
+) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+    """Return frequencies and complex values; raise InputError for anything else."""
+    if len(table) != 2:  # noqa: PLR2004 - frequencies and values
+        refuse(f"a tuple of {len(table)}", "frequencies, Hz, and complex values")
+    frequency = require_real("frequency", require_array("frequency", table[0], (1,)))
+    values = require_array("values", table[1], (1,))
+    if values.size and values.dtype.kind not in "iufc":
+        refuse("values is not an array of numbers", "complex numbers")
+    if frequency.shape != values.shape:
+        refuse(
+            f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
+            "one value for each frequency",
+        )
+    return frequency, values.astype(complex)
 
 
 def _chosen(
@@ -255,16 +287,25 @@ def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quan
     if path.suffix.lower() in {".uff", ".unv", ".uf"}:
         return _read_universal(path)
     titles, table = read_titled(path, _ALLOWED)
-    words = [title.strip().strip('"').lower().split(",")[0].split()[0] for title in titles]
-    kinds = [_TITLES.get(word.split("_")[0], "") for word in words]
+    words = [re.findall("[a-z]+", title.lower()) for title in titles]
+    for title, (_, *others) in zip(titles, (one or [""] for one in words), strict=True):
+        if _OTHERS & {*others}:
+            refuse(f"{path}: {title.strip()!r} is not in SI units and degrees", _ALLOWED)
+    kinds = [_TITLES.get(one[0], "") if one else "" for one in words]
+    if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
+        refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
+    if titles and len(titles) != table.shape[1]:
+        refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", _ALLOWED)
     columns = {kind: table[:, i] for i, kind in enumerate(kinds) if kind}
+    named = {word for one in words for word in one if word in _POWERS}
     if {"frequency", "real", "imaginary"} <= columns.keys():
         values = columns["real"] + 1j * columns["imaginary"]
     elif {"frequency", "magnitude", "phase"} <= columns.keys():
         values = columns["magnitude"] * np.exp(1j * np.radians(columns["phase"]))
     else:
         refuse(f"{path}: the columns are {', '.join(titles) or 'without titles'}", _ALLOWED)
-    return columns["frequency"], values, None
+    known = min(named) if len(named) == 1 else None
+    return columns["frequency"], values, known
 
 
 def _read_universal(

@@ -273,7 +273,7 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
             f"floor: its first natural frequency is {frequency.min():.0f} Hz",
             f"a floor with modes below {HIGHEST:g} Hz",
         )
-    _require_modes("floor: the plate", int(keep.sum()))
+    _require_modes("floor: the plate has", int(keep.sum()))
     return numbers[keep], frequency[keep]
 
 

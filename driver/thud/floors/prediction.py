@@ -109,7 +109,10 @@ class RoomPrediction(Displayed):
         """Share of the floor's losses that it radiates into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
         omega = 2 * np.pi * self.frequency
-        return air * self.radiation_factor / (self.surface_mass * omega * self.loss_factor)
+        radiated = air * self.radiation_factor / (self.surface_mass * omega)
+        # The floor loses at least what it dissipates and radiates to both sides.
+        internal = getattr(self.floor, "loss_factor", 0.0)
+        return radiated / np.maximum(self.loss_factor, internal + 2 * radiated)
 
     @property
     def octave_rating(self) -> Rating:
@@ -229,7 +232,10 @@ def predict_level(
     found = call(floor_api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
     bands = found["bands"]
     if moved and isinstance(source, Impact):
-        change = 20 * math.log10(moved.peak("floor") / source.peak("floor"))
+        blocked = (
+            source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak("floor")
+        )
+        change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
         mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
         change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
@@ -251,12 +257,12 @@ def predict_level(
 
 def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
     """Return the impact on the floor of a case; None where its force is the blocked one."""
+    known = source if isinstance(source, FloorImpact) else source.on_floor
     if source.case.floor == case.floor:
-        return source.on_floor
+        return known
     plain = replace(case, compression=None)
-    return new_floor_impact(
-        case, call(floor_api.drop_on_floor, case_text(plain)), source.floor_force
-    )
+    blocked = source.blocked_force if isinstance(source, FloorImpact) else source.floor_force
+    return new_floor_impact(case, call(floor_api.drop_on_floor, case_text(plain)), blocked)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

@@ -39,7 +39,8 @@ MIN_POSITIONS = 4
 # Columns that are no levels, by their titles without units, small.
 TITLES = {
     "frequency": "frequency", "f": "frequency", "band": "frequency", "hz": "frequency",
-    "reverberation time": "time", "t": "time", "t20": "time", "t30": "time", "rt": "time",
+    "reverberation time": "time", "t": "time", "t20": "time", "t30": "time", "t60": "time",
+    "rt": "time", "rt20": "time", "rt30": "time", "rt60": "time",
     "background": "background", "background level": "background", "noise": "background",
 }  # fmt: skip
 ALLOWED = (
@@ -50,6 +51,13 @@ ALLOWED = (
 # Units in which the columns are read, and what stands in a title where another is meant.
 UNITS = {"frequency": "Hz", "time": "s", "background": "dB", "level": "dB"}
 OTHERS = {"khz", "ms", "min", "pa", "mpa", "upa", "np"}
+# Words in the title of a column that is no position's where there are others.
+NO_POSITION = {
+    "mean", "average", "median", "standardised", "standardized", "spread", "std", "sd", "stdev",
+    "deviation", "uncertainty", "edt", "nominal",
+}  # fmt: skip
+# Difference of two positions, dB, as the mean over the bands, from which on one hardly is one.
+DIFFERENT = 15.0
 # Levels and times beyond these are mistyped.
 LEVELS, TIMES = (-50.0, 200.0), (0.01, 100.0)
 
@@ -145,6 +153,12 @@ class RoomLevels(Displayed):
                 f"levels of {self._count}; ISO 16283-2 asks for {MIN_POSITIONS} positions of the "
                 "source or more"
             )
+        different = float(np.ptp(self.positions.mean(axis=1)))
+        if different > DIFFERENT:
+            found.append(
+                f"the levels of two positions differ by {different:.0f} dB in the mean: check that "
+                "every column without a known title holds the levels of a position"
+            )
         if self.background is None:
             found.append("the background is not known: levels are not corrected for it")
         elif self.is_maximum.any():
@@ -239,6 +253,9 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     if len(titles) != table.shape[1]:
         refuse(f"{path}: {len(titles)} titles over {table.shape[1]} columns", ALLOWED)
     kinds = [_kind(title, path) for title in titles]
+    _require_positions(
+        [title for title, kind in zip(titles, kinds, strict=True) if kind == "level"], path
+    )
     columns: dict[str, NDArray[np.float64]] = {}
     for kind in ("frequency", "background", "time"):
         if kinds.count(kind) > 1:
@@ -310,6 +327,13 @@ def _kind(title: str, path: object) -> str:
     if OTHERS & {word.lower() for word in re.findall(r"[A-Za-z]+", title)[1:]}:
         refuse(f"{path}: {title.strip()!r} is not in {UNITS[kind]}", f"{kind} in {UNITS[kind]}")
     return kind
+
+
+def _require_positions(titles: list[str], path: object) -> None:
+    """Raise InputError where one of several columns of levels is a mean or a spread."""
+    for title in titles:
+        if len(titles) > 1 and NO_POSITION & {*_plain(title).split()}:
+            refuse(f"{path}: {title.strip()!r} is no position", ALLOWED)
 
 
 def _plain(title: str) -> str:

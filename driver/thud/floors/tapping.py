@@ -107,6 +107,12 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
             "of ISO 12354-2 holds",
             f"{CONCRETE / WITHIN:.2f} to {CONCRETE * WITHIN:.2f} m4/(kg s)",
         )
+    if (floor.stiffness_ratio, floor.torsion_ratio) != (1, 1):
+        refuse(
+            f"floor: stiffness_ratio = {floor.stiffness_ratio:g} and torsion_ratio = "
+            f"{floor.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
+            "1 and 1",
+        )
     case = Case(floor=floor, room=require_room(room))
     found = call(floor_api.get_radiator, case_text(case), THIRDS)
     time = 2.2 / (THIRDS * found["loss_factor"])
