@@ -3,10 +3,11 @@ module thud_ensemble_api
    use thud_bundle, only: bundle_type, leave
    use thud_case, only: case_type
    use thud_case_text, only: read_case
+   use thud_column, only: column_type, find_columns
    use thud_error, only: error_type
    use thud_force_history, only: force_count, outcome_count
    use thud_kinds, only: int64, wp
-   use thud_many, only: column_type, find_columns, leave_many, many_type, new_many, solve_many, take_many
+   use thud_many, only: leave_many, many_type, new_many, solve_many, take_many
    use thud_sampling, only: get_sample_count
    use thud_system, only: begin_call, end_call
    use thud_text, only: newline, split

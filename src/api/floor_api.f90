@@ -1,18 +1,26 @@
-!> The flat API for Python to floors that move; see `thud_api`.
+!> The flat API for Python to floors and the rooms below them; see `thud_api`.
 module thud_floor_api
    use thud_band, only: band_type, find_bands
    use thud_bundle, only: bundle_type, leave
    use thud_case, only: case_type, get_floor_number
    use thud_case_text, only: read_case
+   use thud_compute, only: drop_on_case_floor => drop_on_floor, predict_room_level
    use thud_error, only: error_type
    use thud_floor_result, only: get_point_velocity
+   use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances
    use thud_kinds, only: int64, wp
+   use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
+   use thud_remarks, only: add_floor_remark, remark_length
+   use thud_result_bundle, only: add_history
+   use thud_room, only: get_room_bands, room_level_type
+   use thud_system, only: begin_call, end_call
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: floor_energies, floor_mobility, point_velocity
+   public :: drop_on_floor, floor_energies, floor_mobility, get_radiator, point_velocity, predict_room
 
 contains
 
@@ -129,5 +137,120 @@ contains
       if (.not. allocated(error)) call bundle%add_array('velocity', [n], velocity)
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine point_velocity
+
+   !> The impact of a case on its floor alone.
+   subroutine drop_on_floor(text, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !> Text of a namelist file with the group `&floor`.
+      character(len=*), intent(in) :: text
+      !> Status, handle and sizes as in `leave`; the bundle is empty where the force is the blocked one.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(force_history_type), allocatable :: on_floor
+      type(error_type), allocatable :: error
+
+      allocate (bundle)
+      call begin_call()
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call drop_on_case_floor(case, on_floor, error)
+      if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
+      call end_call()
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine drop_on_floor
+
+   !> Level that a force causes in the room below.
+   subroutine predict_room(text, level, n_band, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(level) :: n_band = len(level)
+      !> Text of a namelist file with floor and room.
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: n_band
+      !> Force exposure levels of the thirds that a rating is made of, see `get_rated`, dB: [n_band].
+      real(wp), intent(in) :: level(n_band)
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(room_level_type) :: prediction
+      type(band_type), allocatable :: bands(:)
+      character(len=remark_length), allocatable :: remarks(:)
+      type(error_type), allocatable :: error
+      integer :: n(1), i
+
+      allocate (bundle)
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) call get_room_bands(bands, error)
+      if (.not. allocated(error)) call predict_room_level(case, bands, level, prediction, error)
+      if (.not. allocated(error)) then
+         n = n_band
+         call bundle%add_number('surface_mass', prediction%surface_mass)
+         call bundle%add_array('bands.conductance', n, prediction%conductance)
+         call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
+         call bundle%add_array('bands.energy', n, prediction%energy)
+         call bundle%add_array('bands.radiation_factor', n, prediction%radiation_factor)
+         call bundle%add_array('bands.loss_factor', n, prediction%loss_factor)
+         call bundle%add_array('bands.reverberation_time', n, prediction%reverberation_time)
+         call bundle%add_array('bands.floor_modes', n, prediction%floor_modes)
+         call bundle%add_array('bands.room_modes', n, prediction%room_modes)
+         call bundle%add_array('bands.level', n, prediction%level)
+         call bundle%add_array('bands.time', n, prediction%time)
+         call bundle%add_array('bands.spread', n, prediction%spread)
+         call bundle%add_array('octaves.frequency', shape(prediction%octave_level), prediction%octaves%nominal)
+         call bundle%add_array('octaves.level', shape(prediction%octave_level), prediction%octave_level)
+         call bundle%add_array('octaves.time', shape(prediction%octave_level), prediction%octave_time)
+         call bundle%add_array('history.time', shape(prediction%history_time), prediction%history_time)
+         call bundle%add_array('history.level', shape(prediction%history), prediction%history)
+         allocate (remarks(0))
+         call add_floor_remark(case, remarks)
+         do i = 1, size(remarks)
+            call bundle%add_text('remarks.'//to_text(i), trim(remarks(i)))
+         end do
+      end if
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine predict_room
+
+   !> The plate of a floor that radiates into the room below, at some frequencies.
+   subroutine get_radiator(text, frequency, n_frequency, status, handle, n_byte, n_value)
+      !f2py threadsafe
+      !f2py integer, intent(hide), depend(frequency) :: n_frequency = len(frequency)
+      !> Text of a namelist file with floor and room.
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: n_frequency
+      !> Frequencies, Hz: [n_frequency].
+      real(wp), intent(in) :: frequency(n_frequency)
+      !> Status, handle and sizes as in `leave`.
+      integer, intent(out) :: status, n_byte, n_value
+      integer(int64), intent(out) :: handle
+      type(bundle_type), pointer :: bundle
+      type(case_type), target :: case
+      type(plate_type) :: plate
+      type(error_type), allocatable :: error
+      real(wp) :: conductance(n_frequency)
+      integer :: n(1)
+
+      allocate (bundle)
+      call read_case(text, 'python', case, error)
+      if (.not. allocated(error)) then
+         associate (floor => case%floors(get_floor_number(case))%model)
+            call floor%get_radiator(frequency, plate, conductance, error)
+         end associate
+      end if
+      if (.not. allocated(error)) then
+         n = n_frequency
+         associate (air => case%room%air)
+            call bundle%add_number('surface_mass', get_surface_mass(plate))
+            call bundle%add_number('critical_frequency', get_critical_frequency(plate, air))
+            call bundle%add_number('length', plate%length)
+            call bundle%add_number('width', plate%width)
+            call bundle%add_array('conductance', n, conductance)
+            call bundle%add_array('loss_factor', n, get_total_loss(plate, air, frequency))
+            call bundle%add_array('radiation_factor', n, get_plate_radiation(plate, air, frequency))
+         end associate
+      end if
+      call leave(bundle, error, status, handle, n_byte, n_value)
+   end subroutine get_radiator
 
 end module thud_floor_api

@@ -13,7 +13,7 @@ module thud_progress_line
    !> Time without a line, at the beginning and between two lines, s.
    real(wp), parameter :: patience = 0.5_wp
 
-   !> Clock at the beginning, at the beginning or at the latest line, and its ticks in a second.
+   !> Clock at the beginning and at the latest line, and its ticks in a second.
    integer(int64) :: first = 0, latest = 0, rate = 1
 
    !> Length of a line.

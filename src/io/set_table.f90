@@ -3,11 +3,11 @@
 !> where commas do not separate; empty lines and what follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
+   use thud_column, only: column_type, find_columns
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
    use thud_kinds, only: wp
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
-   use thud_many, only: column_type, find_columns
    use thud_suggestion, only: get_suggestion
    use thud_system, only: directory_exists, path_length
    use thud_text, only: join_quoted, lower_case, newline, quoted, replaced, to_text

@@ -167,7 +167,10 @@ def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None
 
 
 def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> None:
-    values = SHELL | {"ball": {"mass": 2.4}, "moved": {"height": [1.0, 0.5], "width": [1, 2]}}
+    values = SHELL | {
+        "ball": {"mass": 2.4},
+        "moved": {"drop.height": [1.0, 0.5], "room.volume": [1, 2]},
+    }
     path = tmp_path / "study.toml"
     path.write_bytes(client.post("/download/study.toml", json=values).content)
     content = tomllib.loads(path.read_text())
@@ -176,6 +179,16 @@ def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> Non
     found = thud.sweep(path)
     assert found.sizes == {**found.sizes, "height": 11}
     assert client.post("/download/study.toml", json=SHELL).status_code == 400
+
+
+def test_study_varies_options_of_the_model_but_no_namesakes(client: TestClient) -> None:
+    values = {"model": {"name": "hunt_crossley"}, "floor": {"name": "oscillator"}}
+    values["hunt_crossley"] = {"contact_time": 0.02}
+    moved = {"hunt_crossley.exponent": [1.2, 1.8], "oscillator.mass": [10.0, 20.0]}
+    content = client.post("/download/study.toml", json=values | {"moved": moved}).text
+    assert tomllib.loads(content)["parameters"] == {
+        "exponent": {"low": 1.2, "high": 1.8, "count": 11}
+    }
 
 
 def test_page_starts_with_a_case_or_results(tmp_path: Path) -> None:

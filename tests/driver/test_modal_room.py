@@ -191,3 +191,11 @@ def test_modal_room_takes_the_stiffnesses_of_an_orthotropic_plate(impact: thud.I
     for frequency in found[:5]:
         near = thud.mobility(bare, frequency * np.array([0.98, 1.0, 1.02]))
         assert near[1].real > 5 * near[[0, 2]].real.max()
+
+
+@pytest.mark.parametrize("ratio", [0.01, 100.0])
+def test_no_mode_of_an_orthotropic_plate_is_missing(impact: thud.Impact, ratio: float) -> None:
+    plate = replace(FLOOR, thickness=0.08, stiffness_ratio=ratio)
+    found = thud.modal_room(impact, plate, ROOM, balls=1, microphones=1).floor_frequency
+    numbers = list(itertools.product(range(1, 60), repeat=2))
+    assert len(found) == (plate_frequencies(plate, numbers) <= 400).sum()

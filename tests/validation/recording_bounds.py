@@ -22,6 +22,7 @@ import thud
 from thud.contact_time import THRESHOLD, contact_span
 from thud.errors import InputError
 from thud.recordings import contact as contact_module
+from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate
 from thud.recordings.drops import Window
 from thud.recordings.levels import ENERGY_DECIBEL, measure_levels
@@ -170,7 +171,9 @@ def realise(seed: int) -> tuple[Draw, Result | str]:
 
 def band_bound(oracle: Drop, lower: float, upper: float) -> tuple[float, float]:
     """Return the energy of a band, N2 s, and the deviation of its best unbiased estimate."""
-    value, covariance = oracle.band_values(lower, upper)
+    force = oracle.force[slice(*oracle.gate)]
+    functionals = band_functionals(len(force), oracle.sample_rate, lower, upper)
+    value, covariance = functionals @ force, oracle.contact.covariance_of(functionals)
     variance = 4 * float(value @ covariance @ value) + 2 * float((covariance**2).sum())
     return float(value @ value), float(np.sqrt(variance))
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 # Points of a grid along one parameter, and sets of a design with more than two.
 POINTS = 11
 SETS = 256
-# Group of a request that is not one of the case: the ends that sliders were moved to.
+# Group of a request that is no group of the case: the ends of the moves of sliders, by group.key.
 MOVED = "moved"
 
 
@@ -68,8 +68,9 @@ def study(values: Values) -> bytes:
     }
     case = new_case(values)
     check_case(case)
-    known = known_keys(case.model.name) if case.model else {}
-    ranges = {name: (min(ends), max(ends)) for name, ends in moved.items() if name in known}
+    known = known_keys((case.model.name,)) if case.model else {}
+    names = {f"{key.group}.{name}": name for name, key in known.items()}
+    ranges = {names[key]: (min(ends), max(ends)) for key, ends in moved.items() if key in names}
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if not ranges:
         refuse("no slider of ball, drop or model was moved", "a study of one or more")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import call, floor_api
 from thud._schema import BandSet, InfinitePlate
 from thud.case import Case, case_text
 from thud.checks import refuse, refuse_value, require_array, require_kind, require_real
@@ -227,7 +227,9 @@ def _force_on(source: Impact, resistance: float) -> NDArray[np.float64]:
     case = replace(
         source.case, modes=None, compression=None, room=None, floor=InfinitePlate(resistance)
     )
-    moved = new_floor_impact(case, call(api.drop_on_floor, case_text(case)), source.floor_force)
+    moved = new_floor_impact(
+        case, call(floor_api.drop_on_floor, case_text(case)), source.floor_force
+    )
     if moved is None:
         refuse(
             "source: its model has one force on all floors", "an impact of a model that feels them"

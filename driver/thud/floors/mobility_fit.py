@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import f90nml
 import numpy as np
 
-from thud import _api
+from thud._api import call, mobility_api
 from thud._schema import MeasuredMobility
 from thud.case import Case
 from thud.checks import (
@@ -25,6 +25,7 @@ from thud.checks import (
 from thud.columns import read_titled
 from thud.display import MAKERS, Displayed
 from thud.floors.mobility import mobility
+from thud.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
 
 if TYPE_CHECKING:
@@ -62,8 +63,6 @@ _EXACT = 1e-8
 # Error of the fit that is remarked, and of the change that makes it passive.
 _POOR = 0.1
 _CHANGED = 1.5
-# Octaves of the errors, exact mid frequencies, Hz.
-_OCTAVES = 1000 * 10 ** (0.3 * np.arange(-5, 0))
 
 
 @dataclass(frozen=True, repr=False)
@@ -99,11 +98,6 @@ class MobilityFit(Displayed):
         """Relative error, root of the mean square over the lines."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
 
-    @property
-    def max_error(self) -> float:
-        """Largest relative error of a line."""
-        return float(self._errors().max())
-
     def band_errors(self) -> dict[float, tuple[float, float]]:
         """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
 
@@ -113,15 +107,15 @@ class MobilityFit(Displayed):
         found = {}
         errors = self._errors()
         fitted = self.mobility(self.frequency)
-        for mid, name in zip(_OCTAVES, (31.5, 63.0, 125.0, 250.0, 500.0), strict=True):
-            edges = mid * 10**-0.15, mid * 10**0.15
-            inside = (self.frequency >= edges[0]) & (self.frequency < edges[1])
-            if self.frequency[0] > edges[0] or self.frequency[-1] < edges[1] or not inside.any():
+        octaves = get_bands("octave")
+        for name, low, high in zip(octaves.nominal, octaves.lower, octaves.upper, strict=True):
+            inside = (self.frequency >= low) & (self.frequency < high)
+            if self.frequency[0] > low or self.frequency[-1] < high or not inside.any():
                 continue
             real = [np.trapezoid(y.real[inside], self.frequency[inside])
                     for y in (fitted, self.measured)]  # fmt: skip
             level = 10 * np.log10(real[0] / real[1]) if min(real) > 0 else np.nan
-            found[name] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
+            found[float(name)] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
         return found
 
     @property
@@ -279,8 +273,8 @@ def _fit(
 ) -> MobilityFit:
     """Return the fit with a number of poles."""
     n = len(frequency)
-    routine = _api.mobility_api.fit_mobility
-    found: dict[str, Any] = _api.call(routine, frequency, values.real, values.imag, int(order), n)
+    routine = mobility_api.fit_mobility
+    found: dict[str, Any] = call(routine, frequency, values.real, values.imag, int(order), n)
     lists: dict[str, Any] = {
         key: value if isinstance(value, float) else tuple(map(float, value))
         for key, value in found["floor"].items()

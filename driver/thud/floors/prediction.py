@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud._api import api, call, text
+from thud._api import call, floor_api, text
 from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
@@ -232,7 +232,7 @@ def predict_level(
         else source.levels(THIRDS)
     )
     rated = np.isin(get_bands(THIRDS).nominal, rated_bands(THIRDS))
-    found = call(api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
+    found = call(floor_api.predict_room, case_text(asked), np.ascontiguousarray(levels[rated]))
     bands = found["bands"]
     if moved and isinstance(source, Impact):
         blocked = (
@@ -266,7 +266,7 @@ def _on_floor(source: Impact, case: Case) -> FloorImpact | None:
         return known
     plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.floor_force
-    return new_floor_impact(case, call(api.drop_on_floor, case_text(plain)), blocked)
+    return new_floor_impact(case, call(floor_api.drop_on_floor, case_text(plain)), blocked)
 
 
 def _force_change(mass: float, contact_time: float, resistance: float) -> float:

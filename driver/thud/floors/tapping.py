@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import api, call
+from thud._api import call, floor_api
 from thud._schema import Plate, Room
 from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
@@ -114,7 +114,7 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
             "1 and 1",
         )
     case = Case(floor=floor, room=require_room(room))
-    found = call(api.get_radiator, case_text(case), THIRDS)
+    found = call(floor_api.get_radiator, case_text(case), THIRDS)
     time = 2.2 / (THIRDS * found["loss_factor"])
     radiated = time * found["radiation_factor"] * THIRDS / 1000
     level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)

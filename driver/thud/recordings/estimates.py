@@ -13,7 +13,6 @@ import numpy as np
 
 from thud.checks import refuse
 from thud.levels import RECORDED_BAND, record_force
-from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.levels import measure_levels
@@ -118,17 +117,6 @@ class Drop:
         uncertainties too.
         """
         return measure_levels([self], bands, method, low_pass=low_pass)[0].level
-
-    def band_values(
-        self, lower: float, upper: float
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return values whose squares add up to the energy of the gate in a band, N2 s.
-
-        Linear functionals of the force, [n], and the covariance of the noise in them, [n, n].
-        """
-        force = self.force[slice(*self.gate)]
-        functionals = band_functionals(len(force), self.sample_rate, lower, upper)
-        return functionals @ force, self.contact.covariance_of(functionals)
 
 
 def measure_drop(  # noqa: PLR0913 - what a laboratory knows

@@ -93,8 +93,9 @@ function fieldElement(field) {
   const pair = element("div", { class: "pair" }, number);
   let slider = null;
   const send = (value) => {
-    const ends = (state.moved[field.name] ??= [current(field), current(field)]);
-    state.moved[field.name] = [Math.min(ends[0], value), Math.max(ends[1], value)];
+    const key = `${field.group}.${field.name}`;
+    const ends = (state.moved[key] ??= [current(field), current(field)]);
+    state.moved[key] = [Math.min(ends[0], value), Math.max(ends[1], value)];
     changed(value);
   };
   if (field.slider) {

@@ -1,0 +1,101 @@
+!> Columns of a table of drops: the keys in whose values they differ.
+module thud_column
+   use thud_case, only: case_type, get_active_fields
+   use thud_error, only: error_type, input_error
+   use thud_field, only: field_type, key_length, list_type
+   use thud_suggestion, only: get_suggestion
+   use thud_text, only: join_quoted, quoted, to_text
+   implicit none (type, external)
+   private
+
+   public :: column_type, find_columns
+
+   !> Groups in whose keys drops may not differ: names, and what a run writes.
+   character(len=key_length), parameter :: common_groups(*) = [character(len=key_length) :: &
+      'case', 'model', 'modes', 'compression', 'output', 'floor']
+
+   !> A key in whose values drops differ.
+   type :: column_type
+      !> Its place among the keys that the case uses.
+      integer :: place = 0
+      !> Which entry of a list; 0 for keys that are no lists.
+      integer :: entry = 0
+   end type column_type
+
+contains
+
+   !> Keys by their names, entries of lists as `frequency(2)`, those of a group as `plate.thickness`.
+   subroutine find_columns(case, names, columns, error)
+      type(case_type), intent(in), target :: case
+      !> The names: [n_column].
+      character(len=*), intent(in) :: names(:)
+      !> The keys: [n_column].
+      type(column_type), allocatable, intent(out) :: columns(:)
+      !> A name is unknown, given twice, or no entry of its list.
+      type(error_type), allocatable, intent(out) :: error
+      type(field_type), allocatable :: fields(:)
+      type(list_type), pointer :: list
+      logical, allocatable :: possible(:)
+      character(len=:), allocatable :: group, key, suggestion
+      logical :: known
+      integer :: i, j
+
+      allocate (fields, source=get_active_fields(case))
+      ! Levels of all drops have the same bands.
+      possible = [(.not. any(common_groups == fields(i)%group) .and. fields(i)%owner /= 'modes' &
+         .and. fields(i)%key /= 'bands', i=1, size(fields))]
+      allocate (columns(size(names)))
+      do i = 1, size(names)
+         call split_name(names(i), group, key, columns(i)%entry, known)
+         ! Of keys of one name the first is meant, that of the source, unless a group is named.
+         columns(i)%place = findloc(possible .and. fields%key == key .and. (group == '' .or. fields%group == group), &
+            .true., dim=1)
+         nullify (list)
+         known = known .and. columns(i)%place > 0
+         if (columns(i)%place > 0) then
+            list => fields(columns(i)%place)%list_value
+            if (associated(list)) then
+               known = known .and. columns(i)%entry >= 1 .and. columns(i)%entry <= list%count
+            else
+               known = known .and. index(names(i), '(') == 0
+            end if
+         end if
+         if (.not. known) then
+            call get_suggestion(trim(names(i)), pack(fields%key, possible), suggestion)
+            error = input_error(quoted(names(i))//' is not a key of drops'//suggestion//'; allowed: ' &
+               //join_quoted(pack(fields%key, possible)))
+            if (columns(i)%place > 0 .and. associated(list)) error = input_error(quoted(names(i)) &
+               //' is not an entry of the list; allowed: '//trim(key)//'(1) to '//trim(key)//'('//to_text(list%count)//')')
+         else if (any([(columns(j)%place == columns(i)%place .and. columns(j)%entry == columns(i)%entry, j=1, i - 1)])) then
+            error = input_error(quoted(names(i))//' is given twice; allowed: once')
+         end if
+         if (allocated(error)) return
+      end do
+   end subroutine find_columns
+
+   !> Group, key and entry of a name such as `frequency(2)` or `plate.thickness`.
+   pure subroutine split_name(name, group, key, entry, valid)
+      character(len=*), intent(in) :: name
+      !> The group, empty where none is named.
+      character(len=:), allocatable, intent(out) :: group, key
+      !> The entry; 0 where none is named.
+      integer, intent(out) :: entry
+      !> The name is a key, or a key with a number in brackets.
+      logical, intent(out) :: valid
+      integer :: bracket, dot, last
+
+      dot = index(name, '.')
+      group = name(:max(dot - 1, 0))
+      key = name(dot + 1:)
+      entry = 0
+      valid = dot /= 1
+      bracket = index(name, '(')
+      if (bracket == 0) return
+      key = name(dot + 1:bracket - 1)
+      last = len_trim(name)
+      valid = valid .and. last > bracket + 1 .and. last < bracket + 6 .and. name(last:last) == ')' &
+         .and. verify(name(bracket + 1:last - 1), '0123456789') == 0
+      if (valid) read (name(bracket + 1:last - 1), *) entry
+   end subroutine split_name
+
+end module thud_column

@@ -1,0 +1,105 @@
+!> What a case has computed as items of a bundle.
+module thud_result_bundle
+   use thud_bundle, only: bundle_type
+   use thud_case, only: case_type
+   use thud_compression, only: compression_type
+   use thud_compute, only: results_type
+   use thud_force_history, only: force_history_type, get_scalars, scalar_fields
+   use thud_free_modes, only: free_modes_type
+   use thud_kinds, only: wp
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: add_compression, add_history, add_results
+
+contains
+
+   !> Adds what a case has computed to a bundle.
+   subroutine add_results(bundle, case, results)
+      type(bundle_type), intent(inout) :: bundle
+      type(case_type), intent(in) :: case
+      type(results_type), intent(in) :: results
+      integer :: i
+
+      if (case%has_impact) call add_history(bundle, '', results%history)
+      if (allocated(results%on_floor)) call add_history(bundle, 'on_floor.', results%on_floor)
+      if (case%has_modes) call add_modes(bundle, results%modes)
+      if (case%has_compression) call add_compression(bundle, results%compression)
+      do i = 1, size(results%remark)
+         call bundle%add_text('remarks.'//to_text(i), trim(results%remark(i)))
+      end do
+   end subroutine add_results
+
+   !> Adds a force history to a bundle.
+   subroutine add_history(bundle, prefix, history)
+      type(bundle_type), intent(inout) :: bundle
+      !> What the names of its items begin with.
+      character(len=*), intent(in) :: prefix
+      type(force_history_type), intent(in) :: history
+      real(wp) :: scalars(size(scalar_fields))
+      integer :: n(1)
+      integer :: i
+
+      n = size(history%deflection)
+      scalars = get_scalars(history)
+      do i = 1, size(scalars)
+         call bundle%add_number(prefix//'scalars.'//scalar_fields(i)%name, scalars(i))
+      end do
+      do i = 1, size(history%fact)
+         call bundle%add_number(prefix//'facts.'//history%fact_name(i), history%fact(i))
+      end do
+      call bundle%add_array(prefix//'samples.deflection', n, history%deflection)
+      call bundle%add_array(prefix//'samples.velocity', n, history%velocity)
+      call bundle%add_array(prefix//'samples.elastic_force', n, history%elastic_force)
+      call bundle%add_array(prefix//'samples.floor_force', n, history%floor_force)
+      if (allocated(history%floor_velocity)) then
+         call bundle%add_array(prefix//'floor.floor_displacement', n, history%floor_displacement)
+         call bundle%add_array(prefix//'floor.floor_velocity', n, history%floor_velocity)
+         call bundle%add_number(prefix//'floor.floor_work', history%floor_work)
+      end if
+      do i = 1, size(history%part_name)
+         call bundle%add_array(prefix//'parts.'//history%part_name(i), n, history%part(:, i))
+      end do
+      if (allocated(history%channel)) then
+         do i = 1, size(history%channel_name)
+            call bundle%add_array(prefix//'channels.'//history%channel_name(i), n, history%channel(:, i))
+         end do
+      end if
+      associate (motion => history%motion, n_frame => history%motion%n_frame)
+         if (n_frame == 0) return
+         call bundle%add_array(prefix//'motion.time', [n_frame], motion%time)
+         call bundle%add_array(prefix//'motion.start', shape(motion%start), motion%start)
+         call bundle%add_array(prefix//'motion.position', [shape(motion%start), n_frame], motion%position)
+         call bundle%add_array(prefix//'motion.velocity', [shape(motion%start), n_frame], motion%velocity)
+         call bundle%add_array(prefix//'motion.contact_pressure', [size(motion%start, 1), n_frame], motion%contact_pressure)
+         call bundle%add_array(prefix//'motion.contact_shear', [size(motion%start, 1), n_frame], motion%contact_shear)
+         call bundle%add_array(prefix//'motion.cavity_pressure', [n_frame], motion%cavity_pressure)
+         call bundle%add_array(prefix//'motion.floor_displacement', [n_frame], motion%floor_displacement)
+      end associate
+   end subroutine add_history
+
+   !> Adds free modes to a bundle.
+   subroutine add_modes(bundle, modes)
+      type(bundle_type), intent(inout) :: bundle
+      type(free_modes_type), intent(in) :: modes
+
+      call bundle%add_array('modes.frequency', shape(modes%frequency), modes%frequency)
+      call bundle%add_array('modes.harmonic', shape(modes%harmonic), real(modes%harmonic, wp))
+      call bundle%add_array('modes.participation', shape(modes%participation), modes%participation)
+      call bundle%add_number('modes.rigid_frequency', modes%rigid_frequency)
+      call bundle%add_array('modes.r', shape(modes%mesh%r), modes%mesh%r)
+      call bundle%add_array('modes.z', shape(modes%mesh%z), modes%mesh%z)
+      call bundle%add_array('modes.shape', shape(modes%shape), modes%shape)
+   end subroutine add_modes
+
+   !> Adds a slow compression to a bundle.
+   subroutine add_compression(bundle, compression)
+      type(bundle_type), intent(inout) :: bundle
+      type(compression_type), intent(in) :: compression
+
+      call bundle%add_array('compression.deflection', shape(compression%deflection), compression%deflection)
+      call bundle%add_array('compression.force', shape(compression%force), compression%force)
+   end subroutine add_compression
+
+end module thud_result_bundle
