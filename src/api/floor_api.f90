@@ -178,7 +178,8 @@ contains
       type(band_type), allocatable :: bands(:)
       character(len=remark_length), allocatable :: remarks(:)
       type(error_type), allocatable :: error
-      integer :: n(1), i
+      integer :: n(1)
+      integer :: i
 
       allocate (bundle)
       call read_case(text, 'python', case, error)

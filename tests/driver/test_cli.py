@@ -116,9 +116,10 @@ def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> N
 def test_figures_of_the_paper(tmp_path: Path) -> None:
     assert cli.main(["figures", "-q", "-o", "drawn"]) == 0
     names = (
-        "compression",
+        *("ball_impedance", "compression"),
         *("figure2_force_history", "figure3_levels", "figure4_free_modes", "figure5_motion"),
-        *("finite_element_force", "finite_element_levels", "loss_factor"),
+        *("finite_element_force", "finite_element_levels"),
+        *("floor_chipboard", "floor_mobilities", "floor_motion", "loss_factor"),
         *("modal_families", "momentum_flux", "tyre_levels"),
     )
     drawn = sorted(path.name for path in (tmp_path / "drawn").iterdir())

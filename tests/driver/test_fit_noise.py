@@ -90,7 +90,8 @@ def test_what_lies_under_the_pulse_is_found(disturbance: str, name: str, size: f
     assert set(nuisances) == {"offset", name}
     value, error = nuisances[name]
     assert abs(value - size) < FAR * error
-    assert error < 0.1 * size
+    # That of an offset holds the unknown constant of coloured noise.
+    assert error < 0.15 * size
     assert f"{name} {value:.3g} ± {error:.2g} N" in str(fit)
 
 
