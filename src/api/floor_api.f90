@@ -10,9 +10,10 @@ module thud_floor_api
    use thud_force_history, only: force_history_type
    use thud_injected_energy, only: get_injected_energies, get_mean_conductances
    use thud_kinds, only: int64, wp
-   use thud_plate, only: get_critical_frequency, get_radiation_factor, get_surface_mass, get_total_loss, plate_type
+   use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
-   use thud_result_bundle, only: add_history
+   use thud_remarks, only: add_floor_remark, remark_length
+   use thud_result_bundle, only: add_history, add_remarks
    use thud_room, only: get_room_bands, room_level_type
    use thud_system, only: begin_call, end_call
    implicit none (type, external)
@@ -174,6 +175,7 @@ contains
       type(case_type), target :: case
       type(room_level_type) :: prediction
       type(band_type), allocatable :: bands(:)
+      character(len=remark_length), allocatable :: remarks(:)
       type(error_type), allocatable :: error
       integer :: n(1)
 
@@ -200,6 +202,9 @@ contains
          call bundle%add_array('octaves.time', shape(prediction%octave_level), prediction%octave_time)
          call bundle%add_array('history.time', shape(prediction%history_time), prediction%history_time)
          call bundle%add_array('history.level', shape(prediction%history), prediction%history)
+         allocate (remarks(0))
+         call add_floor_remark(case, remarks)
+         call add_remarks(bundle, remarks)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine predict_room
@@ -232,15 +237,14 @@ contains
       end if
       if (.not. allocated(error)) then
          n = n_frequency
-         associate (critical => get_critical_frequency(plate, case%room%air))
+         associate (air => case%room%air)
             call bundle%add_number('surface_mass', get_surface_mass(plate))
-            call bundle%add_number('critical_frequency', critical)
+            call bundle%add_number('critical_frequency', get_critical_frequency(plate, air))
             call bundle%add_number('length', plate%length)
             call bundle%add_number('width', plate%width)
             call bundle%add_array('conductance', n, conductance)
-            call bundle%add_array('loss_factor', n, get_total_loss(plate, case%room%air, frequency))
-            call bundle%add_array('radiation_factor', n, get_radiation_factor(frequency, critical, plate%length, &
-               plate%width, case%room%air%sound_speed))
+            call bundle%add_array('loss_factor', n, get_total_loss(plate, air, frequency))
+            call bundle%add_array('radiation_factor', n, get_plate_radiation(plate, air, frequency))
          end associate
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)

@@ -10,7 +10,7 @@ module thud_remarks
    implicit none (type, external)
    private
 
-   public :: get_remarks, remark_length
+   public :: add_floor_remark, get_remarks, remark_length
 
    !> Length of a remark.
    integer, parameter :: remark_length = 240
@@ -69,6 +69,7 @@ contains
 
    !> Adds a remark on octaves of the standard in which the floor is not what it claims to be.
    subroutine add_floor_remark(case, remarks)
+      !> A case with a floor.
       type(case_type), intent(in) :: case
       !> Sentences: [n].
       character(len=remark_length), allocatable, intent(inout) :: remarks(:)

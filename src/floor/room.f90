@@ -10,8 +10,7 @@ module thud_room
    use thud_flanking, only: get_junction_rate, get_vibration_reduction, get_wall_fields, get_walls, walls_type
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, real_field
-   use thud_plate, only: air_type, get_critical_frequency, get_mode_density, get_radiation_factor, get_surface_mass, &
-      get_total_loss, plate_type
+   use thud_plate, only: air_type, get_mode_density, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_rating, only: fast_reverberation, find_rated_bands, get_a_weighted_level
    use thud_response_spread, only: get_band_variance, get_level_spread
    use thud_text, only: to_text
@@ -178,8 +177,7 @@ contains
       prediction%conductance = conductance
       prediction%surface_mass = get_surface_mass(plate)
       prediction%energy = 10**(force_level/10)*conductance
-      prediction%radiation_factor = get_radiation_factor(bands%centre, get_critical_frequency(plate, room%air), &
-         plate%length, plate%width, room%air%sound_speed)
+      prediction%radiation_factor = get_plate_radiation(plate, room%air, bands%centre)
       prediction%loss_factor = get_total_loss(plate, room%air, bands%centre)
       prediction%reverberation_time = get_reverberation_times(room, size(bands))
       prediction%floor_modes = get_mode_density(plate)*width
@@ -275,8 +273,7 @@ contains
       at_cavity = at_room + 1
       associate (f => prediction%bands(band)%centre, third => prediction%bands(band), air => room%air, &
          ceiling => room%ceiling, area => plate%length*plate%width)
-         radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_radiation_factor(f, &
-            get_critical_frequency(plates, air), plates%length, plates%width, air%sound_speed)
+         radiated = air%density*air%sound_speed/get_surface_mass(plates)*get_plate_radiation(plates, air, f)
          flow = new_energy_flow([get_mode_density(plates), get_room_mode_density(room, f)], &
             2*pi*f*get_total_loss(plates, air, f), &
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])

@@ -46,6 +46,12 @@ def test_tapping_levels_are_those_of_the_published_example() -> None:
     assert found.level[:12] == pytest.approx(PUBLISHED, abs=0.1)
 
 
+def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
+    found = thud.predict_level(thud.solve(), thud.JoistFloor(), thud.Room())
+    remarks = thud.compare_floors({"joists": found}).remarks
+    assert any("above 13" in one and "cannot be smeared" in one for one in remarks)
+
+
 def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
     """Excesses of 2 dB in all sixteen thirds are 32 dB, the maximum: the curve stays."""
     level = np.concatenate([np.zeros(3), CURVE + 2.0])

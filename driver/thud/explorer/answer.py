@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._schema import FLOORS, MODELS
+from thud._schema import FLOORS, KEYS, MODELS
 from thud.case import Case
-from thud.checks import require_choice, shown
+from thud.checks import refuse, require_choice, require_words, shown
 from thud.errors import ThudError
 from thud.floors.prediction import predict_level
 from thud.impact import Impact, compute
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 # Points of a curve on the page, and snapshots of an animation.
 MAX_POINTS = 600
 MAX_SNAPSHOTS = 60
+# Samples of a record that the page asks for.
+MAX_SAMPLES = 200_000
 # Part of the contact that is shown after it.
 MARGIN = 1.15
 
@@ -41,6 +43,7 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
 
     Raise InputError, or TypeError and ValueError where values are of other types.
     """
+    require_words("the case", values, known_groups())
     for part, known in (("model", MODELS), ("floor", FLOORS)):
         if part in values:
             require_choice(f"&{part}: name", values[part].get("name"), list(known))
@@ -52,6 +55,11 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     )
 
 
+def known_groups() -> set[str]:
+    """Return the names of the groups that a case may have."""
+    return {key.group for key in KEYS} | {"model", "floor"}
+
+
 def _listed(value: object) -> object:
     return tuple(value) if isinstance(value, list) else value
 
@@ -59,13 +67,17 @@ def _listed(value: object) -> object:
 def answer_case(case: Case) -> Answer:
     """Return force, levels, verdict, remarks and, where asked for, motion, floor and room."""
     start = time.perf_counter()
+    samples = case.sampling.sample_rate * case.sampling.duration
+    if samples > MAX_SAMPLES:
+        refuse(f"&sampling: {samples:g} samples are too many for the page", f"up to {MAX_SAMPLES}")
     impact = compute(case)
     found = _answer(impact, impact.time, impact.force(), impact.peak())
     found["remarks"] += impact.remarks
     found["motion"] = _motion(impact)
     if case.room is not None and case.floor is not None:
         found["room"] = _room(impact)
-        found["remarks"] += found["room"].pop("remarks")
+        further = found["room"].pop("remarks")
+        found["remarks"] += [remark for remark in further if remark not in found["remarks"]]
     found["seconds"] = time.perf_counter() - start
     return found
 

@@ -63,7 +63,7 @@ def report(values: Values) -> bytes:
 
 def study(values: Values) -> bytes:
     """Return the file of a sweep over the keys that were moved, between the ends of their moves."""
-    moved: dict[str, list[float]] = values.pop(MOVED, {})
+    moved = {name: [float(end) for end in ends] for name, ends in values.pop(MOVED, {}).items()}
     case = new_case(values)
     check_case(case)
     known = known_keys((case.model.name,)) if case.model else {}

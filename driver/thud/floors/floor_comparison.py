@@ -63,7 +63,7 @@ class FloorComparison(Displayed):
                 "class (KS F 2863-2)",
                 *(CLASSES[one.octave_rating.korean_class or 0] for one in found),
             ),
-            ("energy into the floor, mJ", *(f"{1e3 * one.energy.sum():.3g}" for one in found)),
+            ("energy, 50 to 630 Hz, mJ", *(f"{1e3 * one.energy.sum():.3g}" for one in found)),
             ("tapping machine, L_n,w (C_I), dB", *(_tapping(one) for one in found)),
         ]
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud._api import call, floor_api
+from thud._api import call, floor_api, text
 from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
@@ -75,6 +75,8 @@ class RoomPrediction(Displayed):
     force_change : float
         Change of the peak of the force by the floor, dB; of a blocked force that which a linear
         source with the mass and the contact time of the impact would have.
+    floor_remarks : tuple of str
+        Where the floor is not what it claims to be.
     """
 
     floor: FloorOptions
@@ -98,6 +100,7 @@ class RoomPrediction(Displayed):
     source: Impact | Recording
     force: Literal["contact", "blocked"]
     force_change: float
+    floor_remarks: tuple[str, ...]
 
     @property
     def rating(self) -> Rating:
@@ -138,7 +141,7 @@ class RoomPrediction(Displayed):
     def remarks(self) -> tuple[str, ...]:
         """What a reader of the numbers has to know."""
         few = self.has_few_modes
-        found = []
+        found = [*self.floor_remarks]
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             found.append(
@@ -245,6 +248,7 @@ def predict_level(
         source=moved or source,
         force="contact" if moved else "blocked",
         force_change=change,
+        floor_remarks=tuple(map(text, found.get("remarks", {}).values())),
         time_of_maximum=bands.pop("time"),
         surface_mass=found["surface_mass"],
         octave_level=found["octaves"]["level"],

@@ -32,6 +32,10 @@ if TYPE_CHECKING:
     from thud.floors.floor_comparison import FloorComparison
     from thud.floors.prediction import RoomPrediction
 
+# Width of a letter of the table, inch, and letters between two columns.
+_LETTER, _GAP = 0.057, 2
+# Letters of names that fit beside each other under the bars, per inch.
+_LETTERS = 13
 # Height of a line of the table, inch.
 _LINE = 0.17
 # Labels of the steps of the chain, and whether their axes are logarithmic.
@@ -47,7 +51,8 @@ def draw_floors(found: FloorComparison) -> Figure:
     """Draw the chain of each floor as spectra, its levels beside the classes, and the table."""
     table = found.rows()
     below = _LINE * (len(table) + 1)
-    figure = new_figure(7.2 + below, 2 * WIDTH)
+    letters = [max(map(len, column)) + _GAP for column in zip(*table, strict=True)]
+    figure = new_figure(7.2 + below, max(2 * WIDTH, _LETTER * sum(letters)))
     rows = figure.add_gridspec(4, 2, height_ratios=[2.4, 2.4, 2.4, below])
     panels = [dress(figure.add_subplot(rows[i, j])) for i in range(2) for j in range(2)]
     for number, (name, one) in enumerate(found.predictions.items()):
@@ -66,8 +71,9 @@ def draw_floors(found: FloorComparison) -> Figure:
     axes = figure.add_subplot(rows[3, :])
     axes.set_axis_off()
     cells = axes.table(
-        [[literal(cell) for cell in row] for row in table], bbox=Bbox.unit(), edges="horizontal"
-    )
+        [[literal(cell) for cell in row] for row in table], bbox=Bbox.unit(), edges="horizontal",
+        colWidths=[count / sum(letters) for count in letters],
+    )  # fmt: skip
     cells.auto_set_font_size(value=False)
     cells.set_fontsize(SIZE - 1)
     for (_, column), cell in cells.get_celld().items():
@@ -130,7 +136,11 @@ def _draw_classes(axes: Axes, found: FloorComparison) -> None:
             f"class {number}", (1, limit), xycoords=("axes fraction", "data"), ha="left",
             va="center", fontsize=SIZE - 2, color=COLOURS[1],
         )  # fmt: skip
-    axes.set_xticks(place, [literal(name) for name in found.predictions])
+    names = [literal(name) for name in found.predictions]
+    axes.set_xticks(place, names)
+    width = axes.bbox.width / axes.figure.dpi
+    if max(map(len, names)) * len(names) > _LETTERS * width:
+        axes.tick_params(axis="x", labelrotation=20)
     axes.set_ylabel("L_iA,Fmax, dB", fontsize=SIZE)
     axes.set_ylim(bottom=min([CLASS_LIMITS[0], *room, *after]) - 5)
     axes.legend(
