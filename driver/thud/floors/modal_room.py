@@ -250,27 +250,21 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
 
 def plate_frequencies(floor: Plate, numbers: ArrayLike) -> Array:
     """Return natural frequencies of a simply supported plate, Hz, by numbers of half-waves."""
-    # sqrt(B'/m'') = c_L h/sqrt(12); over B' the stiffnesses are 1/root along the length, and root.
-    along, across = np.moveaxis(
-        (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2, -1, 0
-    )
-    root = math.sqrt(floor.stiffness_ratio)
-    wave = np.sqrt(along**2 / root + 2 * floor.torsion_ratio * along * across + across**2 * root)
-    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * wave / (2 * np.pi)
+    # omega**2 m'' = Bx kx**4 + 2 H kx**2 ky**2 + By ky**4, sqrt(B'/m'') = c_L h/sqrt(12).
+    square = (np.pi * np.asarray(numbers) / (floor.length, floor.width)) ** 2
+    x, y, ratio = square[..., 0], square[..., 1], math.sqrt(floor.stiffness_ratio)
+    root = np.sqrt(x**2 / ratio + 2 * floor.torsion_ratio * x * y + ratio * y**2)
+    found: Array = floor.wave_speed * floor.thickness / math.sqrt(12) * root / (2 * np.pi)
     return found
 
 
 def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     """Return numbers of half-waves, shape (n, 2), and frequencies of the plate's modes, Hz."""
-    # f >= c k**2 of each side alone: half-waves along it at the highest frequency.
+    # Half-waves along one side alone at the highest frequency.
     unit = floor.wave_speed * floor.thickness * math.pi / (2 * math.sqrt(12))
-    softer = floor.stiffness_ratio**0.125
-    numbers = _grid(
-        [
-            1 + int(side * math.sqrt(HIGHEST / unit))
-            for side in (floor.length * softer, floor.width / softer)
-        ]
-    )
+    stretch = floor.stiffness_ratio**0.125
+    sides = floor.length * stretch, floor.width / stretch
+    numbers = _grid([1 + int(side * math.sqrt(HIGHEST / unit)) for side in sides])
     numbers += 1
     frequency = plate_frequencies(floor, numbers)
     keep = frequency <= HIGHEST
@@ -279,7 +273,7 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
             f"floor: its first natural frequency is {frequency.min():.0f} Hz",
             f"a floor with modes below {HIGHEST:g} Hz",
         )
-    _require_modes("floor: the plate", int(keep.sum()))
+    _require_modes("floor: the plate has", int(keep.sum()))
     return numbers[keep], frequency[keep]
 
 
