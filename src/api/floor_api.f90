@@ -13,10 +13,9 @@ module thud_floor_api
    use thud_plate, only: get_critical_frequency, get_plate_radiation, get_surface_mass, get_total_loss, plate_type
    use thud_receiver, only: get_mobility, receiver_type
    use thud_remarks, only: add_floor_remark, remark_length
-   use thud_result_bundle, only: add_history
+   use thud_result_bundle, only: add_history, add_remarks
    use thud_room, only: get_room_bands, room_level_type
    use thud_system, only: begin_call, end_call
-   use thud_text, only: to_text
    implicit none (type, external)
    private
 
@@ -179,7 +178,6 @@ contains
       character(len=remark_length), allocatable :: remarks(:)
       type(error_type), allocatable :: error
       integer :: n(1)
-      integer :: i
 
       allocate (bundle)
       call read_case(text, 'python', case, error)
@@ -206,9 +204,7 @@ contains
          call bundle%add_array('history.level', shape(prediction%history), prediction%history)
          allocate (remarks(0))
          call add_floor_remark(case, remarks)
-         do i = 1, size(remarks)
-            call bundle%add_text('remarks.'//to_text(i), trim(remarks(i)))
-         end do
+         call add_remarks(bundle, remarks)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine predict_room

@@ -9,8 +9,8 @@ module thud_plate
    private
 
    public :: air_type, get_bending_stiffness, get_critical_frequency, get_mode_density, get_plate_fields
-   public :: get_plate_radiation, get_radiation_factor, get_resistance, get_surface_mass, get_thin_limit, get_total_loss
-   public :: plate_type
+   public :: get_plate_radiation, get_radiation_factor, get_resistance, get_surface_mass, get_thin_limit
+   public :: get_total_loss, plate_type
 
    !> Directions of the waves of an orthotropic plate; as many leave 2 % of the mean of their radiation factors.
    integer, parameter :: n_direction = 64
@@ -233,8 +233,8 @@ contains
       sigma = get_plate_radiation(plate, air, frequency)
       loss_factor = plate%loss_factor &
          + 2*air%density*air%sound_speed*sigma/(2*pi*frequency*get_surface_mass(plate)) &
-         + air%sound_speed*plate%edge_absorption &
-         /(pi**2*plate%length*plate%width*sqrt(frequency*get_critical_frequency(plate, air)))
+         + air%sound_speed/(pi**2*plate%length*plate%width*sqrt(frequency*get_critical_frequency(plate, air))) &
+         *plate%edge_absorption
    end function get_total_loss
 
 end module thud_plate

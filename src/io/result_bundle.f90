@@ -11,7 +11,7 @@ module thud_result_bundle
    implicit none (type, external)
    private
 
-   public :: add_compression, add_history, add_results
+   public :: add_compression, add_history, add_remarks, add_results
 
 contains
 
@@ -20,16 +20,25 @@ contains
       type(bundle_type), intent(inout) :: bundle
       type(case_type), intent(in) :: case
       type(results_type), intent(in) :: results
-      integer :: i
 
       if (case%has_impact) call add_history(bundle, '', results%history)
       if (allocated(results%on_floor)) call add_history(bundle, 'on_floor.', results%on_floor)
       if (case%has_modes) call add_modes(bundle, results%modes)
       if (case%has_compression) call add_compression(bundle, results%compression)
-      do i = 1, size(results%remark)
-         call bundle%add_text('remarks.'//to_text(i), trim(results%remark(i)))
-      end do
+      call add_remarks(bundle, results%remark)
    end subroutine add_results
+
+   !> Adds remarks to a bundle.
+   subroutine add_remarks(bundle, remarks)
+      type(bundle_type), intent(inout) :: bundle
+      !> Sentences: [n].
+      character(len=*), intent(in) :: remarks(:)
+      integer :: i
+
+      do i = 1, size(remarks)
+         call bundle%add_text('remarks.'//to_text(i), trim(remarks(i)))
+      end do
+   end subroutine add_remarks
 
    !> Adds a force history to a bundle.
    subroutine add_history(bundle, prefix, history)

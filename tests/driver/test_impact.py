@@ -95,10 +95,7 @@ def test_threads_do_not_disturb_each_other() -> None:
     [
         ({"model": "cube"}, r"&model: name = 'cube' is not known; allowed: 'hollow_sphere'"),
         ({"momentum_flux": "some"}, r"&hollow_sphere: momentum_flux = 'some' .* 'momentum_bal"),
-        (
-            {"stiffness": 1.0},
-            r"&hollow_sphere: 'stiffness' is a key of HuntCrossley and Oscillator; allowed: H",
-        ),
+        ({"stiffness": 1.0}, r"&hollow_sphere: 'stiffness' is a key of HuntCrossley and Osc"),
         ({"sample_rate": 0.0}, r"&sampling: sample_rate = 0.0"),
         ({"duration": 0.01}, r"&sampling: duration = 0.01 s ends while"),
         ({"substeps": 0}, r"&sampling: substeps = 0 is not allowed; allowed: 1 <= substeps"),

@@ -171,28 +171,6 @@ def test_figures_show_positions_and_shapes(found: thud.ModalRoom) -> None:
     assert sum(map(bool, titles)) == 4
 
 
-def test_strongly_orthotropic_plate_keeps_all_its_modes(impact: thud.Impact) -> None:
-    floor = thud.Plate(
-        thickness=0.03, density=900, wave_speed=3180, stiffness_ratio=0.05, torsion_ratio=0.25,
-        edges="absorption",
-    )  # fmt: skip
-    found = thud.modal_room(impact, floor, ROOM, balls=1, microphones=1)
-    every = plate_frequencies(floor, list(itertools.product(range(1, 60), repeat=2)))
-    assert len(found.floor_frequency) == (every <= 400).sum()
-
-
-def test_modal_room_takes_the_stiffnesses_of_an_orthotropic_plate(impact: thud.Impact) -> None:
-    timber = thud.Plate(
-        length=4.5, width=3.7, thickness=0.16, stiffness_ratio=0.2, torsion_ratio=0.4
-    )
-    found = thud.modal_room(impact, timber, ROOM, balls=1, microphones=1).floor_frequency
-    # Resonances of the mobility of the same floor, whose modes the library has in closed form.
-    bare = replace(timber, loss_factor=0.0, edges="absorption", source_x=0.31, source_y=0.37)
-    for frequency in found[:5]:
-        near = thud.mobility(bare, frequency * np.array([0.98, 1.0, 1.02]))
-        assert near[1].real > 5 * near[[0, 2]].real.max()
-
-
 @pytest.mark.parametrize("ratio", [0.01, 100.0])
 def test_no_mode_of_an_orthotropic_plate_is_missing(impact: thud.Impact, ratio: float) -> None:
     plate = replace(FLOOR, thickness=0.08, stiffness_ratio=ratio)

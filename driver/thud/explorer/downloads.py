@@ -63,9 +63,7 @@ def report(values: Values) -> bytes:
 
 def study(values: Values) -> bytes:
     """Return the file of a sweep over the keys that were moved, between the ends of their moves."""
-    moved = {
-        name: [float(end) for end in ends] for name, ends in values.pop(MOVED, {}).items()
-    }
+    moved = {name: [float(end) for end in ends] for name, ends in values.pop(MOVED, {}).items()}
     case = new_case(values)
     check_case(case)
     known = known_keys((case.model.name,)) if case.model else {}
