@@ -11,8 +11,8 @@ from scipy.stats import binom
 sys.path.insert(0, str(Path(__file__).parent))
 from recording_bounds import Result, columns, realise
 
-# 60 realisations: four of each colour and level of noise.
-COUNT = 60
+# 30 realisations: two of each colour and level of noise.
+COUNT = 30
 
 
 def test_random_recordings_keep_to_the_bounds() -> None:
