@@ -17,7 +17,7 @@ module thud_mobility_fit
    integer, parameter :: max_lines = 10000
 
    !> Least magnitude, over the largest, whose relative error counts in full.
-   real(wp), parameter :: least_magnitude = 1.0e-6_wp
+   real(wp), parameter :: min_magnitude = 1.0e-6_wp
 
 contains
 
@@ -41,7 +41,7 @@ contains
       free_error = 0.0_wp
       call check_table(frequency, mobility, order, size(floor%pole_frequency%values), error)
       if (allocated(error)) return
-      weight = 1/max(abs(mobility), least_magnitude*maxval(abs(mobility)))
+      weight = 1/max(abs(mobility), min_magnitude*maxval(abs(mobility)))
       call fit_rational(2*pi*frequency, mobility, weight, order, pole, residue, floor%direct, free_error, failed)
       call check_interrupt(error)
       if (allocated(error)) return

@@ -1,4 +1,4 @@
-"""Ringing of a plate is told, and nothing else is taken for it."""
+"""Ringing of a plate is remarked, and nothing else is taken for it."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ OTHER = {".thud", FIGURE, *MINE}
 
 
 class Place(NamedTuple):
-    """A directory, and how a run is told of it: by its name, or as its working directory."""
+    """A directory, and how it is named to a run: by its name, or as its working directory."""
 
     out: Path
     where: Path
