@@ -191,7 +191,7 @@ MAKERS.update(
     recording=_maker("plot.recording", "recording_figure"),
     floors=_maker("plot.floors", "draw_floors"),
     floors_html=_maker("plot.floors", "floors_html"),
-    save_all=_maker("plot.look", "save_all"),
+    save_page=_maker("plot.look", "save_page"),
     modal_room=_maker("plot.modal_room", "draw_modal_room"),
     mobility_fit=_maker("plot.mobility_fit", "mobility_fit"),
     prediction=_maker("plot.prediction", "draw_prediction"),

@@ -18,13 +18,12 @@ from thud.case import Case, read_case
 from thud.checks import refuse, refuse_value, require_choice, require_kind
 from thud.display import Displayed
 from thud.errors import InputError, PlausibilityWarning, ThudError
-from thud.files import replace_file
 from thud.impact import FORCES, Impact, compute
 from thud.levels import SOURCES, get_bands
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 from thud.plot.levels import common_source
-from thud.plot.look import save_all
+from thud.plot.look import save_page
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 
@@ -128,12 +127,7 @@ class Comparison(Displayed):
         OSError
             Where they cannot be written.
         """
-        folder = Path(directory)
-        folder.mkdir(parents=True, exist_ok=True)
-        pictures = save_all({"comparison": self.figure()}, folder)
-        page = folder / "comparison.html"
-        replace_file(page, self.html().encode())
-        return [*pictures, page]
+        return save_page("comparison", self.figure(), self.html(), directory)
 
 
 def _digits(force: float) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
@@ -14,7 +13,6 @@ from thud.case import Case
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
 from thud.errors import InputError, ThudError
-from thud.files import replace_file
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.rating import CLASSES
 from thud.floors.tapping import tapping_level
@@ -23,6 +21,7 @@ from thud.levels import get_bands
 
 if TYPE_CHECKING:
     import os
+    from pathlib import Path
 
     from matplotlib.figure import Figure
 
@@ -85,12 +84,8 @@ class FloorComparison(Displayed):
         OSError
             Where they cannot be written.
         """
-        folder = Path(directory)
-        folder.mkdir(parents=True, exist_ok=True)
-        pictures: list[Path] = MAKERS["save_all"]({"floors": self.figure()}, folder)
-        page = folder / "floors.html"
-        replace_file(page, self.html().encode())
-        return [*pictures, page]
+        paths: list[Path] = MAKERS["save_page"]("floors", self.figure(), self.html(), directory)
+        return paths
 
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""

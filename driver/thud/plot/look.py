@@ -235,3 +235,22 @@ def save_all(figures: Mapping[str, Figure], directory: str | os.PathLike[str]) -
             paths.append(Path(directory, f"{name}.{ending}"))
             save(figure, paths[-1])
     return paths
+
+
+def save_page(
+    name: str, figure: Figure, html: str, directory: str | os.PathLike[str]
+) -> list[Path]:
+    """Save a figure as PNG and SVG beside the page of the same name; return the paths.
+
+    The directory is made where there is none.
+
+    Raises
+    ------
+    OSError
+        Where a file cannot be written.
+    """
+    page = Path(directory, f"{name}.html")
+    page.parent.mkdir(parents=True, exist_ok=True)
+    pictures = save_all({name: figure}, directory)
+    replace_file(page, html.encode())
+    return [*pictures, page]
