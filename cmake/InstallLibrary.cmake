@@ -1,8 +1,10 @@
-# Installs the executable, and the library for find_package(thud) and pkg-config.
+# Installs the executable with its manual page, and the library for find_package(thud) and pkg-config.
 include(CMakePackageConfigHelpers)
 file(RELATIVE_PATH to_libraries "/${CMAKE_INSTALL_BINDIR}" "/${CMAKE_INSTALL_LIBDIR}")
 set_target_properties(thud PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
 install(TARGETS thud)
+# Manual pages and completions of shells; thud-driver comes with the wheel.
+install(DIRECTORY "${PROJECT_SOURCE_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}" PATTERN "*thud-driver*" EXCLUDE)
 install(TARGETS thud_library EXPORT thudTargets)
 install(DIRECTORY "${module_directory}/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/thud")
 

@@ -143,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
     """Return the options, or an exit code where argparse has shown its text."""
     try:
-        return _parser().parse_args(arguments)
+        return new_parser().parse_args(arguments)
     except SystemExit as stop:
         # argparse exits with 2 for bad usage, which is a numerical failure here.
         return InputError.exit_code if stop.code else 0
@@ -167,7 +167,7 @@ def _words() -> list[str]:
     return [*COMMANDS, *options, *(word for _, more in given for word in more.get("choices", ()))]
 
 
-def _parser() -> argparse.ArgumentParser:
+def new_parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     parser = _Parser(
         prog="thud-driver",
