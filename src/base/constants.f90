@@ -21,7 +21,7 @@ module thud_constants
    real(wp), parameter :: recorded_band = 1250.0_wp
 
    !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.
-   character(len=*), parameter :: version = '0.1.0'
+   character(len=*), parameter :: version = '1.0.0'
 
    !> Compiler of the library and its options.
    character(len=*), parameter :: compiler = compiler_version()//', options '//compiler_options()
