@@ -1,0 +1,36 @@
+"""The first figure of the documentation: the ball of the paper, and by finite elements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import thud
+from thud.plot.force_history import draw_forces
+from thud.plot.levels import draw_levels
+from thud.plot.look import LEVEL, SIZE, WIDTH, dress, legend_above, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+INPUTS = Path(__file__).parents[2] / "inputs"
+CASES = {
+    "shell of the paper": "rubber_ball_100cm",
+    "elements, law of order 0.3": "rubber_ball_fe",
+    "elements, Kelvin–Voigt": "rubber_ball_fe_viscous",
+}
+
+
+def flagship() -> Figure:
+    """Draw forces and octaves of the three cases of `./bootstrap run`."""
+    impacts = {
+        name: thud.solve_case(thud.read_case(INPUTS / f"{case}.nml"))
+        for name, case in CASES.items()
+    }
+    figure = new_figure(2.4, 2 * WIDTH)
+    history, octaves = figure.subplots(1, 2)
+    draw_forces(dress(history), impacts, None)
+    draw_levels({"octave": octaves}, impacts, None, "rubber_ball")
+    octaves.set_ylabel(LEVEL, fontsize=SIZE)
+    legend_above(octaves)
+    return figure
