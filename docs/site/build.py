@@ -7,6 +7,8 @@ writes plain files to DIRECTORY (default: build/site/html). A warning is an erro
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 import subprocess
 import sys
@@ -16,13 +18,17 @@ import thud
 
 REPOSITORY = Path(__file__).parents[2]
 WORK = REPOSITORY / "build/site"
-COPIED = ("docs", "inputs", "README.md", "CHANGELOG.md")
+COPIED = (
+    *("docs", "inputs", "README.md", "CHANGELOG.md"),
+    *("CONTRIBUTING.md", "CITATION.cff", "LICENSE"),
+)
 # FORD does not read lengths of characters that are calls, nor the include file of FFTW.
 FORD = """---
 project: thud
 summary: The Fortran library
 src_dir: {sources}
 output_dir: {output}/fortran
+css: {css}
 preprocess: false
 display: public
 source: false
@@ -59,6 +65,46 @@ def python_page() -> str:
     return text
 
 
+def fortran_page(reference: Path) -> str:
+    """Return the page of all Fortran modules, made from FORD's list of them."""
+    modules = json.loads((reference / "modules.json").read_text(encoding="utf-8"))["modules"]
+    rows = [
+        f"| <a href=\"fortran/{module['external_url'].removeprefix('./')}\">{module['name']}</a> "
+        f"| {', '.join(f'`{name}`' for name in sorted([*module['pub_types'], *module['pub_procs']]))} |"
+        for module in sorted(modules, key=lambda module: module["name"])
+    ]
+    return "\n".join(
+        [
+            "# Fortran reference",
+            "",
+            "The modules of the library and their public types and procedures. Programs use the façade `thud`",
+            "([page on it](docs/fortran.md)).",
+            "",
+            "| module | types and procedures |",
+            "|---|---|",
+            *rows,
+            "",
+        ]
+    )
+
+
+def strip_network(reference: Path) -> None:
+    """Take from FORD's pages what they load from other hosts; `fortran.css` replaces it."""
+    for path in reference.rglob("*.html"):
+        text = path.read_text(encoding="utf-8")
+        text = re.sub(r"<script\b.*?</script>", "", text, flags=re.DOTALL)
+        text = re.sub(r"<link\b(?![^>]*(?:user|pygments)\.css)[^>]*stylesheet[^>]*>", "", text)
+        # A way back to the other pages.
+        text = re.sub(
+            r'(<a class="navbar-brand" href="([^"]*)index\.html">)',
+            r'<a href="\2../index.html">Documentation</a> \1Fortran reference of ',
+            text,
+        )
+        path.write_text(text, encoding="utf-8")
+    for name in ("js", "webfonts"):
+        shutil.rmtree(reference / name)
+
+
 def copy_sources() -> Path:
     """Return the directory of the sources of the site, made anew."""
     source = WORK / "source"
@@ -72,7 +118,6 @@ def copy_sources() -> Path:
             shutil.copy(path, source)
     for name in ("conf.py", "index.md"):
         shutil.copy(Path(__file__).parent / name, source)
-    (source / "python_reference.md").write_text(python_page(), encoding="utf-8")
     return source
 
 
@@ -82,10 +127,20 @@ def build(target: Path) -> None:
     shutil.rmtree(target, ignore_errors=True)
     settings = WORK / "ford.md"
     settings.write_text(
-        FORD.format(sources=REPOSITORY / "src", output=WORK / "ford"), encoding="utf-8"
+        FORD.format(
+            sources=REPOSITORY / "src",
+            output=WORK / "ford",
+            css=Path(__file__).parent / "fortran.css",
+        ),
+        encoding="utf-8",
     )
     python = [sys.executable, "-m"]
     subprocess.run([*python, "ford", str(settings)], check=True)
+    reference = WORK / "ford/fortran"
+    strip_network(reference)
+    pages = {"python_reference.md": python_page(), "fortran_reference.md": fortran_page(reference)}
+    for name, text in pages.items():
+        (source / name).write_text(text, encoding="utf-8")
     subprocess.run(
         [*python, "sphinx", "-W", "--keep-going", "-q", "-j", "auto", str(source), str(target)],
         check=True,

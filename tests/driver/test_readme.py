@@ -1,4 +1,4 @@
-"""The README shows what the program prints."""
+"""The README shows what the program prints, and the page of the commands has all of them."""
 
 from __future__ import annotations
 
@@ -42,5 +42,8 @@ def test_python_example_prints_what_is_shown() -> None:
 
 
 def test_commands_exist() -> None:
-    for command in re.findall(r"thud-driver (\w+)", README):
+    page = (REPOSITORY / "docs/commands.md").read_text(encoding="utf-8")
+    for command in re.findall(r"thud-driver ([a-z]+)", README + page):
         assert command in cli.COMMANDS
+    for command in cli.COMMANDS:
+        assert re.search(rf"`(thud-driver )?{command}`", page), command

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 from html.parser import HTMLParser
 from typing import TYPE_CHECKING
@@ -17,13 +18,14 @@ if TYPE_CHECKING:
 
 
 class Page(HTMLParser):
-    """Links and anchors of a page."""
+    """Links and anchors of a page, and what it loads."""
 
     def __init__(self) -> None:
         """Begin with none."""
         super().__init__()
         self.links: list[str] = []
         self.anchors: set[str] = set()
+        self.loaded: list[str] = []
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         """Take links and anchors of a tag."""
@@ -32,6 +34,8 @@ class Page(HTMLParser):
         link = found.get("href" if tag in {"a", "link"} else "src")
         if link:
             self.links.append(link)
+        if link and tag != "a":
+            self.loaded.append(link)
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +68,21 @@ def test_no_link_is_broken(site: Path) -> None:
                 broken.append((path.relative_to(site).as_posix(), link))
     assert len(pages) > len(thud.__all__)
     assert not broken
+
+
+def test_site_needs_no_network(site: Path) -> None:
+    foreign = []
+    for path in site.rglob("*.html"):
+        page = Page()
+        page.feed(path.read_text(encoding="utf-8"))
+        foreign += [(path.name, link) for link in page.loaded if urlsplit(link).netloc]
+    for path in site.rglob("*.css"):
+        style = path.read_text(encoding="utf-8")
+        foreign += [
+            (path.name, link)
+            for link in re.findall(r"(?:@import|url\()\W*(?:https?:)?//\S+", style)
+        ]
+    assert not foreign
 
 
 def test_every_page_of_the_documentation_is_in_the_site(site: Path) -> None:
