@@ -97,7 +97,11 @@ contains
       end if
       if (.not. allocated(error)) then
          allocate (by_motion(size(bands)), by_mobility(size(bands)))
-         call get_injected_energies(receiver, force, velocity, sample_rate, bands, by_motion, by_mobility)
+         call begin_call()
+         call get_injected_energies(receiver, force, velocity, sample_rate, bands, by_motion, by_mobility, error)
+         call end_call()
+      end if
+      if (.not. allocated(error)) then
          call bundle%add_array('frequency', shape(bands), bands%nominal)
          call bundle%add_array('by_motion', shape(bands), by_motion)
          call bundle%add_array('by_mobility', shape(bands), by_mobility)

@@ -56,7 +56,8 @@ contains
          call floor%get_receiver(receiver, error)
          if (allocated(error)) return
          call get_injected_energies(receiver, contact%floor_force, contact%floor_velocity, contact%sample_rate, &
-            found%bands, found%energy_by_motion, found%energy_by_mobility)
+            found%bands, found%energy_by_motion, found%energy_by_mobility, error)
+         if (allocated(error)) return
          found%conductance = get_mean_conductances(receiver, found%bands)
          allocate (found%point_velocity(size(contact%floor_force), floor%point_x%count))
          do i = 1, floor%point_x%count

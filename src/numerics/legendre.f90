@@ -1,11 +1,11 @@
-!> Legendre polynomials and Gauss-Legendre quadrature.
+!> Legendre polynomials, Legendre functions of the second kind, and Gauss-Legendre quadrature.
 module thud_legendre
    use thud_constants, only: pi
    use thud_kinds, only: wp
    implicit none (type, external)
    private
 
-   public :: get_gauss_legendre, get_legendre
+   public :: get_gauss_legendre, get_legendre, get_second_legendre
 
 contains
 
@@ -35,6 +35,25 @@ contains
          second(j) = second(j - 2) + (2*j - 1)*first(j - 1)
       end do
    end subroutine get_legendre
+
+   !> Legendre functions of the second kind, 2 Q_n(z) = integral over [-1, 1] of P_n(x)/(z - x).
+   !>
+   !> By their recursion upwards, in which errors grow as |P_n(z)|. Sums over coefficients of a smooth function do not
+   !> suffer: these fall as fast.
+   pure subroutine get_second_legendre(z, second)
+      !> Place in the upper half of the plane, on [-1, 1] taken as above it.
+      complex(wp), intent(in) :: z
+      !> Q_0(z) and so on: [0:degree].
+      complex(wp), intent(out) :: second(0:)
+      integer :: n
+
+      second(0) = (log(z + 1) - log(z - 1))/2
+      if (ubound(second, 1) == 0) return
+      second(1) = z*second(0) - 1
+      do n = 2, ubound(second, 1)
+         second(n) = ((2*n - 1)*z*second(n - 1) - (n - 1)*second(n - 2))/n
+      end do
+   end subroutine get_second_legendre
 
    !> Nodes and weights of Gauss-Legendre quadrature on [-1, 1], by Newton's iteration.
    pure subroutine get_gauss_legendre(node, weight)
