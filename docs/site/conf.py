@@ -22,7 +22,13 @@ myst_heading_anchors = 4
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 templates_path = ["docs/site/templates"]
 suppress_warnings = ["misc.highlighting_failure"]  # lines of a CMake list
-exclude_patterns = ["README.md", "inputs/**", "docs/tutorials/inputs/**", "docs/paper/**", "docs/site/**"]
+exclude_patterns = [
+    "README.md",
+    "inputs/**",
+    "docs/paper/**",
+    "docs/site/**",
+    "docs/tutorials/inputs/**",
+]
 
 # Tutorials are computed at each build; one that fails is an error.
 nb_execution_mode = "force"
