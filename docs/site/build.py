@@ -118,6 +118,8 @@ def copy_sources() -> Path:
             shutil.copy(path, source)
     for name in ("conf.py", "index.md"):
         shutil.copy(Path(__file__).parent / name, source)
+    # Tutorials find the inputs beside them, as `thud-driver examples` puts them.
+    (source / "docs/tutorials/inputs").symlink_to(source / "inputs")
     return source
 
 

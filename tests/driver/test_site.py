@@ -1,4 +1,4 @@
-"""The documentation site builds without a warning, and its links lead somewhere."""
+"""The documentation site builds without a warning: pages, links, and tutorials, which it runs."""
 
 from __future__ import annotations
 
@@ -42,6 +42,7 @@ class Page(HTMLParser):
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the built site; a warning of its builder fails."""
     pytest.importorskip("sphinx")
+    pytest.importorskip("myst_nb")
     target = tmp_path_factory.mktemp("site") / "html"
     runpy.run_path(str(REPOSITORY / "docs/site/build.py"))["build"](target)
     return target
@@ -87,5 +88,7 @@ def test_site_needs_no_network(site: Path) -> None:
 
 def test_every_page_of_the_documentation_is_in_the_site(site: Path) -> None:
     menu = (site / "index.html").read_text(encoding="utf-8")
-    for page in (REPOSITORY / "docs").glob("*.md"):
-        assert f'href="docs/{page.stem}.html"' in menu, page
+    docs = REPOSITORY / "docs"
+    for page in [*docs.glob("*.md"), *docs.glob("tutorials/*.md")]:
+        place = page.relative_to(REPOSITORY).with_suffix(".html").as_posix()
+        assert f'href="{place}"' in menu, page
