@@ -23,6 +23,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
 REPOSITORY = Path(__file__).parents[1]
+DESCRIPTIONS = {
+    "thud": "Drops the source of a case and leaves its force, its levels and the verdict, and the "
+    "input with all defaults, as files in a directory; prints the verdict.",
+    "thud-driver": "Runs cases as thud(1) does and draws them; judges recordings, compares, fits "
+    "and varies. thud-driver COMMAND --help shows the arguments of one command.",
+}
 COMPLETIONS = {
     "bash": "bash-completion/completions/{}",
     "zsh": "zsh/site-functions/_{}",
@@ -169,6 +175,7 @@ def manual(program: Program, date: str, keys: str = "") -> str:
         # Neither hyphens in names that are typed, nor gaps in lines.
         f".nh\n.ad l\n.SH NAME\n{roff(name)} \\- {purpose}\n",
         ".SH SYNOPSIS\n" + ".br\n".join(calls),
+        f".SH DESCRIPTION\n{plain(DESCRIPTIONS[name])}\n",
         f".SH OPTIONS\n{entries(program.arguments)}",
     ]
     if program.commands:

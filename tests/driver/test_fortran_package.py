@@ -103,6 +103,8 @@ def test_pkg_config_names_all_that_is_needed(installed: Path, tmp_path: Path) ->
 
 def test_the_executable_of_the_installed_tree_runs(installed: Path) -> None:
     assert run(installed / "bin/thud", "--version").split()[1] == thud.__version__
+    assert (installed / "share/man/man1/thud.1").exists()
+    assert not list(installed.rglob("*thud-driver*"))
 
 
 def test_the_page_shows_the_example_and_what_it_prints() -> None:

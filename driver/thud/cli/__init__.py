@@ -1,4 +1,4 @@
-"""The command ``thud-driver``: cases with figures, studies, and the figures of the paper."""
+"""The command ``thud-driver``: cases with figures, recordings, floors, fits and studies."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def new_parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     parser = _Parser(
         prog="thud-driver",
-        description="Cases with figures, studies, and the figures of the paper.",
+        description="Cases with figures, recordings, floors, fits and studies.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
         "3 not conforming (run --check), 130 interrupted, 143 terminated.",
     )
