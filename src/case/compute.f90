@@ -81,7 +81,7 @@ contains
       end if
       if (allocated(error)) return
       if (case%has_impact .and. case%has_floor) call drop_on_floor(case, results%on_floor, error)
-      if (.not. allocated(error)) call get_remarks(case, results%history, allocated(results%on_floor), results%remark)
+      if (.not. allocated(error)) call get_remarks(case, results%history, results%remark, results%on_floor)
    end subroutine compute_case
 
    !> The drop of a case on its floor.

@@ -1,12 +1,17 @@
 !> Remarks on what is possible but not plausible: input of no rubber, moduli of another model, forces of no source.
 module thud_remarks
    use thud_ball, only: get_density
-   use thud_case, only: case_type, get_floor_number
+   use thud_band, only: band_type, get_band_name, get_octaves, octave_count
+   use thud_case, only: case_type, get_floor_number, get_model_number
+   use thud_error, only: error_type
    use thud_floor_model, only: reason_length
+   use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_registry, only: floor_names, model_names
+   use thud_sampling, only: get_rate_limit
    use thud_text, only: fixed, quoted, to_text
+   use thud_theory_limit, only: get_limit_sentence, is_outside, theory_limit_type
    implicit none (type, external)
    private
 
@@ -21,6 +26,9 @@ module thud_remarks
    !> Moduli of elasticity of rubbers, from gels to hard rubber, Pa: [2].
    real(wp), parameter :: rubber_modulus(2) = [1.0e4_wp, 3.0e9_wp]
 
+   !> Poisson's ratios of rubbers, also of filled ones: [2].
+   real(wp), parameter :: rubber_ratio(2) = [0.45_wp, 0.5_wp]
+
    !> Two moduli count as the same within this part.
    real(wp), parameter :: same_modulus = 0.02_wp
 
@@ -34,22 +42,27 @@ module thud_remarks
    !> Outer edges of the octaves 31.5 and 500 Hz, Hz: [2].
    real(wp), parameter :: standard_band(2) = [22.4_wp, 707.0_wp]
 
+   !> Level of an octave below that over all frequencies at which rounding counts, dB.
+   real(wp), parameter :: max_decline = 120.0_wp
+
+   !> Error of a coefficient of restitution.
+   real(wp), parameter :: restitution_error = 1.0e-6_wp
+
    !> The model that computes free modes.
    character(len=*), parameter :: modes_model = 'finite_element'
 
 contains
 
    !> Remarks on a case and its force.
-   subroutine get_remarks(case, history, moved, remarks)
+   subroutine get_remarks(case, history, remarks, on_floor)
       !> The case, checked.
       type(case_type), intent(in) :: case
       !> Its force, of no samples without an impact.
       type(force_history_type), intent(in) :: history
-      !> The floor has moved under the source.
-      logical, intent(in) :: moved
       !> Sentences: [n].
       character(len=remark_length), allocatable, intent(out) :: remarks(:)
-      real(wp) :: level
+      !> The force on a floor that has moved under the source.
+      type(force_history_type), intent(in), optional :: on_floor
 
       allocate (remarks(0))
       if (case%has_impact) then
@@ -58,14 +71,61 @@ contains
          call add_ball_remarks(case, modes_model, remarks)
       end if
       if (.not. case%has_impact) return
-      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. moved) call add(remarks, '&floor: name = ' &
-         //quoted(case%floor)//' does not move under the model '//quoted(case%model)//': its force is that on a rigid floor')
+      if (case%has_floor .and. case%floor /= floor_names(1) .and. .not. present(on_floor)) call add(remarks, &
+         '&floor: name = '//quoted(case%floor)//' does not move under the model '//quoted(case%model) &
+         //': its force is that on a rigid floor')
       if (case%has_floor) call add_floor_remark(case, remarks)
-      level = 10*log10(max(sum(history%floor_force**2)/history%sample_rate, tiny(1.0_wp)))
-      if (level < source_level(1) - max_distance .or. level > source_level(2) + max_distance) call add(remarks, &
-         'the force exposure level over all frequencies is '//fixed(level, 1)//' dB, sources that conform have ' &
-         //fixed(source_level(1), 0)//' to '//fixed(source_level(2), 0)//' dB; check the units of the input')
+      call add_limit_remarks(case, history, remarks)
+      call add_level_remarks(history, remarks)
+      if (present(on_floor)) call add_limit_remarks(case, on_floor, remarks)
    end subroutine get_remarks
+
+   !> Adds remarks on an answer that lies outside the theory.
+   subroutine add_limit_remarks(case, history, remarks)
+      type(case_type), intent(in) :: case
+      type(force_history_type), intent(in) :: history
+      !> Sentences: [n].
+      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      type(theory_limit_type), allocatable :: limits(:)
+      integer :: i
+
+      associate (model => case%models(get_model_number(case))%model)
+         limits = [get_rate_limit(case%sampling), model%get_theory_limits(case%ball, case%drop, history), &
+            theory_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
+            reason='it gives energy to the source'), &
+            theory_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &
+            reason='the source goes on downwards with a floor too light for it')]
+      end associate
+      do i = 1, size(limits)
+         if (.not. is_outside(limits(i))) cycle
+         ! One sentence on a drop, on whichever floor.
+         if (any(index(remarks, trim(limits(i)%quantity)//' is ') > 0)) cycle
+         call add(remarks, get_limit_sentence(limits(i)))
+      end do
+   end subroutine add_limit_remarks
+
+   !> Adds remarks on levels of a force in other units, and on levels that are rounding.
+   subroutine add_level_remarks(history, remarks)
+      type(force_history_type), intent(in) :: history
+      !> Sentences: [n].
+      character(len=remark_length), allocatable, intent(inout) :: remarks(:)
+      type(band_type) :: bands(octave_count)
+      type(error_type), allocatable :: error
+      real(wp) :: levels(octave_count)
+      real(wp) :: total
+      integer :: first
+
+      total = 10*log10(max(sum(history%floor_force**2)/history%sample_rate, tiny(1.0_wp)))
+      if (total < source_level(1) - max_distance .or. total > source_level(2) + max_distance) call add(remarks, &
+         'the force exposure level over all frequencies is '//fixed(total, 1)//' dB, sources that conform have ' &
+         //fixed(source_level(1), 0)//' to '//fixed(source_level(2), 0)//' dB; check the units of the input')
+      bands = get_octaves()
+      call get_force_exposure_levels(history%floor_force, history%sample_rate, bands, 'exact', levels, error)
+      if (allocated(error)) return
+      first = findloc(levels < total - max_decline, .true., dim=1)
+      if (first > 0) call add(remarks, 'octaves from '//trim(get_band_name(bands(first))) &
+         //' Hz on hold less than 1e-12 of the energy of the force: rounding counts in their levels')
+   end subroutine add_level_remarks
 
    !> Adds a remark on octaves of the standard in which the floor is not what it claims to be.
    subroutine add_floor_remark(case, remarks)
@@ -106,6 +166,9 @@ contains
          if (modulus < rubber_modulus(1) .or. modulus > rubber_modulus(2)) call add(remarks, &
             '&ball: youngs_modulus = '//to_text(modulus)//' Pa, rubbers have '//to_text(rubber_modulus(1))//' to ' &
             //to_text(rubber_modulus(2))//'; check the unit')
+         if (case%ball%poisson_ratio < rubber_ratio(1)) call add(remarks, '&ball: poisson_ratio = ' &
+            //to_text(case%ball%poisson_ratio)//', rubbers have '//fixed(rubber_ratio(1), 2)//' to ' &
+            //fixed(rubber_ratio(2), 2))
          do i = 1, size(model_names)
             other = case%models(i)%model%get_paper_modulus()
             if (.not. (other > 0.0_wp .and. abs(other - own) > same_modulus*own)) cycle

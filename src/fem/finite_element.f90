@@ -5,6 +5,7 @@
 !> record is that of the run.
 module thud_finite_element
    use thud_ball, only: ball_type
+   use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
    use thud_error, only: error_type, input_error, numerical_error
@@ -25,6 +26,7 @@ module thud_finite_element
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
    use thud_text, only: to_text
+   use thud_theory_limit, only: get_wave_limit, theory_limit_type
    implicit none (type, external)
    private
 
@@ -60,6 +62,7 @@ module thud_finite_element
       procedure, pass(options) :: solve
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: get_theory_limits
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
    end type finite_element_type
@@ -88,6 +91,26 @@ contains
 
       modulus = 2.08e6_wp
    end function get_paper_modulus
+
+   !> Limits of what the mesh resolves: beyond them octaves are off by more than about 0.5 dB (docs/finite_elements.md).
+   function get_theory_limits(ball, drop, options, history) result(limits)
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      class(finite_element_type), intent(in) :: options
+      !> The answer.
+      type(force_history_type), intent(in) :: history
+      !> The limits: [n_limit].
+      type(theory_limit_type), allocatable :: limits(:)
+      real(wp) :: length
+
+      length = pi*ball%outer_radius/options%mesh%polar_elements
+      limits = [get_wave_limit(ball, history, 0.5_wp), &
+         theory_limit_type('mesh', 'sqrt(outer_radius wall_thickness) over the length of an element', &
+         sqrt(ball%outer_radius*ball%wall_thickness)/length, lowest=6.0_wp, &
+         reason='fewer polar_elements do not resolve how a wall so thin bends'), &
+         theory_limit_type('mesh', 'radius of the contact over the length of an element', &
+         maxval(history%channel(:, 1))/length, lowest=4.0_wp, reason='fewer polar_elements do not resolve the contact')]
+   end function get_theory_limits
 
    !> Loss factor of the material in shear against frequency.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)

@@ -1,17 +1,22 @@
 !> The answer of every source model: the force on a floor, sampled from first touch on.
 !> Levels, verdicts and files know this type only, never the model behind it.
 module thud_force_history
+   use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
+   use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: continue_to_zero, force_count, force_history_type, force_names, get_scalars, max_residual, new_force_history
-   public :: outcome_count, scalar_fields
+   public :: check_samples, continue_to_zero, force_count, force_history_type, force_names, get_scalars, holds_impulse
+   public :: max_residual, new_force_history, outcome_count, scalar_fields
 
    !> Residual of the balances of impulse and energy above which models that integrate or sum one
    !> equation of motion refuse their result; at the default step they have less than 1e-9.
    real(wp), parameter :: max_residual = 1.0e-6_wp
+
+   !> Part of the impulse that samples may miss; those of eight samples of a contact miss up to 0.006.
+   real(wp), parameter :: max_missing = 0.02_wp
 
    !> Forces that levels and verdicts are made of: without and with the flux of momentum.
    integer, parameter :: force_count = 2
@@ -119,6 +124,29 @@ contains
          merge(history%exact_contact_time, history%contact_time, history%exact_contact_time > 0.0_wp), &
          history%touch_time, history%sample_rate, history%impulse_residual, history%energy_residual]
    end function get_scalars
+
+   !> Whether samples hold the impulse of a force.
+   elemental function holds_impulse(sampled, impulse) result(yes)
+      !> Sum of the samples over their rate, and time integral of the force, N s.
+      real(wp), intent(in) :: sampled, impulse
+      logical :: yes
+
+      yes = abs(sampled - impulse) <= max_missing*impulse
+   end function holds_impulse
+
+   !> Refuses samples that miss the force, as of a spike between two of them.
+   subroutine check_samples(history, error)
+      !> The history, complete.
+      type(force_history_type), intent(in) :: history
+      !> Names both impulses.
+      type(error_type), allocatable, intent(out) :: error
+      real(wp) :: sampled
+
+      sampled = sum(history%floor_force)/history%sample_rate
+      if (holds_impulse(sampled, history%impulse)) return
+      error = input_error('&sampling: sample_rate = '//to_text(history%sample_rate)//' Hz misses the force: its samples ' &
+         //'hold an impulse of '//to_text(sampled)//' N s of '//to_text(history%impulse)//' N s; allowed: a higher one')
+   end subroutine check_samples
 
    !> Finds the contact time between samples: the force is continued to zero in a straight line from the last two
    !> samples of the first contact.

@@ -5,7 +5,7 @@ module thud_lumped
    use thud_coupled_impact, only: solve_coupled
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
-   use thud_force_history, only: force_history_type, max_residual, new_force_history
+   use thud_force_history, only: check_samples, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_receiver, only: is_rigid, receiver_type
@@ -78,6 +78,7 @@ contains
       ! The contact time of a motion whose balances do not close would give a wrong advice.
       call finish(source%mass, state, history, error)
       if (.not. allocated(error)) call check_contact_samples(sampling, history%contact_time, error)
+      if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve_lumped
 
    !> Marches from first touch to release on a rigid floor.

@@ -7,7 +7,7 @@ module thud_measured_modes
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type, list_type
-   use thud_force_history, only: force_history_type, max_residual, new_force_history
+   use thud_force_history, only: check_samples, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_new_field, only: list_field, logical_field
@@ -147,6 +147,7 @@ contains
       history%floor_force = history%part(:, 1)
       call finish(modes, release_time(modes, v0, time - step/substeps, time), history, error)
       if (.not. allocated(error)) call check_history(history, sampling, error)
+      if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve
 
    !> Refuses a history whose ball does not turn, whose balances do not close, or of too few samples.
@@ -256,6 +257,8 @@ contains
       real(wp) :: deflection, velocity, force, impulse, loss, energy, power, stored, weight
       integer :: i, n_interval
 
+      history%peak_force = maxval(history%floor_force)
+      history%max_deflection = maxval(history%deflection)
       ! Simpson's rule with 64 intervals in the shortest period.
       n_interval = max(4096, 2*ceiling(32*contact_time*maxval(modes%omega)/(2*pi)))
       impulse = 0.0_wp

@@ -5,11 +5,12 @@ module thud_sampling
    use thud_kinds, only: wp
    use thud_new_field, only: integer_field, real_field
    use thud_text, only: to_text
+   use thud_theory_limit, only: theory_limit_type
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_sample_count, get_sampling_fields, min_contact_samples
-   public :: sampling_type
+   public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields
+   public :: min_contact_samples, sampling_type
 
    !> Samples of one record; more would fill the memory and no drop needs them.
    real(wp), parameter :: max_samples = 5.0e6_wp
@@ -78,6 +79,16 @@ contains
       error = input_error('&sampling: sample_rate = '//to_text(sampling%sample_rate)//' Hz gives the contact of ' &
          //to_text(contact_time)//' s too few samples; allowed: from '//to_text(min_contact_samples/contact_time)//' Hz')
    end subroutine check_contact_samples
+
+   !> Limit of levels by the sampling rate: what the samples of a force that sets in with a jump or a corner fold into the
+   !> octave of 500 Hz changes its level by up to 0.2 dB at the limit, 2 dB at 2000 Hz.
+   pure function get_rate_limit(sampling) result(limit)
+      type(sampling_type), intent(in) :: sampling
+      type(theory_limit_type) :: limit
+
+      limit = theory_limit_type('sampling', 'sample_rate in Hz', sampling%sample_rate, lowest=8000.0_wp, &
+         reason='below, samples falsify the level at 500 Hz, by up to 2 dB at 2000 Hz')
+   end function get_rate_limit
 
    !> Number of samples of the record.
    pure function get_sample_count(sampling) result(n_sample)

@@ -11,6 +11,7 @@ module thud_source_model
    use thud_kinds, only: wp
    use thud_receiver, only: receiver_type
    use thud_sampling, only: sampling_type
+   use thud_theory_limit, only: get_gravity_limit, theory_limit_type
    implicit none (type, external)
    private
 
@@ -25,6 +26,7 @@ module thud_source_model
       procedure, pass(options) :: get_snapshot_shape
       procedure, pass(options) :: get_cost
       procedure, pass(options) :: get_paper_modulus
+      procedure, pass(options) :: get_theory_limits
       procedure, pass(options) :: get_loss_factors
       procedure, pass(options) :: compress
       procedure, pass(options) :: couples
@@ -99,6 +101,19 @@ contains
 
       modulus = 0.0_wp
    end function get_paper_modulus
+
+   !> Limits of the theory of the model in an answer; by default gravity, which models leave out.
+   function get_theory_limits(ball, drop, options, history) result(limits)
+      type(ball_type), intent(in) :: ball
+      type(drop_type), intent(in) :: drop
+      class(source_model_type), intent(in) :: options
+      !> The answer.
+      type(force_history_type), intent(in) :: history
+      !> The limits: [n_limit].
+      type(theory_limit_type), allocatable :: limits(:)
+
+      limits = [get_gravity_limit(drop, history)]
+   end function get_theory_limits
 
    !> Loss factor of the material against frequency, of models that have a material; others refuse.
    subroutine get_loss_factors(ball, options, frequency, loss_factor, error)

@@ -9,7 +9,7 @@ module thud_two_mass
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error
    use thud_field, only: field_type
-   use thud_force_history, only: force_history_type, max_residual, new_force_history
+   use thud_force_history, only: check_samples, force_history_type, max_residual, new_force_history
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_new_field, only: real_field
@@ -163,6 +163,7 @@ contains
       if (allocated(error)) return
       call check_contact_samples(sampling, history%contact_time, error)
       if (.not. allocated(error)) call finish(tyre, state, history, error)
+      if (.not. allocated(error)) call check_samples(history, error)
    end subroutine solve
 
    !> Marches from first touch until the source has left a rigid floor for good.

@@ -57,7 +57,7 @@ def test_doubtful_input_is_remarked_by_every_command(
     "text",
     [
         "&ball /",
-        "&ball youngs_modulus = 2.1e6 / &model name = 'finite_element' / &mesh polar_elements=9 /",
+        "&ball youngs_modulus = 2.1e6 / &model name = 'finite_element' / &mesh polar_elements=32 /",
         "&ball youngs_modulus = 1.75e6 / &model name = 'modal_ball' /",
         # The wall of a lumped source counts for nothing.
         "&ball mass = 7.3 / &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
@@ -67,6 +67,48 @@ def test_plausible_input_earns_no_remark(text: str, case_file: Callable[..., Pat
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert thud.solve_case(thud.read_case(case_file(text))).remarks == ()
+
+
+OUTSIDE = {
+    "&ball: wall_thickness over outer_radius is 0.5, the theory holds up to 0.4": "&ball"
+    " wall_thickness = 0.0445 /",
+    "&ball: poisson_ratio = 0.3, rubbers have 0.45 to 0.50": "&ball poisson_ratio = 0.3 /",
+    "&drop: deflection over outer_radius is 0.": "&drop height = 3 /",
+    "&drop: deflection over wall_thickness is 4.0": "&ball wall_thickness = 0.01, mass = 1 /",
+    "&drop: velocity at first touch over sqrt(youngs_modulus/density) is 0.3": "&drop height = 7 /",
+    "&ball: strain of the wall by gauge_pressure is 0.1": "&ball gauge_pressure = 3e5 /",
+    "&drop: gravity times contact time over velocity at first touch is 0.4": "&drop"
+    " height = 0.01 /",
+    "&sampling: sample_rate in Hz is 4000.0, the theory holds from 8000.0": "&sampling"
+    " sample_rate = 4000 /",
+    "octaves from 63 Hz on hold less than 1e-12 of the energy": "&drop height = 10 / &sampling"
+    " duration = 2 / &model name = 'hunt_crossley' /"
+    " &hunt_crossley contact_time = 1, exponent = 3 /",
+    "&mesh: sqrt(outer_radius wall_thickness) over the length of an element is 3.05": "&ball"
+    " youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 16 /",
+    "&mesh: radius of the contact over the length of an element is 2.2": "&drop height = 0.01 /"
+    " &ball youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 32 /",
+    "&modal_ball: rings in contact is 1": "&drop height = 0.03 / &model name = 'modal_ball' /",
+    "&modal_ball: harmonics times the angle of the contact is 6": "&model name = 'modal_ball' /"
+    " &modal_ball harmonics = 12 /",
+    "&modal_ball: harmonics times wall_thickness over outer_radius is 1": "&ball mass = 0.2,"
+    " wall_thickness = 0.002 / &drop height = 0.1 / &sampling duration = 0.3 /"
+    " &model name = 'modal_ball' /",
+    "&floor: restitution is -": "&model name = 'hunt_crossley' /"
+    " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"
+    " &oscillator mass = 0.5, stiffness = 0, damping = 0 / &sampling duration = 0.2 /",
+    "&model: restitution less 1 is 4.4e-5": "&hollow_sphere momentum_flux = 'none' / &floor"
+    " name = 'oscillator' / &oscillator mass = 30, stiffness = 1.70549e7,"
+    " damping = 0 / &sampling duration = 0.2 /",
+}
+
+
+@pytest.mark.parametrize("words", OUTSIDE)
+def test_answer_outside_the_theory_is_remarked(words: str, case_file: Callable[..., Path]) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        remarks = thud.solve_case(thud.read_case(case_file(OUTSIDE[words]))).remarks
+    assert [remark.startswith(words) for remark in remarks].count(True) == 1, remarks
 
 
 def test_free_modes_with_the_modulus_of_the_shell_are_remarked() -> None:

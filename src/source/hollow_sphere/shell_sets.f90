@@ -10,7 +10,7 @@ module thud_shell_sets
    use thud_drop, only: drop_type, get_drop_fields, get_impact_velocity
    use thud_error, only: error_type
    use thud_field, only: field_type
-   use thud_force_history, only: force_history_type, max_residual
+   use thud_force_history, only: force_history_type, holds_impulse, max_residual
    use thud_hollow_sphere, only: compression_weights, flux_choices, get_shell_stiffness, hollow_sphere_type, &
       restitution_weights, solve_hollow_sphere
    use thud_impact_batch, only: impact_batch_type
@@ -174,6 +174,7 @@ contains
       type(set_outcome_type), intent(out) :: outcomes(:)
       type(impact_batch_type), pointer :: impacts
       real(wp), target :: buffer(storage_size(impacts)/storage_size(1.0_wp) + line_length)
+      real(wp) :: sampled(block_size)
       real(wp) :: step
       integer :: i
 
@@ -187,6 +188,7 @@ contains
          call set_lane(impacts, i, sets(min(i, size(sets))), step)
       end do
       call solve_impacts(impacts, get_sample_count(sampling), sampling%substeps, force, last_sample)
+      sampled = sum(force(block_size + 1:, :last_sample), dim=2)/sampling%sample_rate
       do i = 1, size(sets)
          outcomes(i)%computed = is_computed(impacts, i, sets(i), sampling)
          if (.not. outcomes(i)%computed) cycle
@@ -198,6 +200,7 @@ contains
             outcomes(i)%restitution = -impacts%states(impacts%now)%velocity(i)/impacts%impact_velocity(i)
             outcomes(i)%impulse = sets(i)%ball%mass*(1 + outcomes(i)%restitution)*get_impact_velocity(sets(i)%drop)
          end associate
+         outcomes(i)%computed = holds_impulse(sampled(i), outcomes(i)%impulse)
       end do
    end subroutine solve_block
 

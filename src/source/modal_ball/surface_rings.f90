@@ -12,10 +12,10 @@ module thud_surface_rings
    implicit none (type, external)
    private
 
-   public :: new_surface_rings, surface_rings_type
+   public :: new_surface_rings, outermost_angle, surface_rings_type
 
    !> Angle of the outermost ring from the lowest point, rad.
-   real(wp), parameter :: outermost = pi/3
+   real(wp), parameter :: outermost_angle = pi/3
 
    !> The rings of a sphere of radius 1.
    type :: surface_rings_type
@@ -46,7 +46,7 @@ contains
       real(wp) :: width, angle, share
       integer :: i, j, k, n_node, row
 
-      width = outermost/(n_ring - 1)
+      width = outermost_angle/(n_ring - 1)
       rings%radius = sin([((i - 1)*width, i=1, n_ring)])
       rings%n_way = merge(2, 1, sticks)
       allocate (rings%height(n_ring), rings%fall(rings%n_way*n_ring, 2, 0:highest), source=0.0_wp)

@@ -1,0 +1,106 @@
+!> Limits of a theory: a number of an answer, where the theory holds, and why. An answer outside is computed, and remarked.
+module thud_theory_limit
+   use thud_ball, only: ball_type, get_density
+   use thud_drop, only: drop_type
+   use thud_force_history, only: force_history_type
+   use thud_kinds, only: wp
+   use thud_text, only: to_text
+   implicit none (type, external)
+   private
+
+   public :: get_gravity_limit, get_limit_sentence, get_wall_limits, get_wave_limit, is_outside, theory_limit_type
+
+   !> Length of the sentence on a limit.
+   integer, parameter :: sentence_length = 240
+
+   !> A limit.
+   type :: theory_limit_type
+      !> Group of the keys that decide.
+      character(len=24) :: group = ''
+      !> What is limited, a pure number or with its unit.
+      character(len=72) :: quantity = ''
+      !> What it is, and the range in which the theory holds.
+      real(wp) :: value = 0.0_wp, lowest = -huge(1.0_wp), highest = huge(1.0_wp)
+      !> Why, as the end of a sentence.
+      character(len=96) :: reason = ''
+   end type theory_limit_type
+
+contains
+
+   !> Whether an answer lies outside.
+   pure function is_outside(limit) result(yes)
+      type(theory_limit_type), intent(in) :: limit
+      logical :: yes
+
+      ! Written so that NaN is outside too.
+      yes = .not. (limit%value >= limit%lowest .and. limit%value <= limit%highest)
+   end function is_outside
+
+   !> Sentence on an answer that lies outside.
+   pure function get_limit_sentence(limit) result(sentence)
+      type(theory_limit_type), intent(in) :: limit
+      character(len=sentence_length) :: sentence
+      logical :: below
+
+      below = limit%value < limit%lowest
+      sentence = '&'//trim(limit%group)//': '//trim(limit%quantity)//' is '//trim(rounded(limit%value)) &
+         //', the theory holds '//trim(merge('from ', 'up to', below))//' ' &
+         //trim(rounded(merge(limit%lowest, limit%highest, below)))//': '//limit%reason
+   end function get_limit_sentence
+
+   !> A number of three digits.
+   pure function rounded(value) result(text)
+      real(wp), intent(in) :: value
+      character(len=24) :: text
+      real(wp) :: near
+
+      write (text, '(es24.2e3)') value
+      read (text, *) near
+      text = to_text(near)
+   end function rounded
+
+   !> Limit of models that leave gravity out during the contact.
+   pure function get_gravity_limit(drop, history) result(limit)
+      type(drop_type), intent(in) :: drop
+      type(force_history_type), intent(in) :: history
+      type(theory_limit_type) :: limit
+
+      limit = theory_limit_type('drop', 'gravity times contact time over velocity at first touch', &
+         drop%gravity*history%contact_time/history%impact_velocity, highest=0.2_wp, &
+         reason='gravity acts before first touch only')
+   end function get_gravity_limit
+
+   !> Limit of the velocity at first touch by that of waves in the wall.
+   pure function get_wave_limit(ball, history, highest) result(limit)
+      type(ball_type), intent(in) :: ball
+      type(force_history_type), intent(in) :: history
+      !> Part of the velocity of waves up to which the theory holds.
+      real(wp), intent(in) :: highest
+      type(theory_limit_type) :: limit
+
+      limit = theory_limit_type('drop', 'velocity at first touch over sqrt(youngs_modulus/density)', &
+         history%impact_velocity/sqrt(ball%youngs_modulus/get_density(ball)), highest=highest, &
+         reason='it is the order of the strain of the wall')
+   end function get_wave_limit
+
+   !> Limits of models of an elastic wall that stays near the sphere.
+   pure function get_wall_limits(ball, history) result(limits)
+      type(ball_type), intent(in) :: ball
+      type(force_history_type), intent(in) :: history
+      !> The limits: [4].
+      type(theory_limit_type) :: limits(4)
+
+      associate (radius => ball%outer_radius, wall => ball%wall_thickness)
+         limits = [ &
+            theory_limit_type('drop', 'deflection over outer_radius', history%max_deflection/radius, highest=0.5_wp, &
+            reason='the wall outside the contact stays spherical'), &
+            theory_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, highest=2.0_wp, &
+            reason='a wall that is pressed further buckles inwards'), &
+            get_wave_limit(ball, history, 0.25_wp), &
+            theory_limit_type('ball', 'strain of the wall by gauge_pressure', &
+            ball%gauge_pressure*(radius - wall)/(2*wall*ball%youngs_modulus), highest=0.1_wp, &
+            reason='the wall is free of stress before first touch')]
+      end associate
+   end function get_wall_limits
+
+end module thud_theory_limit
