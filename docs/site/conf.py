@@ -58,7 +58,7 @@ html_title = f"thud {release}"
 html_static_path = ["docs/site/static"]
 html_css_files = ["tutorials.css"]
 html_extra_path = ["../ford"]  # made by FORD
-html_static_path = ["docs/site/site.css"]
+html_static_path = ["docs/site/static"]
 html_css_files = ["site.css"]
 html_theme_options = {
     f"{scheme}_css_variables": {"code-font-size": "76%"} for scheme in ("light", "dark")
