@@ -13,23 +13,25 @@ from sources import finite_elements, hollow_sphere, lumped_models, modal_ball
 from thud.plot import save
 
 FIGURES = Path(__file__).parents[1] / "figures"
-PICTURES = {
-    "flagship": flagship,
-    "sketch_finite_elements": finite_elements,
-    "sketch_floors": floors,
-    "sketch_flow": flow,
-    "sketch_hollow_sphere": hollow_sphere,
-    "sketch_lumped_models": lumped_models,
-    "sketch_modal_ball": modal_ball,
-    "sketch_room": room,
+SKETCHES = {
+    "finite_elements": finite_elements,
+    "floors": floors,
+    "flow": flow,
+    "hollow_sphere": hollow_sphere,
+    "lumped_models": lumped_models,
+    "modal_ball": modal_ball,
+    "room": room,
 }
+# Letters as outlines: the same with any fonts. The same sketch gives the same bytes.
+STYLE = {"hatch.linewidth": 0.5, "svg.fonttype": "path", "svg.hashsalt": "thud"}
 
 
 def draw(directory: Path) -> None:
     """Draw all pictures into a directory."""
-    with mpl.rc_context({"mathtext.fontset": "dejavusans", "hatch.linewidth": 0.5}):
-        for name, picture in PICTURES.items():
-            save(picture(), directory / f"{name}.png")
+    save(flagship(), directory / "flagship.png")
+    with mpl.rc_context(STYLE):
+        for name, sketch in SKETCHES.items():
+            sketch().savefig(directory / f"sketch_{name}.svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 INPUTS = Path(__file__).parents[2] / "inputs"
 CASES = {
     "shell of the paper": "rubber_ball_100cm",
-    "elements, law of order 0.3": "rubber_ball_fe",
+    "elements, order 0.3": "rubber_ball_fe",
     "elements, Kelvin–Voigt": "rubber_ball_fe_viscous",
 }
 

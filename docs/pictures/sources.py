@@ -147,8 +147,8 @@ def finite_elements() -> Figure:
     text(second, 0.1, 2.26, "largest deflection", ha="left")
     for x in (0.06, 0.2, 0.34, 0.48):
         arrow(second, (x, -0.02), (x, 0.24), RED, mutation_scale=7, zorder=6)
-    text(second, 1.1, 0.72, "contact at the nodes:\npressure, friction", color=RED, ha="left")
-    arrow(second, (1.2, 0.58), (0.56, 0.14), RED, linewidth=0.8, mutation_scale=6)
+    text(second, 1.22, 0.72, "contact at the nodes:\npressure, friction", color=RED, ha="left")
+    arrow(second, (1.26, 0.56), (0.56, 0.14), RED, linewidth=0.8, mutation_scale=6)
     arrow(second, (1.62, 1.75), (1.62, 1.35), GREEN)
     text(second, 1.62, 1.87, "$g$", color=GREEN)
     text(second, 0.3, 0.75, "$p(V)$")

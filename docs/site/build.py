@@ -67,11 +67,13 @@ def python_page() -> str:
 
 def fortran_page(reference: Path) -> str:
     """Return the page of all Fortran modules, made from FORD's list of them."""
-    modules = json.loads((reference / "modules.json").read_text(encoding="utf-8"))["modules"]
+    listed = json.loads((reference / "modules.json").read_text(encoding="utf-8"))["modules"]
+    # One of two files of a module is compiled.
+    modules = {module["name"]: module for module in listed}
     rows = [
         f"| <a href=\"fortran/{module['external_url'].removeprefix('./')}\">{module['name']}</a> "
         f"| {', '.join(f'`{name}`' for name in sorted([*module['pub_types'], *module['pub_procs']]))} |"
-        for module in sorted(modules, key=lambda module: module["name"])
+        for _, module in sorted(modules.items())
     ]
     return "\n".join(
         [

@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from docutils import nodes
+from matplotlib.image import imread
+
 import thud
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
 
 project = "thud"
 author = "The thud developers"
@@ -41,8 +51,38 @@ autosummary_generate = True
 numpydoc_show_class_members = False
 add_module_names = False
 
+highlight_language = "none"  # blocks without a language are what programs print
+
 html_theme = "furo"
 html_title = f"thud {release}"
 html_static_path = ["docs/site/static"]
 html_css_files = ["tutorials.css"]
 html_extra_path = ["../ford"]  # made by FORD
+html_static_path = ["docs/site/static"]
+html_css_files = ["site.css"]
+html_theme_options = {
+    f"{scheme}_css_variables": {"code-font-size": "76%"} for scheme in ("light", "dark")
+}
+# Width of a column of a journal, inch, and pixels of the screen for an inch of a figure.
+COLUMN, DENSITY = 3.5, 150
+
+
+def inches(path: Path) -> float:
+    """Return the width of a figure: of PNG by 300 dots an inch, of SVG as it says."""
+    if path.suffix == ".png":
+        return float(imread(path).shape[1] / 300)
+    width = re.search(r'<svg [^>]*?width="([\d.]+)pt"', path.read_text(encoding="utf-8"))
+    return float(width[1]) / 72 if width else COLUMN
+
+
+def scale_figures(app: Sphinx, document: nodes.document) -> None:
+    """Show all figures with text of one size, and mark those of more than a column."""
+    for image in document.findall(nodes.image):
+        width = inches(Path(app.srcdir) / image["uri"])
+        image["width"] = f"{width * DENSITY:.0f}px"
+        image["classes"] += ["wide"] * (width > 1.1 * COLUMN)
+
+
+def setup(app: Sphinx) -> None:
+    """Scale figures when a page was read."""
+    app.connect("doctree-read", scale_figures)

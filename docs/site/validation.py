@@ -42,8 +42,11 @@ def number(value: float, unit: str) -> str:
     """Return a number of two digits with its unit."""
     if value and not 1e-3 <= abs(value) < 1e4:  # noqa: PLR2004 - as people write them
         mantissa, exponent = f"{value:.1e}".split("e")
-        return f"{mantissa} · 10{str(int(exponent)).translate(RAISED)} {unit}".strip()
-    return f"{value:.2g} {unit}".strip()
+        shown = f"{mantissa} · 10{str(int(exponent)).translate(RAISED)}"
+    else:
+        shown = f"{value:.2g}"
+    # Blanks that do not break.
+    return f"{shown} {unit}".strip().replace(" ", "\u00a0")
 
 
 def table(oracles: list[dict[str, Any]]) -> str:
