@@ -1,6 +1,7 @@
 !> Errors as values: a routine that can fail has an allocatable `error` that stays
 !> unallocated when all went well.
 module thud_error
+   use thud_text, only: is_utf8
    implicit none (type, external)
    private
 
@@ -31,12 +32,14 @@ contains
       character(len=*), intent(in) :: message
       type(error_type) :: error
       character(len=len(message)) :: text
-      integer :: i
+      integer :: i, last
 
       text = message
-      ! Control characters do not print, and a zero byte would end the sentence; input may hold them.
+      ! Control characters do not print, a zero byte would end the sentence, and bytes that are no characters spoil the
+      ! screen; input may hold them, and a character may be cut in two where a value is shortened.
+      last = merge(255, 126, is_utf8(text))
       do i = 1, len(text)
-         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) text(i:i) = '?'
+         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127 .or. iachar(text(i:i)) > last) text(i:i) = '?'
       end do
       error = error_type(code=bad_input, message=text)
    end function input_error

@@ -5,7 +5,7 @@ module thud_field
    use thud_interval, only: get_range_text, interval_type, new_interval
    use thud_kinds, only: wp
    use thud_suggestion, only: get_suggestion
-   use thud_text, only: join_quoted, lower_case, quoted, shortened, to_text
+   use thud_text, only: is_number, join_quoted, lower_case, quoted, replaced, shortened, to_text
    implicit none (type, external)
    private
 
@@ -30,6 +30,10 @@ module thud_field
 
    !> Maximum number of allowed texts of one key.
    integer, parameter :: max_choices = 12
+
+   !> What a flag may be.
+   character(len=*), parameter :: flags(*) = [character(len=7) :: '.true.', '.false.', 'true', 'false', '.t.', '.f.', &
+      't', 'f']
 
    !> Value that no entry of a list can have.
    real(wp), parameter :: unset = -huge(1.0_wp)
@@ -140,43 +144,37 @@ contains
       character(len=128) :: message
       character(len=:), allocatable :: line, wanted
       integer :: status, whole
-      logical :: flag
       real(wp) :: list(list_length + 1)
       real(wp) :: number
-      namelist /real_group/ number
       namelist /list_group/ list
-      namelist /integer_group/ whole
-      namelist /logical_group/ flag
       namelist /text_group/ word
 
-      ! The run-time library's own namelist reader decides what a value is.
       status = 1
       if (associated(self%real_value)) then
          wanted = 'a number'
-         line = '&real_group number = '//text//' /'
-         if (is_plain(text, repeats=.false.)) read (line, nml=real_group, iostat=status, iomsg=message)
+         if (is_number(text)) read (text, *, iostat=status, iomsg=message) number
          if (status == 0) self%real_value = number
       else if (associated(self%list_value)) then
          wanted = 'a list of up to '//to_text(list_length)//' numbers'
          line = '&list_group list = '//text//' /'
          list = unset
-         if (is_plain(text, repeats=.true.)) read (line, nml=list_group, iostat=status, iomsg=message)
+         if (are_numbers(text)) read (line, nml=list_group, iostat=status, iomsg=message)
          if (status == 0) call set_list(list, self%list_value, status)
       else if (associated(self%integer_value)) then
          wanted = 'a whole number'
-         line = '&integer_group whole = '//text//' /'
-         if (index(text, '*') == 0) read (line, nml=integer_group, iostat=status, iomsg=message)
+         if (is_number(text)) read (text, *, iostat=status, iomsg=message) whole
          if (status == 0) self%integer_value = whole
       else if (associated(self%logical_value)) then
          wanted = '.true. or .false.'
-         line = '&logical_group flag = '//text//' /'
-         if (index(text, '*') == 0) read (line, nml=logical_group, iostat=status, iomsg=message)
-         if (status == 0) self%logical_value = flag
+         if (any(lower_case(text) == flags)) status = 0
+         if (status == 0) self%logical_value = scan(text, 'tT') > 0
       else
          wanted = 'short text in quotes'
          line = '&text_group word = '//text//' /'
          word = ''
-         if (scan(text(1:1), '''"') == 1) read (line, nml=text_group, iostat=status, iomsg=message)
+         if (scan(text(1:1), '''"') == 1 .and. text(len(text):) == text(1:1)) then
+            read (line, nml=text_group, iostat=status, iomsg=message)
+         end if
          ! A longer constant would be cut.
          if (status == 0) status = merge(0, 1, len_trim(text) <= len(word) + 2 .and. len_trim(word) <= name_length)
          if (status == 0) self%text_value = word(:name_length)
@@ -185,21 +183,23 @@ contains
       if (status /= 0) error = self%get_error(text, 'is not '//wanted, new_interval(self%range))
    end subroutine set_from_text
 
-   !> Whether numbers are written in the usual way. A namelist may also hold null values (`1*`) and
-   !> exponents without a letter (`1+3` for 1000): those are mistakes.
-   pure function is_plain(text, repeats) result(plain)
+   !> Whether a list holds numbers, some with repeats such as `3*0.1`; others are mistakes, which the reader of namelists
+   !> skips without an error (`-`), or takes for null values (`1*`).
+   pure function are_numbers(text) result(yes)
       !> Text after the equals sign.
       character(len=*), intent(in) :: text
-      !> `3*0.1` is allowed.
-      logical, intent(in) :: repeats
-      logical :: plain
-      integer :: i
+      logical :: yes
+      character(len=len(text) + 1) :: rest
+      integer :: last
 
-      plain = scan(text, 'qQ') == 0 .and. (repeats .or. index(text, '*') == 0)
-      do i = 2, len(text)
-         if (scan(text(i:i), '+-') > 0) plain = plain .and. scan(text(i - 1:i - 1), ' ,*eEdD') > 0
+      yes = .true.
+      rest = adjustl(replaced(text, ',', ' '))
+      do while (yes .and. rest /= '')
+         last = index(rest, ' ') - 1
+         yes = is_number(rest(index(rest(:last), '*') + 1:last))
+         rest = adjustl(rest(last + 1:))
       end do
-   end function is_plain
+   end function are_numbers
 
    !> Takes over the entries that were read.
    subroutine set_list(entries, list, status)

@@ -8,7 +8,7 @@ module thud_text
    implicit none (type, external)
    private
 
-   public :: fixed, is_utf8, join_quoted, lower_case, newline, quoted, replaced, shortened, split, to_text
+   public :: fixed, is_number, is_utf8, join_quoted, lower_case, newline, quoted, replaced, shortened, split, to_text
 
    !> Maximum length of a value in a message.
    integer, parameter :: longest_shown = 80
@@ -178,6 +178,24 @@ contains
       end do
       valid = valid .and. more == 0
    end function is_utf8
+
+   !> Whether a text holds nothing but a number; to the reader other characters mean repeats and names, signs exponents
+   !> without a letter, and a sign or a point alone is nothing that is read, without an error.
+   pure function is_number(text) result(yes)
+      !> The text, without blanks around it.
+      character(len=*), intent(in) :: text
+      !> It is a number, or one of the names of what is none.
+      logical :: yes
+      character(len=len(text)) :: word
+      integer :: sign
+
+      word = lower_case(text)
+      if (scan(word, '+-') == 1) word = word(2:)
+      sign = scan(word, '+-', back=.true.)
+      yes = verify(word, '0123456789+-.ed ') == 0 .and. scan(word, '0123456789') > 0 .and. index(trim(word), ' ') == 0
+      if (sign > 0) yes = yes .and. scan(word(max(sign - 1, 1):sign - 1), 'ed') == 1
+      yes = yes .or. any(word == [character(len=8) :: 'nan', 'inf', 'infinity'])
+   end function is_number
 
    !> A text with all characters of a set replaced by another one.
    pure function replaced(text, set, new) result(changed)

@@ -102,8 +102,10 @@ contains
          else if (text(i:i) == "'" .or. text(i:i) == '"') then
             quote = text(i:i)
             structure(i:i) = 'x'
-         else if (iachar(text(i:i)) < 32 .and. scan(text(i:i), blanks) == 0) then
-            error = input_error('line '//to_text(line_of(text, i))//' holds a control character; allowed: plain text')
+         else if (iachar(text(i:i)) < 32 .and. scan(text(i:i), blanks) == 0 .or. iachar(text(i:i)) > 126) then
+            ! Among them blanks and quotes of word processors.
+            error = input_error('line '//to_text(line_of(text, i))//' holds a character that is not plain text outside' &
+               //' quotes and comments; allowed: letters, digits and signs of ASCII')
             return
          end if
       end do

@@ -10,7 +10,7 @@ module thud_set_table
    use thud_line_reader, only: close_lines, line_length, line_reader_type, open_lines, read_line
    use thud_suggestion, only: get_suggestion
    use thud_system, only: directory_exists, path_length
-   use thud_text, only: join_quoted, lower_case, newline, quoted, replaced, to_text
+   use thud_text, only: is_number, join_quoted, lower_case, newline, quoted, replaced, to_text
    implicit none (type, external)
    private
 
@@ -278,20 +278,6 @@ contains
       end associate
       if (status /= 0) error = line_error(table, trim(table%names(column))//' = '//quoted(word)//' is not '//wanted)
    end subroutine read_value
-
-   !> Whether a text holds nothing but a number; to the reader other characters mean repeats and names, and signs
-   !> exponents without a letter.
-   pure function is_number(text) result(yes)
-      !> The text, without blanks around it.
-      character(len=*), intent(in) :: text
-      !> It may be a number.
-      logical :: yes
-      integer :: sign
-
-      yes = text /= '' .and. verify(text, '0123456789+-.eEdD') == 0
-      sign = scan(text, '+-', back=.true.)
-      if (sign > 1) yes = yes .and. scan(text(sign - 1:sign - 1), 'eEdD') == 1
-   end function is_number
 
    !> Error of a line.
    function line_error(table, message) result(error)
