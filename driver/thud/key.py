@@ -72,9 +72,11 @@ def _names(group: type[Group]) -> list[str]:
 
 def require_keywords(place: str, given: Collection[str], known: Collection[str]) -> None:
     """Raise InputError where a word is not known; name the classes of which it is a key."""
-    for word in given:
-        owners = [one.__name__ for one in Group.__subclasses__() if word in _names(one)]
-        if word not in known and owners:
+    unknown = [word for word in given if word not in known]
+    if not unknown:
+        return
+    for word in unknown:
+        if owners := [one.__name__ for one in Group.__subclasses__() if word in _names(one)]:
             refuse(
                 f"{place}: {word!r} is a key of {' and '.join(owners)}",
                 " or ".join(f"{one}({word}=...)" for one in owners),
