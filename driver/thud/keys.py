@@ -75,14 +75,18 @@ def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
     Raises
     ------
     InputError
-        Where there is no such key; lists the keys.
+        Where there is no such key; names the groups that have keys.
     """
     known = known_keys(owners)
     match = re.fullmatch(r"(\w+(?:\.\w+)?)(?:\(([1-9]\d{0,3})\))?", str(name))
     key = known.get(match[1]) if match else None
     if match is None or key is None or (match[2] and key.kind != "list"):
         hint = suggestion(str(name).partition("(")[0], known)
-        refuse(f"{name!r} is not a key of {' and '.join(owners)}{hint}", ", ".join(known))
+        groups = ", ".join(dict.fromkeys(f"&{one.group}" for one in known.values()))
+        refuse(
+            f"{name!r} is not a key of {' and '.join(owners)}{hint}",
+            f"keys of {groups}, density and temperature (`thud --keys` lists them)",
+        )
     return key, int(match[2]) if match[2] else None
 
 

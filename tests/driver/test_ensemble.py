@@ -231,7 +231,7 @@ def test_scalars_and_defaults() -> None:
         (
             {"radius": 1},
             {},
-            "'radius' is not a key of hollow_sphere; allowed: outer_radius, wall_th",
+            "'radius' is not a key of hollow_sphere; allowed: keys of &ball, &drop, ",
         ),
         ({"height": [1, 2], "mass": [1, 2, 3]}, {}, "differ in length: height (2,), mass"),
         ({"height": [[1]]}, {}, "height has 2 dimensions"),

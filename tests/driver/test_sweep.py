@@ -390,7 +390,9 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("format = 'csv'\nparameters.height.values = [1]", "allowed: 'auto', 'netcdf', 'zarr'"),
         ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere .did you mean"),
-        ("parameters.loss_factor.values = [1]", "allowed: outer_radius, wall_thickness, mass"),
+        ("parameters.loss_factor.values = [1]", "allowed: keys of &ball, &drop, &hollow_sphere"),
+        ("fixed.mass = {}\nparameters.height.values = [1]", "mass has no value; allowed: value"),
+        ("name = '\udcff'", "byte 9 is not of UTF-8; allowed: TOML"),
         ("parameters.height = 1", r"height = 1 is not a table; allowed: values, low"),
         ("parameters.height.values = []", r"values = \[\] is empty"),
         ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
@@ -498,7 +500,7 @@ def test_bad_studies_are_reported(
     text: str, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "study.toml"
-    path.write_text(text)
+    path.write_bytes(text.encode(errors="surrogateescape"))
     assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 1
     errors = capsys.readouterr().err
     assert errors.startswith(f"thud-driver: {path}: ")

@@ -288,7 +288,9 @@ def quantity(place: str, given: object, unit: str) -> Any:  # noqa: ANN401 - a v
         return given
     require_words(place, given, ("value", "unit"))
     power = power_of(given.get("unit", unit or "1"), unit, place)
-    value: Any = given.get("value")
+    if "value" not in given:
+        refuse(f"{place} has no value", "value, and its unit")
+    value: Any = given["value"]
     entries = value if isinstance(value, list) else [value]
     if "unit" in given:
         for entry in entries:

@@ -117,7 +117,7 @@ def read_tables(
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
-    except ValueError as error:  # no TOML, no UTF-8, or a number of thousands of digits
+    except ValueError as error:  # no TOML, or a number of thousands of digits
         refuse(f"{path}: {error}", "TOML", error)
 
 
@@ -126,6 +126,8 @@ def _content(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except OSError as error:
         refuse(f"{error.strerror}", "a file that exists and can be read", error)
+    except UnicodeDecodeError as error:
+        refuse(f"byte {error.start + 1} is not of UTF-8", "TOML, which is UTF-8", error)
 
 
 def _text(source: Mapping[str, object]) -> str:
