@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import resource
 import shutil
 import signal
@@ -28,6 +29,8 @@ from thud.errors import InputError
 from thud.recordings.reading import open_signals
 
 if TYPE_CHECKING:
+    import random
+
     from numpy.typing import NDArray
 
 # Seconds that a file may take, and bytes by which memory may grow.
@@ -86,6 +89,19 @@ def mutate(data: bytes, rng: np.random.Generator) -> bytes:
         ][int(rng.integers(10))]
         data = data[:at] + by + data[at + len(replaced) :]
     return data
+
+
+def mutated_text(text: str, chance: random.Random) -> str:
+    """Return a text of which some words or lines are replaced, removed, doubled or exchanged."""
+    for _ in range(chance.choice([1, 1, 2, 4])):
+        parts = re.split(r"(\n)" if chance.random() < 0.4 else r"([\s,;=\[\]{}]+)", text)
+        at, other = chance.randrange(len(parts)), chance.randrange(len(parts))
+        word = chance.choice(
+            [*WORDS, "-1", "0", "1e-300", "1e300", "\udcff", "x", "1,5", "2.5 3.5"]
+        )
+        parts[at] = chance.choice([word, word, "", parts[at] * 2, parts[other]])
+        text = "".join(parts)
+    return text
 
 
 def count_handles() -> int:

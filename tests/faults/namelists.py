@@ -1,67 +1,169 @@
-"""Namelists by grammar and mutation: refused in a sentence, or computed in another process."""
+"""Namelists by grammar and mutation: refused in a sentence, or computed, written and read back."""
 
 from __future__ import annotations
 
-import json
+import itertools
 import math
 import re
-import signal
-import subprocess
-import sys
-import warnings
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from campaign import Finding
+from attempts import SANITIZED
+from sentences import fault_of
 
 import thud
-from thud._schema import GROUPS, KEYS, MODELS
+from thud._api import api, call
+from thud._schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
+from thud.case import case_text
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterable
 
     from thud.key import Key
 
-# Seconds that a case may take, and a share of them before it counts as hung.
-CASE_TIME, SHARE_TIME = 20, 900
-# Models that take too long to be computed often, and the part of their cases that is.
-SLOW = {"modal_ball": 0.05, "finite_element": 0.01}
-NUMBERS = ["0", "-1", "1e-300", "1e300", "nan", "inf", "-0.0", "1d0", "1e", "2*1.0", "9" * 400,
-           "''", ".true.", "1,2", "", "(1,2)", "0x1p3", "é", "1e-9", "0.5", "100", "3"]  # fmt: skip
-INSERTIONS = ["&", "/", "'", '"', "!", "\0", "\t", "\n", "\r", "=", ",", "*", "é", "&ball", "&end",
-              "x" * 300, "'" * 99, "(1)", "%", "$"]  # fmt: skip
+NUMBERS = [
+    "0", "-1", "1e-300", "1e300", "1e-160", "1e160", "nan", "inf", "-0.0", "1d0", "1e", "2*1.0",
+    "3*", "9" * 400, "''", ".true.", "1,2", "", "(1,2)", "0x1p3", "é", "1e-9", "0.5", "100", "3",
+    "1e5", "-1e-9", "2147483648", "'a' 'b'", "1 2", "5,,7", "1.0.0", "1e999", "tru", "'it''s'",
+    '"x"', "+1", "1_8", "-", "+", ".", ".x", "number", "whole", "flag", "word", "list",
+    "1 number", "1, list", "'a' word", "1, -", "-inf", "1e-310", "1+3", ".5", "5.", "t", ".f.",
+]  # fmt: skip
+INSERTIONS = [
+    "&", "/", "'", '"', "!", "\0", "\t", "\n", "\r", "\r\n", "=", ",", "*", "é", "&ball", "&end",
+    "&ball /", "x" * 300, "'" * 99, "(1)", "%", "$", "\udcff", "\ufeff",
+    "&model name = 'two_mass' /", "mass = 2", "&" * 50, "&x" * 40, "&ball mass = 2 /", ";", "\\",
+    "\x1b", "\x7f", "\u2028", "\u00a0",
+]  # fmt: skip
+# Parts of the accepted cases that are computed.
+COMPUTED = {"modal_ball": 0.1, "finite_element": 0.1, "": 0.1}
+USUALLY_COMPUTED = 0.25
+# Floors over which a room may be.
+RADIATORS = ("plate", "floating_floor", "joist_floor")
+# Samples, and elements of a mesh, up to which a case is computed.
+MANY_SAMPLES, MANY_ELEMENTS = 20_000, 64
+NO_NUMBER = re.compile(rb"(?i)(?<![a-z_])(nan|inf|infinity)(?![a-z_])|\*\*\*")
 
 
-def check_namelists(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Read, check and compute namelists in another process, which names each before it begins."""
-    texts = {number: _text(chance) for number, chance in tries}
-    numbers = list(texts)
-    while numbers:
-        given = json.dumps([(number, texts[number]) for number in numbers])
-        command = [sys.executable, __file__]
-        try:
-            done = subprocess.run(
-                command,
-                input=given,
-                capture_output=True,
-                text=True,
-                timeout=SHARE_TIME,
-                check=False,
-            )
-            said, word = done.stdout, "crashed"
-        except subprocess.TimeoutExpired as error:
-            said = error.stdout.decode() if isinstance(error.stdout, bytes) else error.stdout or ""
-            word = "hung"
-        found = [line.split("\t", 2) for line in said.splitlines()]
-        for number, verdict, detail in (line for line in found if len(line) == 3):
-            text = texts[int(number)] if verdict in ("crashed", "hung", "NaN", "mixed") else ""
-            yield Finding(verdict, f"{detail}: {text!r}" if text else "")
-        numbers = numbers[sum(len(line) == 3 for line in found) :]
-        if numbers:
-            # The process has ended with the first of those that are left.
-            yield Finding(word, repr(texts[numbers.pop(0)]))
+def attempt(chance: random.Random) -> tuple[str, str]:
+    """Return what becomes of a namelist, and how to see it."""
+    text = _text(chance)
+    path = Path("case.nml")
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    try:
+        word, detail = _tried(path, chance)
+    except thud.ThudError as error:
+        detail = fault_of(error, "case.nml", text)
+        word = "raw" if detail else "refused"
+    finally:
+        path.unlink()
+        shutil.rmtree("o", ignore_errors=True)
+    return word, f"{detail}: {text!r}" if detail else ""
+
+
+def _tried(path: Path, chance: random.Random) -> tuple[str, str]:
+    effective = call(api.effective_case, str(path).encode())["case"]
+    if NO_NUMBER.search(re.sub(rb"'.*?'", b"", effective)):
+        return "NaN", "in the effective input"
+    if _effective(effective) != effective:
+        return "mixed", "the effective input is not that of itself"
+    model = re.search(rb"&model\s+name = '(\w+)'", effective)
+    name = model[1].decode() if model else ""
+    dice = chance.random()
+    if dice > 0.95 or dice < 0.01:
+        case = thud.read_case(path)
+        if _effective(case_text(case)) != effective:
+            return "mixed", "the case of Python is another one"
+    if dice > COMPUTED.get(name, USUALLY_COMPUTED) or not _is_small(effective):
+        return "accepted", ""
+    # With sanitizers all takes ten times as long.
+    if SANITIZED and chance.random() < 0.8:
+        return "accepted", ""
+    return _computed(path, effective, has_model=bool(name), again=chance.random() < 0.2)
+
+
+def _effective(text: bytes) -> bytes:
+    """Return the effective input of a text."""
+    path = Path("again.nml")
+    path.write_bytes(text)
+    try:
+        found: bytes = call(api.effective_case, b"again.nml")["case"]
+    except thud.InputError as error:
+        return str(error).encode()
+    finally:
+        path.unlink()
+    return found
+
+
+def _is_small(effective: bytes) -> bool:
+    """Return whether a case is quickly computed."""
+    given = {
+        key.decode(): float(value) for key, value in re.findall(rb"(\w+) = ([-+.\deE]+)", effective)
+    }
+    samples = given.get("sample_rate", 0) * given.get("duration", 0)
+    elements = given.get("radial_elements", 0) * given.get("polar_elements", 0)
+    return samples * given.get("substeps", 0) <= MANY_SAMPLES and elements <= MANY_ELEMENTS
+
+
+def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> tuple[str, str]:
+    """Run a case as the executable does, and look at all that it leaves."""
+    out = Path("o")
+    found = call(api.run, str(path), str(out), 0)
+    if wrong := _no_numbers("", found):
+        return "NaN", wrong
+    files = {one.name: one.read_bytes() for one in out.iterdir() if one.is_file()}
+    for name, content in files.items():
+        if not name.endswith(".vtu") and (bad := NO_NUMBER.search(content)):
+            return "NaN", f"{name}: {content[max(0, bad.start() - 80) : bad.end() + 20]!r}"
+    if files["effective.nml"] != effective:
+        return "mixed", "effective.nml is not the effective input"
+    wrong = ""
+    if again and has_model:
+        impact = thud.read_results(out)
+        if not np.array_equal(impact.floor_force, found["samples"]["floor_force"]):
+            return "mixed", "results are not read as they were computed"
+        wrong = _levels(impact)
+    if wrong:
+        return "NaN", wrong
+    differing = _differing(files) if again else []
+    return ("mixed", f"not reproduced: {differing}") if differing else ("computed", "")
+
+
+def _differing(files: dict[str, bytes]) -> list[str]:
+    """Return the files that a run of the effective input makes otherwise."""
+    Path("o/effective.nml").rename("effective.nml")
+    shutil.rmtree("o")
+    try:
+        call(api.run, "effective.nml", "o", 0)
+    finally:
+        Path("effective.nml").unlink()
+    again = {one.name: one.read_bytes() for one in Path("o").iterdir() if one.is_file()}
+    return [name for name in files.keys() | again if files.get(name) != again.get(name)]
+
+
+def _no_numbers(name: str, found: object) -> str:
+    """Return the name of the first entry that is not finite."""
+    if isinstance(found, dict):
+        return next(
+            (bad for key, one in found.items() if (bad := _no_numbers(f"{name}.{key}", one))), ""
+        )
+    if isinstance(found, bytes):
+        return f"{name}: {found!r}" if NO_NUMBER.search(found) else ""
+    return "" if np.isfinite(found).all() else name  # type: ignore[call-overload]
+
+
+def _levels(impact: thud.Impact) -> str:
+    """Return what is not finite of the levels of an impact and what follows from them."""
+    kinds = itertools.product(("octave", "third"), ("exact", "fft"), ("elastic", "floor"))
+    for bands, method, force in kinds:
+        if not np.isfinite(impact.levels(bands, method, force)).all():  # type: ignore[arg-type]
+            return f"levels: {bands} {method} {force}"
+    texts = [*impact.rows(), *(impact.on_floor.rows() if impact.on_floor else ())]
+    if impact.case.room:
+        texts += thud.predict_level(impact).rows()
+    wrong = [row for row in texts if NO_NUMBER.search(" ".join(map(str, row)).encode())]
+    return f"rows: {wrong}" if wrong else ""
 
 
 def _text(chance: random.Random) -> str:
@@ -70,22 +172,42 @@ def _text(chance: random.Random) -> str:
     groups = [
         "ball",
         "drop",
-        "sampling",
-        "levels",
-        "limits",
-        "case",
-        "modes",
-        "compression",
-        "floor",
+        *chance.sample(["sampling", "levels", "limits", "case"], chance.randrange(3)),
     ]
-    text = f"&model name = '{model}' /\n"
-    for group in ("ball", "drop", *chance.sample(groups[2:], chance.randrange(4))):
-        text += f"&{group} {_keys([k for k in KEYS if k.group == group], chance)} /\n"
-    owned = {key.group for key in KEYS if key.owner == model}
-    for group in chance.sample(sorted(owned), chance.randint(0, len(owned))):
-        keys = [key for key in KEYS if key.owner == model and key.group == group]
-        text += f"&{group} {_keys(keys, chance)} /\n"
-    for _ in range(chance.choice([0, 0, 0, 1, 2])):
+    text = f"&model name = '{model}' /\n" if chance.random() < 0.95 else ""
+    owners = [model]
+    if chance.random() < 0.35:
+        floor = chance.choice(list(FLOORS))
+        owners += [floor] + ["room"] * (chance.random() < (0.5 if floor in RADIATORS else 0.01))
+        text += f"&floor name = '{floor}' /\n"
+    owners += ["modes"] * (chance.random() < 0.05) + ["compression"] * (chance.random() < 0.08)
+    steady = chance.random()
+    length = chance.choice([1, 1, 2, 3, 12])
+    for group in groups:
+        text += _group(group, [key for key in KEYS if key.group == group], length, steady, chance)
+    seen = set(groups)
+    for owner in owners:
+        for group in {key.group: None for key in KEYS if key.owner == owner}:
+            needed = group in (
+                "modes",
+                "mesh",
+                "room",
+                "compression",
+                "measured_modes",
+                "measured_mobility",
+                "hunt_crossley",
+            )
+            if group in seen or not (needed or chance.random() < 0.8):
+                continue
+            seen.add(group)
+            text += _group(
+                group,
+                [key for key in KEYS if (key.owner, key.group) == (owner, group)],
+                length,
+                steady,
+                chance,
+            )
+    for _ in range(chance.choice([0, 0, 0, 0, 0, 1, 2])):
         at = chance.randrange(len(text) + 1)
         text = (
             text[:at] + chance.choice([*INSERTIONS, ""]) + text[at + chance.choice([0, 0, 1, 9]) :]
@@ -93,108 +215,84 @@ def _text(chance: random.Random) -> str:
     return text
 
 
-def _keys(keys: list[Key], chance: random.Random) -> str:
-    """Return some keys with values inside, at or outside their ranges."""
-    chosen = chance.sample(keys, chance.randint(0, min(3, len(keys))))
-    return " ".join(f"{key.name} = {_value(key, chance)}" for key in chosen)
+def _group(group: str, keys: list[Key], length: int, steady: float, chance: random.Random) -> str:
+    """Return a group with some keys; lists of a group have one length, as a rule."""
+    # What a case cannot do without is given.
+    given = [key for key in keys if key.kind == "list" and group.startswith("measured")]
+    if group == "hunt_crossley":
+        given = [key for key in keys if key.name in ("contact_time", "restitution")]
+    if group == "mesh":
+        given = keys
+    rest = [key for key in keys if key not in given]
+    may_differ = group == "measured_modes" and chance.random() < 0.8
+    text = "allow_mass_mismatch = .true. " if may_differ else ""
+    chosen = given + chance.sample(rest, chance.randint(0, min(3, len(rest))))
+    if chance.random() < 0.02:
+        chosen = chance.sample(chosen, len(chosen) // 2)
+    text += " ".join(f"{key.name} = {_value(key, length, steady, chance)}" for key in chosen)
+    return f"&{group} {text} /\n"
 
 
-def _value(key: Key, chance: random.Random) -> str:
-    """Return a value of a key, as a rule inside its range, near its usual value."""
-    if chance.random() < 0.1:
+def _value(key: Key, length: int, steady: float, chance: random.Random) -> str:
+    """Return a value of a key; the steadier a case, the nearer to its usual values."""
+    if chance.random() < 0.04 * (1 - steady):
         return chance.choice(NUMBERS)
     if key.kind == "choice":
         return f"'{chance.choice(key.choices)}'"
     if key.kind == "flag":
         return chance.choice([".true.", ".false."])
     if key.kind == "text":
-        return "'text'"
+        return chance.choice(["'text'", "'a.b-c_d'", "'é'", "'a/b'", "' '", "'..'"])
+    count = 1 if key.kind != "list" else length if chance.random() < 0.97 else chance.randrange(20)
+    return ", ".join(_number(key, steady, chance) for _ in range(count))
+
+
+def _number(key: Key, steady: float, chance: random.Random) -> str:
     low = key.lower if isinstance(key.lower, float) else 0.0
     high = key.upper if isinstance(key.upper, float) else 1e9
     usual = USUAL.get((key.owner, key.group, key.name))
-    if usual and chance.random() < 0.8:
-        value = usual * math.exp(chance.gauss(0, 0.7))
+    if chance.random() < 0.05 * (1 - steady):
+        value = chance.choice([low, high, np.nextafter(low, high), np.nextafter(high, low)])
+    elif key.name in ("radial_elements", "polar_elements"):
+        value = chance.choice([2, 2, 3, 4] if key.name.startswith("r") else [8, 8, 12, 16, 20])
+    elif usual and chance.random() < 0.5 + 0.5 * steady:
+        value = usual * math.exp(chance.gauss(0, 0.7 * (1 - steady)))
+    elif low < 0:
+        value = chance.uniform(low, high)
     else:
         value = math.exp(chance.uniform(math.log(max(low, 1e-9)), math.log(max(high, 1e-8))))
-    return str(round(value)) if key.whole else repr(value)
+    if chance.random() < 0.9 + 0.1 * steady:
+        value = min(max(value, low), high)
+    return str(round(value)) if key.whole and math.isfinite(value) else repr(float(value))
 
 
 def _usual() -> dict[tuple[str, str, str], float]:
-    """Return the defaults of keys by owner, group and name."""
-    owners: dict[str, object] = {group: kind() for group, kind in GROUPS.items()}
-    owners |= {name: kind() for name, kind in MODELS.items()}
+    """Return usual values of keys by owner, group and name: defaults, and some of lists."""
+    owners: dict[str, object] = {
+        **{group: kind() for group, kind in GROUPS.items()},
+        **{name: kind() for name, kind in (MODELS | FLOORS).items()},
+        "modes": Modes(), "compression": Compression(), "room": Room(),
+    }  # fmt: skip
     found = {}
     for key in KEYS:
         default = getattr(owners.get(key.owner or key.group), key.name, None)
         if isinstance(default, int | float) and default > 0:
             found[key.owner, key.group, key.name] = float(default)
-    return found
+    lists = {
+        ("measured_modes", "frequency"): 40.0, ("measured_modes", "damping_ratio"): 0.1,
+        ("measured_modes", "effective_mass"): 1.0, ("hunt_crossley", "contact_time"): 0.02,
+        ("hunt_crossley", "restitution"): 0.6, ("measured_mobility", "pole_frequency"): 60.0,
+        ("measured_mobility", "damping_ratio"): 0.03, ("measured_mobility", "residue_real"): 0.01,
+        ("measured_mobility", "residue_imaginary"): 1e-4,
+        ("plate", "point_x"): 1.0, ("plate", "point_y"): 1.0,
+        ("floating_floor", "point_x"): 1.0, ("floating_floor", "point_y"): 1.0,
+        ("joist_floor", "point_x"): 1.0, ("joist_floor", "point_y"): 1.0,
+        ("room", "reverberation_times"): 0.5, ("room", "wall_lengths"): 4.0,
+        ("modal_ball", "static_families"): 12.0,
+    }  # fmt: skip
+    found |= {(owner, owner, name): value for (owner, name), value in lists.items()}
+    prony = {"prony_share": 0.3, "prony_time": 0.001}
+    return found | {("finite_element", "material", name): v for name, v in prony.items()}
 
 
 USUAL = _usual()
-
-
-class _Late(Exception):  # noqa: N818 - no error
-    """A case takes too long."""
-
-
-def _late(*_: object) -> None:
-    raise _Late
-
-
-def _try(number: int, text: str) -> tuple[str, str]:
-    """Return what becomes of a namelist."""
-    path = Path(f"case_{number}.nml")
-    path.write_text(text, encoding="utf-8")
-    try:
-        case = thud.read_case(path)
-        model = case.model.name if case.model else ""
-        if not model or number % 1000 >= 1000 * SLOW.get(model, 1):
-            return "accepted", ""
-        impact = thud.solve_case(case)
-        levels = [impact.levels(force=force) for force in ("elastic", "floor")]
-    except thud.ThudError as error:
-        said = str(error)
-        if re.search(r"\bNaN\b", said) and "nan" not in text.lower():
-            return "NaN", said
-        return ("refused", "") if len(said) < 1500 else ("crashed", f"a sentence of {len(said)}")
-    finally:
-        path.unlink()
-    arrays = [impact.floor_force, impact.elastic_force, *levels]
-    whole = all(np.isfinite(array).all() for array in arrays[:2])
-    numbers = (impact.contact_time, impact.restitution, impact.peak_force, impact.impulse)
-    if (
-        not whole
-        or any(np.isnan(array).any() for array in arrays)
-        or not np.isfinite(numbers).all()
-    ):
-        return "NaN", "in results"
-    return "computed", ""
-
-
-def main() -> None:
-    """Try the namelists of the standard input; print number, verdict and detail of each."""
-    warnings.simplefilter("ignore")
-    signal.signal(signal.SIGALRM, _late)
-    for number, text in json.load(sys.stdin):
-        signal.alarm(CASE_TIME)
-        try:
-            verdict, detail = _try(number, text)
-        except _Late:
-            verdict, detail = "stopped", ""
-        except Exception as error:  # noqa: BLE001 - that is the question
-            verdict, detail = "crashed", repr(error)
-        signal.alarm(0)
-        detail = " ".join(detail.split())
-        sys.stdout.write(f"{number}\t{verdict}\t{detail}\n")
-        sys.stdout.flush()
-
-
-if __name__ == "__main__":
-    import os
-    import tempfile
-
-    with tempfile.TemporaryDirectory(prefix="thud_faults_") as place:
-        os.chdir(place)
-        main()
-        os.chdir("/")

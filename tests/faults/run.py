@@ -12,10 +12,10 @@ import tempfile
 import time
 from pathlib import Path
 
+from attempts import attempts
 from campaign import Part, Report
 from directories import check_calls, check_damage, check_races, plan
 from memory import check_memory
-from namelists import check_namelists
 
 
 def parts() -> dict[str, Part]:
@@ -25,7 +25,10 @@ def parts() -> dict[str, Part]:
         "races": Part(80, 8, check_races),
         "damage": Part(10_000, 60, check_damage, share=100),
         "memory": Part(1000, 12, check_memory),
-        "namelists": Part(1_000_000, 400, check_namelists, share=400),
+        "namelists": Part(1_000_000, 400, attempts("namelists"), share=5000),
+        "recordings": Part(100_000, 60, attempts("damaged_recordings"), share=2000),
+        "studies": Part(100_000, 60, attempts("study_files"), share=2000),
+        "tables": Part(10_000, 60, attempts("table_files"), share=1000),
     }
 
 
