@@ -392,6 +392,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere .did you mean"),
         ("parameters.loss_factor.values = [1]", "allowed: keys of &ball, &drop, &hollow_sphere"),
         ("fixed.mass = {}\nparameters.height.values = [1]", "mass has no value; allowed: value"),
+        (f"name = {'[' * 10_000}", "allowed: TOML"),
         ("name = '\udcff'", "byte 9 is not of UTF-8; allowed: TOML"),
         ("parameters.height = 1", r"height = 1 is not a table; allowed: values, low"),
         ("parameters.height.values = []", r"values = \[\] is empty"),

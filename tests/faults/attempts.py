@@ -56,8 +56,9 @@ def _watch(part: str, seeds: list[int]) -> Iterator[Finding]:
         threading.Thread(target=_forward, args=(worker.stdout, lines), daemon=True).start()
         worker.stdin.write(json.dumps(seeds))
         worker.stdin.close()
-        for seed in seeds:
-            line = _next_line(worker, lines)
+        # Before the first come the imports.
+        for seed, patience in zip(seeds, (3 * PATIENCE, *[PATIENCE] * len(seeds)), strict=False):
+            line = _next_line(worker, lines, patience)
             if line is None or not line:
                 worker.kill()
                 said.seek(0)
@@ -81,12 +82,11 @@ def _forward(source: Iterable[str], lines: queue.Queue[str]) -> None:
     lines.put("")
 
 
-def _next_line(worker: subprocess.Popen[str], lines: queue.Queue[str]) -> str | None:
+def _next_line(worker: subprocess.Popen[str], lines: queue.Queue[str], patience: int) -> str | None:
     """Return a line, empty where the process has ended, None where it hangs."""
-    # Before the first come the imports.
-    for patience in (3 * PATIENCE, 3 * PATIENCE):
+    for seconds in (patience, 3 * PATIENCE):
         with suppress(queue.Empty):
-            return lines.get(timeout=patience)
+            return lines.get(timeout=seconds)
         worker.send_signal(signal.SIGINT)
     return None
 

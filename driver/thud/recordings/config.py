@@ -149,6 +149,8 @@ def read_config(path: str | os.PathLike[str]) -> Config:
         refuse(f"{name}: is larger than 1 MiB", "a TOML file of some lines")
     try:
         given = tomllib.loads(file.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        refuse(f"{name}: byte {error.start + 1} is not of UTF-8", "TOML, which is UTF-8", error)
     except (OSError, ValueError, RecursionError) as error:
         refuse(f"{name}: is no TOML ({shown_text(error)})", 'lines such as unit = "V"', error)
     _require_known(given, [one.name for one in fields(Config)], name)

@@ -117,7 +117,7 @@ def read_tables(
     except InputError as error:
         message = f"{path}: {error}"
         raise InputError(message) from error
-    except ValueError as error:  # no TOML, or a number of thousands of digits
+    except (ValueError, RecursionError) as error:  # no TOML, or thousands of digits or brackets
         refuse(f"{path}: {error}", "TOML", error)
 
 
