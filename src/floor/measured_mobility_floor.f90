@@ -104,7 +104,7 @@ contains
          conductance = get_conductance(receiver, omega/(2*pi))
          i = minloc(conductance, dim=1)
          error = input_error('&measured_mobility: the real part of the mobility is '//to_text(conductance(i)) &
-            //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
+            //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: finite and not negative, see `thud-driver mobility`')
       end if
    end subroutine get_receiver
 

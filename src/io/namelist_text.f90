@@ -165,14 +165,14 @@ contains
       if (key_start > finish .and. verify(structure(start:finish), blanks//',') == 0) return
       if (key_start > finish .or. verify(structure(start:min(key_start, finish + 1) - 1), blanks//',') > 0) then
          call get_value(clean(start:finish), given%value)
-         error = input_error('&'//group%name//' in line '//to_text(group%line)//": '" &
+         error = input_error('&'//shortened(group%name)//' in line '//to_text(group%line)//": '" &
             //shortened(given%value)//"' is not an assignment; allowed: 'key = value'")
          return
       end if
       do while (key_start <= finish)
          given%line = line_of(structure, key_start)
          if (key_end < key_start) then
-            error = input_error('&'//group%name//': an equals sign in line '//to_text(given%line) &
+            error = input_error('&'//shortened(group%name)//': an equals sign in line '//to_text(given%line) &
                //" has no key; allowed: 'key = value'")
             return
          end if

@@ -200,6 +200,13 @@ def test_ball_feels_a_noisy_measured_floor_as_the_floor() -> None:
     assert abs(expected.difference()).max() > 0.5
 
 
+def test_refusals_of_what_a_file_holds_name_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "point.csv"
+    write_table(path, "frequency,real,imaginary", FREQUENCY, -MOBILITY.real, MOBILITY.imag)
+    with pytest.raises(thud.InputError, match=f"^{path}: the mobility: the mean of its real part"):
+        thud.fit_mobility(path, order=4)
+
+
 @pytest.mark.parametrize(
     ("titles", "words"),
     [

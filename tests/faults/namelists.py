@@ -68,10 +68,10 @@ def _tried(path: Path, chance: random.Random) -> tuple[str, str]:
         return "NaN", "in the effective input"
     if _effective(effective) != effective:
         return "mixed", "the effective input is not that of itself"
-    model = re.search(rb"&model\s+name = '(\w+)'", effective)
+    model = re.search(rb"&model\s+name += '(\w+)'", effective)
     name = model[1].decode() if model else ""
     dice = chance.random()
-    if dice > 0.95 or dice < 0.01:
+    if dice > 0.99 or dice < 0.005:
         case = thud.read_case(path)
         if _effective(case_text(case)) != effective:
             return "mixed", "the case of Python is another one"
@@ -99,7 +99,8 @@ def _effective(text: bytes) -> bytes:
 def _is_small(effective: bytes) -> bool:
     """Return whether a case is quickly computed."""
     given = {
-        key.decode(): float(value) for key, value in re.findall(rb"(\w+) = ([-+.\deE]+)", effective)
+        key.decode(): float(value)
+        for key, value in re.findall(rb"(\w+) += (-?\d[-+.\deE]*)", effective)
     }
     samples = given.get("sample_rate", 0) * given.get("duration", 0)
     elements = given.get("radial_elements", 0) * given.get("polar_elements", 0)

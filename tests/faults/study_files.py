@@ -199,7 +199,12 @@ def _target(chance: random.Random) -> object:
     }  # fmt: skip
     force = {"file": str(INPUTS / "studies/fit_force.csv"), "force": "floor", "time_shift": True}
     found = chance.choice(
-        [levels, force, force | {"noise": 5.0}, force | {"window": [0.0, 0.06], "below": 1250.0}]
+        [
+            *[levels] * 6,
+            force,
+            force | {"noise": 5.0},
+            force | {"window": [0.0, 0.06], "below": 1250.0},
+        ]
     )
     if chance.random() < 0.2:
         found[chance.choice([*found, "drop", "gain", "hum", "config", "weight", "fixed"])] = (

@@ -53,10 +53,7 @@ def attempt(chance: random.Random) -> tuple[str, str]:
             wrong = READERS[name](path, chance)
         word = "NaN" if wrong else "read"
     except thud.ThudError as error:
-        # A table that cannot be computed names no file.
-        said = str(error)
-        begin = str(path) if str(path) in said else path.stem if said.startswith(path.stem) else ""
-        wrong = fault_of(error, begin, content.decode(errors="replace"))
+        wrong = fault_of(error, str(path), content.decode(errors="replace"))
         word = "raw" if wrong else "refused"
     finally:
         path.unlink()

@@ -24,6 +24,7 @@ from thud.checks import (
 )
 from thud.columns import read_titled
 from thud.display import MAKERS, Displayed
+from thud.errors import ThudError
 from thud.floors.mobility import mobility
 from thud.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
@@ -202,11 +203,12 @@ def fit_mobility(
     if quantity is not None:
         require_choice("quantity", quantity, get_args(Quantity))
     if isinstance(table, tuple):
-        name, (frequency, values) = "measurement", _checked(table)
+        name = place = "measurement"
+        frequency, values = _checked(table)
     elif not isinstance(table, str | os.PathLike):
         refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
     else:
-        name = Path(table).stem
+        name, place = Path(table).stem, f"{table}"
         frequency, values, known = _read(Path(table))
         if quantity and known and quantity != known:
             refuse(f"{table}: quantity = {quantity!r}, but the file holds {known!r}", repr(known))
@@ -215,16 +217,22 @@ def fit_mobility(
     frequency, values = frequency[frequency != 0], values[frequency != 0]
     values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
     if (n_line := len(frequency)) <= 1:
-        refuse(f"{name}: {n_line} lines above 0 Hz", "two or more")
+        refuse(f"{place}: {n_line} lines above 0 Hz", "two or more")
     if not (good := np.isfinite(values) & (values != 0)).all():
         line = good.argmin()
         refuse(
-            f"{name}: the value at {frequency[line]:g} Hz is {abs(values[line]):g}", "finite, not 0"
+            f"{place}: the value at {frequency[line]:g} Hz is {abs(values[line]):g}",
+            "finite, not 0",
         )
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
+    try:
+        if order is None:
+            return _chosen(name, frequency, values)
         return _fit(name, frequency, values, order)
-    return _chosen(name, frequency, values)
+    except ThudError as error:
+        message = f"{place}: {error}"
+        raise type(error)(message) from error
 
 
 def _checked(
