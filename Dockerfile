@@ -16,7 +16,7 @@ RUN apt-get update \
     && rm -rf /var/lib/apt/lists/*
 RUN --mount=type=bind,from=wheel,source=/thud/dist,target=/dist \
     pip install --no-cache-dir "$(echo /dist/*.whl)[studies,recordings,report,explorer]"
-RUN useradd --create-home thud
-USER thud
+RUN useradd --create-home --uid 1000 thud
+USER 1000
 WORKDIR /work
 CMD ["thud-driver", "--help"]
