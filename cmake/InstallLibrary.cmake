@@ -3,10 +3,14 @@ include(CMakePackageConfigHelpers)
 file(RELATIVE_PATH to_libraries "/${CMAKE_INSTALL_BINDIR}" "/${CMAKE_INSTALL_LIBDIR}")
 set_target_properties(thud PROPERTIES INSTALL_RPATH "$ORIGIN/${to_libraries}")
 install(TARGETS thud)
+set_target_properties(thud_library PROPERTIES
+  EXPORT_NAME thud
+  VERSION ${PROJECT_VERSION}
+  SOVERSION ${PROJECT_VERSION_MAJOR})
 # Manual pages and completions of shells; thud-driver comes with the wheel.
 install(DIRECTORY "${PROJECT_SOURCE_DIR}/share/" DESTINATION "${CMAKE_INSTALL_DATADIR}" PATTERN "*thud-driver*" EXCLUDE)
 install(TARGETS thud_library EXPORT thudTargets)
-install(DIRECTORY "${module_directory}/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/thud")
+install(DIRECTORY "$<TARGET_PROPERTY:thud_library,Fortran_MODULE_DIRECTORY>/" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/thud")
 
 set(package_directory "${CMAKE_INSTALL_LIBDIR}/cmake/thud")
 install(EXPORT thudTargets NAMESPACE thud:: DESTINATION "${package_directory}")

@@ -10,7 +10,7 @@ module thud_api
    use thud_case_text, only: get_case_text, read_case
    use thud_compression, only: compression_type
    use thud_compute, only: compress_case, compute_case, results_type
-   use thud_constants, only: compiler, version
+   use thud_constants, only: get_compiler, version
    use thud_error, only: error_type
    use thud_kinds, only: int64, int8, wp
    use thud_progress, only: latest_progress
@@ -71,7 +71,7 @@ contains
 
       allocate (bundle)
       call bundle%add_text('version', version)
-      call bundle%add_text('compiler', compiler)
+      call bundle%add_text('compiler', get_compiler())
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine describe_library
 

@@ -5,7 +5,7 @@ module thud_constants
    implicit none (type, external)
    private
 
-   public :: compiler, pi, recorded_band, reference_force, reference_time, version
+   public :: get_compiler, pi, recorded_band, reference_force, reference_time, version
 
    !> Ratio of a circle's circumference to its diameter.
    real(wp), parameter :: pi = acos(-1.0_wp)
@@ -23,7 +23,14 @@ module thud_constants
    !> Version of thud; pyproject.toml and CMakeLists.txt read it from here.
    character(len=*), parameter :: version = '1.0.0'
 
-   !> Compiler of the library and its options.
-   character(len=*), parameter :: compiler = compiler_version()//', options '//compiler_options()
+contains
+
+   !> Compiler of the library in use and its options: a constant would be that of who calls.
+   pure function get_compiler() result(text)
+      !> Name, version and options.
+      character(len=:), allocatable :: text
+
+      text = compiler_version()//', options '//compiler_options()
+   end function get_compiler
 
 end module thud_constants
