@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -27,14 +28,13 @@ from thud._schema import (
     Room,
     Sampling,
 )
-from thud.checks import LARGEST, refuse, require_choice, require_kind, shown
+from thud.checks import LARGEST, refuse, require_choice, require_kind, require_words, shown
 from thud.display import Displayed
 from thud.errors import InputError
 from thud.files import replace_file
 from thud.key import Group, require_keywords
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from dataclasses import Field
     from typing import Any, Self
 
@@ -200,6 +200,24 @@ class Case(Group, Displayed):
         }
         title = content.get("case", {}).get("name", cls.name)
         return cls(name=title, model=model, floor=floor, modes=modes, **groups, **further)
+
+
+def tables_case(tables: Mapping[str, Any]) -> Case:
+    """Return the case of tables of keys by group, such as those of JSON or TOML; see `check_case`.
+
+    Raises
+    ------
+    InputError
+        Where a group, or the name of model or floor, is not known, or a group is no table.
+    """
+    require_words("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
+    for group, keys in tables.items():
+        if not isinstance(keys, Mapping):
+            refuse(f"&{group} = {shown(keys)} is no table", "keys and their values")
+    for part, known in (("model", MODELS), ("floor", FLOORS)):
+        if part in tables:
+            require_choice(f"&{part}: name", tables[part].get("name"), list(known))
+    return Case.from_namelist(tables)
 
 
 def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:

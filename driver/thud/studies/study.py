@@ -17,7 +17,7 @@ import numpy as np
 
 from thud._api import version
 from thud._schema import MODELS
-from thud.case import Case, check_case, new_model, read_case
+from thud.case import Case, check_case, new_model, read_case, tables_case
 from thud.checks import refuse, refuse_value, require_kind, require_words
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
@@ -186,9 +186,12 @@ def table_of(given: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
-    if not isinstance(path, str | None):
-        refuse_value("case", path, "the path of a namelist file")
-    case = Case() if path is None else read_case(folder / path)
+    if not isinstance(path, str | Mapping | None):
+        refuse_value("case", path, "the path of a namelist file, or tables of its groups")
+    if isinstance(path, Mapping):
+        case = tables_case(path)
+    else:
+        case = Case() if path is None else read_case(folder / path)
     if (model := fixed.get("model")) is not None:
         if not isinstance(model, str):
             refuse_value("[fixed] model", model, ", ".join(MODELS))
