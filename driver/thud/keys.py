@@ -23,6 +23,19 @@ Value = float | int | str | bool
 # Group of the files that a run writes; it has no effect on sets.
 OF_FILES = "output"
 
+# Names of persons and abbreviations, in lower case and as they are written.
+_PROPER = {
+    "youngs": "Young's",
+    "poisson": "Poisson's",
+    "hunt_crossley": "Hunt–Crossley",
+    "kelvin_voigt": "Kelvin–Voigt",
+    "mooney_rivlin": "Mooney–Rivlin",
+    "mooney": "Mooney",
+    "neo_hookean": "neo-Hookean",
+    "prony": "Prony",
+    "fft": "FFT",
+}
+
 # Keys of studies only: they change the mass and the modulus of elasticity of the ball.
 DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
 TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
@@ -99,13 +112,14 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
 
 
 def plain_words(name: str) -> str:
-    """Return the name of a key in words.
+    """Return the name of a key, a model or a choice in words.
 
     >>> plain_words("youngs_modulus")
     "Young's modulus"
     """
-    persons = {"youngs": "Young's", "poisson": "Poisson's"}
-    return " ".join(persons.get(word, word) for word in name.split("_"))
+    for plain, proper in _PROPER.items():
+        name = re.sub(rf"(?<![^\W_]){plain}(?![^\W_])", proper, name)
+    return name.replace("_", " ")
 
 
 def limits(key: Key, case: Case) -> tuple[float, float]:

@@ -29,7 +29,14 @@ MULTIPLES: dict[str, dict[str, int]] = {
 # The beginning of a quantity.
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
-HANDY = {"Pa": ("Pa", "kPa", "MPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz")}
+HANDY = {
+    "Pa": ("Pa", "kPa", "MPa", "GPa"),
+    "m": ("mm", "m"),
+    "s": ("ms", "s"),
+    "Hz": ("Hz", "kHz"),
+    "N/m": ("N/m", "kN/m"),
+    "N/m3": ("N/m3", "kN/m3", "MN/m3"),
+}
 
 
 def power_of(unit: object, key_unit: str, place: str) -> int:
