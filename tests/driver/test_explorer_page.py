@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import shutil
-import signal
-import subprocess
-import sys
+from base64 import b64encode
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 import pytest
 from conftest import REPOSITORY
+from explorer_server import Served, serve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -22,20 +22,14 @@ sync_api = pytest.importorskip("playwright.sync_api")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
-START = "import sys; from thud_driver import main; sys.exit(main())"
+RECORDING = REPOSITORY / "inputs/recordings/drop_1.wav"
 
 
 @pytest.fixture
-def server() -> Iterator[tuple[str, subprocess.Popen[str]]]:
+def server() -> Iterator[Served]:
     """Return the address of a server, and its process."""
-    command = [sys.executable, "-c", START, "explore", "--no-browser"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        address = re.search(r"http\S+", process.stdout.readline())
-        assert address
-        yield address[0], process
-        process.send_signal(signal.SIGINT)
-        process.wait(20)
+    with serve() as found:
+        yield found
 
 
 @pytest.fixture(scope="module")
@@ -61,46 +55,52 @@ def new_page(browser: Browser, address: str, width: int = 1400, scheme: str = "l
 
 
 def shown(page: Page, name: str) -> str:
-    """Return the first value of a criterion in the table."""
+    """Return the value of a criterion in the table."""
     found: str = page.locator("#criteria tbody tr", has_text=name).locator("td").nth(1).inner_text()
     return found
 
 
-def test_case_is_changed_computed_and_compared(
-    browser: Browser, server: tuple[str, subprocess.Popen[str]]
-) -> None:
+def fill(page: Page, key: str, value: str) -> None:
+    """Write a value into the field of a key."""
+    page.locator(f"[id='{key}']").fill(value)
+    page.keyboard.press("Tab")
+
+
+def test_case_is_changed_computed_and_compared(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    assert shown(page, "octave 31.5") == "38.7"
+    assert shown(page, "31.5 Hz") == "38.70"
     page.locator("#pin").click()
     # A slider by the keyboard.
     page.locator("[id='drop.height'] + input").focus()
     page.keyboard.press("End")
     sync_api.expect(page.locator("[id='drop.height']")).to_have_value("3")
     sync_api.expect(page.locator("#criteria tbody tr").first).to_contain_text("high")
-    assert page.locator("#criteria thead th").count() == 4
+    assert page.locator("#criteria thead th").count() == 6
+    variants = page.locator("#variants li")
+    sync_api.expect(variants).to_have_text(
+        [re.compile("^Hollow sphere Height 3 m"), re.compile("^A: Hollow sphere")]
+    )
     page.locator("#model").select_option("modal_ball")
     sync_api.expect(page.locator("#verdict")).to_contain_text("Modal ball")
     page.locator("#reset").click()
     sync_api.expect(page.locator("#verdict")).to_contain_text("Hollow sphere does not conform")
-    assert page.locator("#criteria thead th").count() == 3
+    assert page.locator("#criteria thead th").count() == 4
 
 
-def test_bad_value_is_named_and_mended(
-    browser: Browser, server: tuple[str, subprocess.Popen[str]]
-) -> None:
+def test_bad_value_is_named_and_mended(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    page.locator("[id='ball.wall_thickness']").fill("0.2")
-    page.keyboard.press("Tab")
+    fill(page, "ball.wall_thickness", "200")
+    sync_api.expect(page.locator("[id='ball.wall_thickness']")).to_have_attribute(
+        "aria-invalid", "true"
+    )
     sync_api.expect(page.locator("#message")).to_contain_text("wall_thickness = 0.2")
-    page.locator("[id='ball.wall_thickness']").fill("0.03")
-    page.keyboard.press("Tab")
+    fill(page, "ball.wall_thickness", "30")
     sync_api.expect(page.locator("#message")).to_be_hidden()
 
 
-def test_link_carries_the_case(browser: Browser, server: tuple[str, subprocess.Popen[str]]) -> None:
+def test_link_carries_the_case(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    page.locator("[id='drop.height']").fill("0.4")
-    page.keyboard.press("Tab")
+    fill(page, "drop.height", "0.4")
     page.locator("#link").click()
     address = page.evaluate("location.href")
     assert "token" not in address
@@ -110,59 +110,122 @@ def test_link_carries_the_case(browser: Browser, server: tuple[str, subprocess.P
     sync_api.expect(page.locator("#verdict")).to_contain_text("drop height")
 
 
-def test_recording_on_the_page_is_judged(
-    browser: Browser, server: tuple[str, subprocess.Popen[str]]
-) -> None:
+def test_recording_on_the_page_is_judged(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("summary", has_text="Recording").click()
     page.locator("#recording_height").fill("1")
     page.locator("#recording_mass").fill("2.5")
     page.locator("#recording_calibration").fill("2000 N/FS")
-    page.locator("#file").set_input_files(REPOSITORY / "inputs/recordings/drop_1.wav")
-    head = page.locator("#criteria thead th", has_text="drop_1.wav (1 drop)")
-    sync_api.expect(head).to_be_visible(timeout=60_000)
+    page.locator("#file").set_input_files(RECORDING)
+    found = page.locator("#variants li", has_text="drop_1.wav, 1 drop does not conform")
+    sync_api.expect(found).to_be_visible(timeout=60_000)
+    found.locator("button").click()
+    sync_api.expect(page.locator("#variants")).to_be_hidden()
+    # The same, dropped on the page.
+    drop = """([bytes, name]) => {
+        const data = new DataTransfer();
+        data.items.add(new File([Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0))], name));
+        document.body.dispatchEvent(
+            new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
+    }"""
+    page.evaluate(drop, [b64encode(RECORDING.read_bytes()).decode(), RECORDING.name])
+    sync_api.expect(found).to_be_visible(timeout=60_000)
+    page.evaluate(drop, [b64encode(b"no record").decode(), "<b>note</b>.wav"])
+    sync_api.expect(page.locator("#message")).to_contain_text("<b>note</b>.wav", timeout=60_000)
 
 
-def test_slow_work_is_cancelled(
-    browser: Browser, server: tuple[str, subprocess.Popen[str]]
-) -> None:
+def test_slow_work_is_cancelled(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    page.locator("summary", has_text="Sampling").click()
     page.locator("#model").select_option("finite_element")
     sync_api.expect(page.locator("#verdict")).to_contain_text("Finite element", timeout=60_000)
-    page.locator("[id='mesh.polar_elements']").fill("400")
-    page.keyboard.press("Tab")
-    sync_api.expect(page.locator("#work")).to_be_visible()
-    page.locator("#cancel").click()
-    sync_api.expect(page.locator("#work")).to_be_hidden()
+    fill(page, "mesh.polar_elements", "400")
+    page.locator(".work button").click()
+    sync_api.expect(page.locator(".work")).to_have_count(0)
     sync_api.expect(page.locator("#message")).to_be_hidden()
 
 
-def test_two_users_do_not_meet(browser: Browser, server: tuple[str, subprocess.Popen[str]]) -> None:
+def test_two_users_do_not_meet(browser: Browser, server: Served) -> None:
     pages = [new_page(browser, server[0]) for _ in range(2)]
     for page, height in zip(pages, ("0.3", "1.5"), strict=True):
-        page.locator("[id='drop.height']").fill(height)
-        page.keyboard.press("Tab")
+        fill(page, "drop.height", height)
     for page, height in zip(pages, ("0.3", "1.5"), strict=True):
-        row = page.locator("#criteria tbody tr", has_text="drop height")
+        row = page.locator("#criteria tbody tr", has_text="Drop height")
         sync_api.expect(row).to_contain_text(height)
 
 
-def test_stopped_server_is_said(
-    browser: Browser, server: tuple[str, subprocess.Popen[str]]
-) -> None:
+def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    server[1].send_signal(signal.SIGINT)
-    assert server[1].wait(20) == 130
-    page.locator("[id='drop.height']").fill("0.3")
-    page.keyboard.press("Tab")
-    sync_api.expect(page.locator("#message")).to_contain_text("does not answer")
+    page.locator("#has_room").check()
+    sync_api.expect(page.locator("#room_words")).to_contain_text("standardised")
+    page.locator("#floor").select_option("joist_floor")
+    sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
+    sync_api.expect(page.locator("#floor_words")).to_contain_text("energy into the floor 2.7")
+    sync_api.expect(page.locator("#ball_words")).to_contain_text("times as large")
+    page.locator("#floor").select_option("")
+    sync_api.expect(page.locator("#room_section")).to_be_hidden()
+    sync_api.expect(page.locator("#floor_section")).to_be_hidden()
+
+
+def test_ball_plays(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0])
+    before = page.locator("#instant").input_value()
+    page.locator("#play").click()
+    sync_api.expect(page.locator("#instant")).not_to_have_value(before)
+    page.locator("#play").click()
+    sync_api.expect(page.locator("#play")).to_have_text("Play")
+    page.locator("#model").select_option("modal_ball")
+    sync_api.expect(page.locator("#ball_section")).to_be_hidden()
+
+
+@pytest.mark.parametrize(
+    "case", ['{"model":{"name":"cube"}}', "3", '{"model":"x","drop":7}', "{", '{"floor":["a"]}']
+)
+def test_link_without_a_case_is_said(browser: Browser, server: Served, case: str) -> None:
+    page = new_page(browser, server[0])
+    page.goto("about:blank")
+    page.goto(f"{server[0].partition('#')[0]}#case={quote(case)}")
+    sync_api.expect(page.locator("#message")).to_contain_text("the link holds no case")
+    sync_api.expect(page.locator("#verdict")).to_contain_text("Hollow sphere does not conform")
+
+
+def test_verdict_is_seen_while_a_slider_moves_on_a_phone(browser: Browser, server: Served) -> None:
+    page = new_page(browser, server[0], 400)
+    slider = page.locator("[id='limits.source']")
+    page.locator("summary", has_text="Limits").click()
+    slider.focus()
+    for part in ("#verdict", "#force svg", "#levels svg"):
+        sync_api.expect(page.locator(part)).to_be_in_viewport(ratio=1)
+    sync_api.expect(slider).to_be_in_viewport(ratio=1)
+
+
+def test_page_recovers_when_the_server_returns(browser: Browser) -> None:
+    with serve() as (address, process):
+        page = new_page(browser, address)
+        page.locator("#model").select_option("finite_element")
+        sync_api.expect(page.locator("#verdict")).to_contain_text("Finite element", timeout=60_000)
+        fill(page, "mesh.polar_elements", "400")
+        sync_api.expect(page.locator(".work")).to_be_visible()
+        # Killed while it computes.
+        process.kill()
+        process.wait(20)
+        sync_api.expect(page.locator("#message")).to_contain_text("the server")
+        sync_api.expect(page.locator("#message")).to_contain_text("start it again with")
+        fill(page, "mesh.polar_elements", "64")
+    port = address.partition("#")[0].strip("/").rpartition(":")[2]
+    with serve("--port", port) as (address, _):
+        sync_api.expect(page.locator("#message")).to_contain_text(
+            "open the address", timeout=10_000
+        )
+        # A new server has a new token, which the address brings into this browser.
+        page.context.new_page().goto(address)
+        sync_api.expect(page.locator("#message")).to_be_hidden(timeout=20_000)
+        sync_api.expect(page.locator("[id='mesh.polar_elements']")).to_have_value("64")
 
 
 @pytest.mark.parametrize(("width", "scheme"), [(1400, "light"), (400, "dark")])
 def test_page_is_accessible(
     browser: Browser,
-    server: tuple[str, subprocess.Popen[str]],
+    server: Served,
     width: int,
     scheme: str,
     tmp_path: Path,

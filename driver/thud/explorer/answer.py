@@ -3,39 +3,47 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._schema import FLOORS, KEYS, MODELS
-from thud.case import Case
-from thud.checks import refuse, require_choice, require_words, shown
+from thud.case import tables_case
+from thud.checks import refuse, shown
+from thud.ensemble import get_cost
 from thud.errors import ThudError
 from thud.floors.prediction import predict_level
-from thud.impact import Impact, compute
+from thud.impact import FloorImpact, compute
+from thud.keys import plain_words
 from thud.levels import get_bands
+from thud.plot.force_history import contact_force
+from thud.plot.look import FORCE_WORDS
 from thud.recordings.read_recording import read_recording
+from thud.recordings.verdict import Decision
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
     from numpy.typing import NDArray
 
+    from thud.case import Case
     from thud.criteria import Criterion
+    from thud.impact import Impact
     from thud.recordings.recording import Recording
-    from thud.recordings.verdict import Decision
 
     Answer = dict[str, Any]
 
-# Points of a curve on the page, and snapshots of an animation.
-MAX_POINTS = 600
-MAX_SNAPSHOTS = 60
+# Points of a curve on the page, and instants of an animation.
+MAX_POINTS = 400
+MAX_INSTANTS = 60
 # Samples of a record that the page asks for.
 MAX_SAMPLES = 200_000
+# Estimated time, s, and integration steps above which a case is computed in a process of its own.
+QUICK = 0.1
+QUICK_STEPS = 1_000_000
 # Part of the contact that is shown after it.
-MARGIN = 1.15
+MARGIN = 1.05
+# Significant digits of curves.
+DIGITS = 6
 
 
 def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
@@ -43,37 +51,31 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
 
     Raise InputError, or TypeError and ValueError where values are of other types.
     """
-    require_words("the case", values, known_groups())
-    for part, known in (("model", MODELS), ("floor", FLOORS)):
-        if part in values:
-            require_choice(f"&{part}: name", values[part].get("name"), list(known))
-    return Case.from_namelist(
-        {
-            group: {key: _listed(value) for key, value in keys.items()}
-            for group, keys in values.items()
-        }
-    )
-
-
-def known_groups() -> set[str]:
-    """Return the names of the groups that a case may have."""
-    return {key.group for key in KEYS} | {"model", "floor"}
-
-
-def _listed(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def answer_case(case: Case) -> Answer:
-    """Return force, levels, verdict, remarks and, where asked for, motion, floor and room."""
-    start = time.perf_counter()
+    case = tables_case(values)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:
         refuse(f"&sampling: {samples:g} samples are too many for the page", f"up to {MAX_SAMPLES}")
+    return case
+
+
+def is_quick(case: Case) -> bool:
+    """Return whether a case is computed while a slider moves; raise InputError if it is invalid."""
+    sampling = case.sampling
+    steps = sampling.sample_rate * sampling.duration * sampling.substeps
+    return get_cost(case, ()) <= QUICK and steps <= QUICK_STEPS
+
+
+def answer_case(case: Case) -> Answer:
+    """Return force, levels, verdict, remarks and, where there are, motion, floor and room."""
+    start = time.perf_counter()
     impact = compute(case)
-    found = _answer(impact, impact.time, impact.force(), impact.peak())
+    force = case.levels.force
+    found = _answer(impact, *contact_force(impact, force), impact.peak())
+    found["force"]["words"] = FORCE_WORDS[force]
     found["remarks"] += impact.remarks
-    found["motion"] = _motion(impact)
+    moving = impact.on_floor
+    found["motion"] = _motion(moving or impact)
+    found["floor"] = None if moving is None else _floor(impact, moving)
     if case.room is not None and case.floor is not None:
         found["room"] = _room(impact)
         further = found["room"].pop("remarks")
@@ -82,30 +84,28 @@ def answer_case(case: Case) -> Answer:
     return found
 
 
-def answer_recording(name: str, content: bytes, settings: Mapping[str, Any]) -> Answer:
+def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answer:
     """Return the same of a recording.
 
     Parameters
     ----------
+    path
+        Path of a copy of the file.
     name
-        Name of the file, whose ending says the format.
-    content
-        Its bytes.
+        Its name, as the user knows it.
     settings
         Arguments of `read_recording`.
     """
     start = time.perf_counter()
-    with TemporaryDirectory() as folder:
-        ending = "".join(c for c in Path(name).suffix if c.isalnum())[:8]
-        path = Path(folder, f"recording.{ending}")
-        path.write_bytes(content)
-        try:
-            recording = read_recording(path, **settings)
-            found = _answer(recording, *recording.to_force_history(), recording.peak())
-        except ThudError as error:
-            # The user knows neither the copy nor its place.
-            sentence = str(error).replace(f"{folder}/", "").replace(path.name, shown(name))
-            raise type(error)(sentence) from error
+    try:
+        recording = read_recording(path, **settings)
+        times, force = recording.to_force_history()
+        kept = (times >= 0) & (times <= MARGIN * recording.contact_time)
+        curve = 1e3 * times[kept], 1e-3 * force[kept]
+        found = _answer(recording, *curve, recording.peak())
+    except ThudError as error:
+        # The user knows neither the copy nor its place.
+        raise type(error)(str(error).replace(path, shown(name))) from error
     found["seconds"] = time.perf_counter() - start
     found["drops"] = len(recording.drops)
     return found
@@ -114,30 +114,22 @@ def answer_recording(name: str, content: bytes, settings: Mapping[str, Any]) -> 
 def _answer(
     source: Impact | Recording, times: NDArray[np.float64], force: NDArray[np.float64], peak: float
 ) -> Answer:
-    """Return what cases and recordings share."""
-    shown = times <= times[0] + MARGIN * source.contact_time
-    step = max(1, -(-int(shown.sum()) // MAX_POINTS))
+    """Return what cases and recordings share; times in ms, the force in kN."""
     verdict = source.conformity()
     return {
-        "force": {
-            "time": _plain(1e3 * times[shown][::step]),
-            "force": _plain(force[shown][::step]),
-        },
+        "force": _curve(times, 1e3 * force),
         "levels": {
-            bands: {
-                "frequency": _plain(get_bands(bands).nominal),
-                "level": _plain(source.levels(bands)),
-            }
-            for bands in ("octave", "third")
+            "frequency": _plain(get_bands().nominal),
+            "level": _plain(source.levels()),
         },
         "criteria": [_criterion(one) for one in verdict.criteria],
         "conforms": bool(verdict.conforms),
         "verdict": verdict.verdict,
-        "numbers": {
-            "contact time, ms": 1e3 * source.contact_time,
-            "peak force, N": float(peak),
-            "restitution": float(source.restitution),
-        },
+        "numbers": [
+            ["peak", float(peak), "N"],
+            ["contact", 1e3 * source.contact_time, "ms"],
+            ["restitution", float(source.restitution), ""],
+        ],
         "remarks": [],
     }
 
@@ -145,34 +137,71 @@ def _answer(
 def _criterion(one: Criterion | Decision) -> Answer:
     """Return a criterion; times are in ms, as on the screen."""
     scale, unit = (1e3, "ms") if one.unit == "s" else (1.0, one.unit)
+    name, band = one.name.rpartition("octave_")[1:]
+    if isinstance(one, Decision):
+        verdict, uncertainty = one.verdict, scale * one.quantity.expanded or None
+    else:
+        verdict, uncertainty = ("conforms" if one.conforms else "does not conform"), None
     return {
-        "name": one.name,
+        "name": f"{band.replace('_', '.')} Hz" if name else plain_words(band),
+        "band": bool(name),
         "unit": unit,
         "value": None if np.isnan(one.value) else round(scale * one.value, 6),
+        "uncertainty": uncertainty,
         "lower": round(scale * one.lower, 6),
         "upper": round(scale * one.upper, 6),
-        "conforms": bool(one.conforms),
+        "verdict": verdict,
     }
 
 
 def _motion(impact: Impact) -> Answer | None:
-    """Return the outer and inner surface against time, mm; of models without snapshots None."""
+    """Return the surfaces of the ball over the floor, and the floor, against time, mm and ms.
+
+    None of models that have no shape. The shell of the paper is a sphere that its deflection
+    flattens.
+    """
     until = impact.touch_time + MARGIN * impact.contact_time
-    if impact.motion is None:
-        shown = impact.time <= until
-        return {
-            "time": _plain(1e3 * impact.time[shown]),
-            "deflection": _plain(1e3 * impact.deflection[shown]),
-            "radius": 1e3 * impact.case.ball.outer_radius,
-            "wall": 1e3 * impact.case.ball.wall_thickness,
-        }
     motion = impact.motion
-    last = max(1, int(np.searchsorted(motion.time, until)))
-    chosen = np.unique(np.linspace(0, last - 1, min(last, MAX_SNAPSHOTS)).astype(int))
+    if motion is None and "shell_force" not in impact.parts:
+        return None
+    times = impact.time if motion is None else motion.time
+    chosen = _some(np.flatnonzero(times <= until), MAX_INSTANTS)
+    found: Answer = {"time": _plain(1e3 * (times[chosen] - impact.touch_time))}
+    if motion is not None:
+        depth = motion.floor_displacement[chosen]
+        over = motion.position[chosen] + np.stack([0 * depth, depth], -1)[:, None, None]
+        found["outer"], found["inner"] = (
+            [[[round(float(x), 2) for x in point] for point in line] for line in 1e3 * surface]
+            for surface in (over[:, :, -1], over[:, :, 0])
+        )
+    else:
+        moving = impact.floor_displacement if isinstance(impact, FloorImpact) else 0 * impact.time
+        depth = moving[chosen]
+        ball = impact.case.ball
+        found["deflection"] = _plain(1e3 * impact.deflection[chosen])
+        found |= {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
+    found["floor"] = _plain(1e3 * depth)
+    return found
+
+
+def _floor(impact: Impact, moving: FloorImpact) -> Answer:
+    """Return force and velocity on a floor that moves, and what it changes in octaves."""
+    shown = np.flatnonzero(moving.time <= moving.touch_time + 2 * moving.contact_time)
+    times = 1e3 * (moving.time - moving.touch_time)
+    contact = contact_force(moving, "floor")
+    head, *rows = moving.rows()
     return {
-        "time": _plain(1e3 * motion.time[chosen]),
-        "outer": [_rounded(line) for line in 1e3 * motion.position[chosen][:, :, -1]],
-        "inner": [_rounded(line) for line in 1e3 * motion.position[chosen][:, :, 0]],
+        "name": plain_words(moving.floor.name),
+        "force": _curve(contact[0], 1e3 * contact[1]),
+        "velocity": _curve(times[shown], 1e3 * moving.floor_velocity[shown]),
+        "numbers": [
+            ["peak of the force", 20 * np.log10(moving.peak_force / impact.peak_force), "dB"],
+            ["restitution", moving.restitution, ""],
+            ["maximum displacement", 1e3 * moving.floor_displacement.max(), "mm"],
+            ["energy into the floor", moving.floor_work, "J"],
+        ],
+        "head": head,
+        "rows": rows,
     }
 
 
@@ -188,10 +217,19 @@ def _room(impact: Impact) -> Answer:
     }
 
 
+def _curve(times: NDArray[np.float64], values: NDArray[np.float64]) -> Answer:
+    """Return some points of a curve, the last among them."""
+    chosen = _some(np.arange(len(times)), MAX_POINTS)
+    return {"time": _plain(times[chosen]), "value": _plain(values[chosen])}
+
+
+def _some(places: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+    """Return at most so many of some places, evenly, the first and the last among them."""
+    even = np.linspace(0, len(places) - 1, min(len(places), count)).astype(int)
+    found: NDArray[np.intp] = places[np.unique(even)]
+    return found
+
+
 def _plain(values: Iterable[float]) -> list[float | None]:
     """Return numbers for JSON, which has no NaN and no infinity."""
-    return [float(value) if np.isfinite(value) else None for value in values]
-
-
-def _rounded(points: NDArray[np.float64]) -> list[list[float]]:
-    return [[round(float(x), 2) for x in point] for point in points]
+    return [float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None for value in values]

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import io
-from dataclasses import fields
+import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._schema import GROUPS
 from thud.case import check_case
 from thud.checks import refuse
 from thud.comparison import compare
 from thud.explorer.answer import new_case
 from thud.impact import compute
-from thud.keys import known_keys
+from thud.keys import find_key, known_keys, users
 from thud.plot.comparison_html import comparison_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from thud.case import Case
+    from thud.key import Key
 
     Values = dict[str, dict[str, Any]]
 
@@ -63,40 +62,35 @@ def report(values: Values) -> bytes:
 
 def study(values: Values) -> bytes:
     """Return the file of a sweep over the keys that were moved, between the ends of their moves."""
-    moved = {name: [float(end) for end in ends] for name, ends in values.pop(MOVED, {}).items()}
+    moved = {name: sorted(map(float, ends)) for name, ends in values.pop(MOVED, {}).items()}
     case = new_case(values)
     check_case(case)
-    known = known_keys((case.model.name,)) if case.model else {}
-    names = {f"{key.group}.{name}": name for name, key in known.items()}
-    ranges = {names[key]: (min(ends), max(ends)) for key, ends in moved.items() if key in names}
-    ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
+    names = {f"{key.group}.{key.name}": name for name, key in known_keys(users(case)).items()}
+    ranges = {
+        names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[-1]
+    }
     if not ranges:
-        refuse("no slider of ball, drop or model was moved", "a study of one or more")
-    lines = ["# A sweep over what was moved: thud-driver sweep <this file>", "", "[fixed]"]
-    lines += [f"{key} = {_toml(value)}" for key, value in _changed(case) if key not in ranges]
+        refuse("no slider of the case was moved", "a study of one or more")
+    lines = ["# A sweep over what was moved: thud-driver sweep <this file>"]
+    for group, keys in case.to_namelist().items():
+        if group in values:
+            given = [f"{key} = {_toml(keys[key])}" for key in keys if key in values[group]]
+            lines += ["", f"[case.{group}]", *given]
     grid = len(ranges) <= 2  # noqa: PLR2004 - more would be many sets
     lines += ["", "[design]"]
     lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SETS}", "seed = 1"]
     lines += ["", "[parameters]"]
-    count = f", count = {POINTS}" if grid else ""
-    lines += [
-        f"{name} = {{ low = {low!r}, high = {high!r}{count} }}"
-        for name, (low, high) in ranges.items()
-    ]
+    for name, (low, *_, high) in ranges.items():
+        key = find_key(name, users(case))[0]
+        count = f", count = {_count(key, low, high)}" if grid else ""
+        ends = [round(low), round(high)] if key.kind == "whole" else [low, high]
+        lines.append(f'"{name}" = {{ low = {ends[0]!r}, high = {ends[1]!r}{count} }}')
     return ("\n".join(lines) + "\n").encode()
 
 
-def _changed(case: Case) -> list[tuple[str, object]]:
-    """Return the model, and the keys that differ from their defaults."""
-    assert case.model is not None  # noqa: S101 - the page has one
-    found: list[tuple[str, object]] = [("model", case.model.name)]
-    for group in (*(getattr(case, name) for name in GROUPS), case.model):
-        default = type(group)()
-        for option in fields(group):
-            value = getattr(group, option.name)
-            if value != getattr(default, option.name):
-                found.append((option.name, value))
-    return found
+def _count(key: Key, low: float, high: float) -> int:
+    """Return the number of values of a key in a grid."""
+    return min(POINTS, round(high - low) + 1) if key.kind == "whole" else POINTS
 
 
 def _toml(value: object) -> str:
@@ -104,8 +98,8 @@ def _toml(value: object) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
-        return f'"{value}"'
-    return repr(list(value)) if isinstance(value, tuple) else repr(value)
+        return json.dumps(value)
+    return repr(value)
 
 
 # What makes a file of the values, and its media type, by the name of the request.

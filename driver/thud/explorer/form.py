@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from thud._schema import FLOORS, GROUPS, KEYS, MODELS
 from thud.case import OPTIONAL
+from thud.keys import plain_words
+from thud.units import handy_unit, power_of, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -16,8 +19,12 @@ if TYPE_CHECKING:
 
 # A slider spans this part to this multiple of the value that it starts with.
 SPAN = 3.0
-# Models that take too long to be computed while a slider moves.
-SLOW = ("finite_element",)
+# A slider spans the whole range where that is positive, no longer than this, and the value lies
+# at least at this part of it.
+SHORT, PART = 3.0, 0.1
+# Part of such a range that is left out at its ends.
+INSET = 0.01
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Groups that the page leaves out: name, free modes, slow compression, files.
 LEFT_OUT = ("case", "modes", "compression", "output")
 
@@ -25,8 +32,9 @@ LEFT_OUT = ("case", "modes", "compression", "output")
 def form() -> list[dict[str, Any]]:
     """Return the groups of fields: name, title, what they belong to, and the fields.
 
-    A field has the group and the name of its key, kind, unit, meaning, choices, default and, where
-    it is a number, limits of the allowed range (None: open) and those of a slider.
+    A field has the group and the name of its key, label, kind, help, choices and default. A number
+    also has a unit, the power of ten that brings it to that of the key, limits of the allowed range
+    (None: open) and those of a slider, all in its unit.
     """
     groups = [
         _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
@@ -49,39 +57,79 @@ def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
 def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str, Any]:
     """Return a group of fields."""
     found = [_field(key, getattr(values, key.name)) for key in keys if key.group not in LEFT_OUT]
-    return {"part": part, "name": name, "fields": found}
+    return {"part": part, "name": name, "title": _title(name), "fields": found}
 
 
 def _field(key: Key, default: object) -> dict[str, Any]:
     """Return the field of a key."""
+    label, meaning = _title(key.name), _begun(plain_words(key.meaning))
     field = {
         "group": key.group,
         "name": key.name,
+        "label": label,
         "kind": key.kind,
-        "unit": key.unit,
-        "meaning": key.meaning,
-        "choices": list(key.choices),
+        "help": meaning,
+        "choices": {choice: plain_words(choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
+        "unit": _typeset(key.unit),
+        "power": 0,
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
-        lower, upper = (_number(end) for end in (key.lower, key.upper))
-        field |= {"lower": lower, "upper": upper, "slider": _slider(default, lower, upper)}
+        # Times stay in seconds: a reverberation time of 500 ms is none that anybody knows.
+        unit = key.unit if key.unit == "s" else handy_unit(key.unit, default)[0]
+        power = power_of(unit or "1", key.unit, key.name)
+        allowed = f"allowed: {_end(key.lower, power)} to {_end(key.upper, power)} {_typeset(unit)}"
+        value, lower, upper = (_shown(end, power) for end in (default, key.lower, key.upper))
+        field |= {
+            "unit": _typeset(unit),
+            "power": power,
+            "lower": lower,
+            "upper": upper,
+            "help": f"{'' if meaning == label else meaning + '; '}{allowed.rstrip()}",
+            "slider": _slider(value or 0.0, lower, upper, whole=key.kind == "whole"),
+        }
     return field
 
 
-def _number(end: float | str) -> float | None:
-    """Return a limit; None where there is none, or where it depends on other keys."""
-    return None if isinstance(end, str) or math.isinf(end) else end
+def _title(name: str) -> str:
+    return _begun(plain_words(name))
 
 
-def _slider(value: float, lower: float | None, upper: float | None) -> list[float] | None:
+def _begun(words: str) -> str:
+    """Return words with a capital at the beginning."""
+    return words[:1].upper() + words[1:]
+
+
+def _typeset(unit: str) -> str:
+    """Return a unit with its powers raised."""
+    return re.sub(r"(?<=[a-z])[23]", lambda digit: digit[0].translate(_RAISED), unit)
+
+
+def _shown(value: float | str, power: int) -> float | None:
+    """Return a number in the unit of the page; None for an end that is open or other keys."""
+    return None if isinstance(value, str) or math.isinf(value) else scaled(value, -power)
+
+
+def _end(end: float | str, power: int) -> str:
+    """Return the end of a range in words."""
+    if isinstance(end, str):
+        return plain_words(end)
+    number = f"{scaled(end, -power):g}"
+    return re.sub(r"1e\+0?(\d+)", lambda found: "10" + found[1].translate(_RAISED), number)
+
+
+def _slider(
+    value: float, lower: float | None, upper: float | None, *, whole: bool
+) -> list[float] | None:
     """Return the ends of a slider around a value; None where the value says no scale."""
+    if lower is not None and upper is not None and lower >= 0:
+        length = upper - lower
+        if length <= SHORT and (value <= 0 or value >= lower + PART * length):
+            # Only the default shows that an end itself is allowed.
+            inner = lower + INSET * length, upper - INSET * length
+            return [min(value, inner[0]), max(value, inner[1])]
     if value <= 0:
-        small = lower is not None and upper is not None and upper - lower <= SPAN
-        return [lower, upper] if small and lower is not None and upper is not None else None
-    ends = [value / SPAN, value * SPAN]
-    if lower is not None:
-        ends[0] = max(ends[0], lower)
-    if upper is not None:
-        ends[1] = min(ends[1], upper)
-    return ends
+        return None
+    low = max(value / SPAN, -math.inf if lower is None else lower)
+    high = min(value * SPAN, math.inf if upper is None else upper)
+    return [math.ceil(low), math.floor(high)] if whole else [low, high]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import resource
+import tempfile
 import threading
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
@@ -11,19 +14,23 @@ import anyio
 from thud._api import progress
 from thud.errors import InputError, ThudError
 from thud.explorer.answer import answer_case, answer_recording, new_case
+from thud.explorer.downloads import DOWNLOADS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable
     from multiprocessing.connection import Connection
 
 # Works by name; each takes plain data.
-WORKS: dict[str, Callable[..., dict[str, Any]]] = {
+WORKS: dict[str, Callable[..., Any]] = {
     "case": lambda values: answer_case(new_case(values)),
     "recording": answer_recording,
+    "download": lambda what, values: DOWNLOADS[what][0](values),
 }
 # Time between two reports, s, and the longest that a work may take.
 INTERVAL = 0.05
 LONGEST = 300.0
+# Largest memory of a work, bytes: small files can hold long recordings.
+MEMORY = 4_000_000_000
 
 
 class Jobs:
@@ -39,26 +46,31 @@ class Jobs:
     async def run(self, work: str, *arguments: object) -> AsyncIterator[dict[str, Any]]:
         """Yield reports ``{"done": part}``, at last ``{"answer": …}`` or ``{"error": sentence}``.
 
-        The process is ended where the caller stops to ask.
+        The first report comes before the work begins. The process is ended, and its temporary files
+        are removed, where the caller stops to ask.
         """
+        yield {"done": 0.0}
         async with self._limit:
-            near, far = self._context.Pipe()
-            process = self._context.Process(target=_work, args=(far, work, arguments), daemon=True)
-            process.start()
-            far.close()
-            try:
-                with anyio.move_on_after(LONGEST) as limit:
-                    while True:
-                        report = await anyio.to_thread.run_sync(_next, near)
-                        yield report
-                        if "done" not in report:
-                            return
-                if limit.cancelled_caught:
-                    yield {"error": f"the work takes longer than {LONGEST:g} s; allowed: less"}
-            finally:
-                near.close()
-                process.kill()
-                process.join()
+            with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+                near, far = self._context.Pipe()
+                process = self._context.Process(
+                    target=_work, args=(far, folder, work, arguments), daemon=True
+                )
+                process.start()
+                far.close()
+                try:
+                    with anyio.move_on_after(LONGEST) as limit:
+                        while True:
+                            report = await anyio.to_thread.run_sync(_next, near)
+                            yield report
+                            if "done" not in report:
+                                return
+                    if limit.cancelled_caught:
+                        yield {"error": f"the work takes longer than {LONGEST:g} s; allowed: less"}
+                finally:
+                    near.close()
+                    process.kill()
+                    process.join()
 
 
 def _next(near: Connection) -> dict[str, Any]:
@@ -70,20 +82,27 @@ def _next(near: Connection) -> dict[str, Any]:
     return report
 
 
-def _work(far: Connection, work: str, arguments: tuple[Any, ...]) -> None:
-    """Do a work in this process, and report."""
+def _work(far: Connection, folder: str, work: str, arguments: tuple[Any, ...]) -> None:
+    """Do a work in this process, and report; end with the server."""
+    tempfile.tempdir = folder
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     over = threading.Event()
 
     def report() -> None:
-        while not over.wait(INTERVAL):
-            far.send({"done": progress()})
+        try:
+            while not over.wait(INTERVAL):
+                far.send({"done": progress()})
+        except OSError:
+            os._exit(1)
 
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
     last: dict[str, Any]
     try:
         last = {"answer": WORKS[work](*arguments)}
-    except (ThudError, OSError, MemoryError) as error:
+    except MemoryError:
+        last = {"error": f"the work needs more than {MEMORY / 1e9:g} GB of memory; allowed: less"}
+    except (ThudError, OSError, TypeError, ValueError, KeyError) as error:
         last = {"error": str(error) or InputError.__name__}
     over.set()
     thread.join()

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import json
 import secrets
+from contextlib import aclosing
 from importlib import resources
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
+import anyio
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -18,16 +22,16 @@ from starlette.routing import Route
 
 from thud._api import version
 from thud.case import read_case
+from thud.checks import refuse, shown
 from thud.cli.command import channel_of
 from thud.errors import ThudError
-from thud.explorer.answer import answer_case, new_case
+from thud.explorer.answer import answer_case, is_quick, new_case
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import SLOW, form
+from thud.explorer.form import form
 from thud.explorer.jobs import Jobs
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
-    from pathlib import Path
 
     from starlette.requests import Request
 
@@ -38,14 +42,14 @@ MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
-# Files of the page, by name: their package and folder.
-FILES = dict.fromkeys(("index.html", "explorer.js", "explorer.css"), (__package__, "page")) | {
-    "plotly.min.js": ("plotly", "package_data")
-}
+# Longest silence while a body is sent, s.
+PATIENCE = 20.0
+# Files of the page, by name.
+FILES = {one.name: one for one in (resources.files("thud.explorer") / "page").iterdir()}
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
-# The page loads nothing from elsewhere; Plotly styles its elements.
+# The page loads nothing from elsewhere.
 POLICY = (
-    "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "default-src 'self'; img-src 'self' data:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'none'"
 )
 HEADERS = {
@@ -81,7 +85,6 @@ def new_application(
                 for path, endpoint, methods in (
                     ("/about", _about, ["GET"]),
                     ("/solve", _solve, ["POST"]),
-                    ("/solve_slowly", _solve_slowly, ["POST"]),
                     ("/measure", _measure, ["POST"]),
                     ("/download/{what}", _download, ["POST"]),
                 )
@@ -92,7 +95,12 @@ def new_application(
         exception_handlers=dict.fromkeys((ThudError, TypeError, ValueError, KeyError), _refuse)
         | {ClientDisconnect: _forget},
     )
-    application.state.about = {"form": form(), "slow": SLOW, "version": version(), "start": start}
+    application.state.about = {
+        "form": form(),
+        "version": version(),
+        "start": start,
+        "largest": MAX_RECORDING,
+    }
     application.state.token = token
     application.state.jobs = Jobs(width)
     return application
@@ -102,9 +110,9 @@ async def _page(request: Request) -> Response:
     name = request.path_params.get("name", "index.html")
     if name not in FILES:
         raise HTTPException(404, "there is no such file")
-    package, folder = FILES[name]
-    content = (resources.files(package) / folder / name).read_bytes()
-    return Response(content, media_type=TYPES[name.rpartition(".")[2]], headers=HEADERS)
+    return Response(
+        FILES[name].read_bytes(), media_type=TYPES[name.rpartition(".")[2]], headers=HEADERS
+    )
 
 
 async def _about(request: Request) -> Response:
@@ -112,33 +120,54 @@ async def _about(request: Request) -> Response:
 
 
 async def _solve(request: Request) -> Response:
-    case = new_case(await _values(request))
-    return JSONResponse(await run_in_threadpool(answer_case, case), headers=HEADERS)
+    values = await _values(request)
+    answer = await run_in_threadpool(_answer_at_once, values)
+    if answer is None:
+        return _stream(request.app.state.jobs.run("case", values))
+    return JSONResponse({"answer": answer}, headers=HEADERS)
 
 
-async def _solve_slowly(request: Request) -> Response:
-    return _stream(request.app.state.jobs.run("case", await _values(request)))
+def _answer_at_once(values: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the answer of a case that is computed quickly; None of another."""
+    case = new_case(values)
+    return answer_case(case) if is_quick(case) else None
 
 
 async def _measure(request: Request) -> Response:
-    content = await _body(request, MAX_RECORDING)
     asked = dict(request.query_params)
     settings: dict[str, Any] = {
-        key: float(asked[key]) for key in ("height", "mass") if key in asked
+        key: _number(key, asked[key]) for key in ("height", "mass") if key in asked
     }
     settings |= {key: asked[key] for key in ("calibration", "unit") if key in asked}
     if "channel" in asked:
         settings["channel"] = channel_of(asked["channel"])
     name = asked.get("name", "recording.wav")
-    return _stream(request.app.state.jobs.run("recording", name, content, settings))
+    ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
+    folder = TemporaryDirectory()
+    try:
+        path = Path(folder.name, f"recording.{ending}")
+        async with await anyio.open_file(path, "wb") as copy:
+            async for part in _body(request, MAX_RECORDING):
+                await copy.write(part)
+    except BaseException:
+        folder.cleanup()
+        raise
+    return _stream(
+        _with(folder, request.app.state.jobs.run("recording", str(path), name, settings))
+    )
 
 
 async def _download(request: Request) -> Response:
     if (what := request.path_params["what"]) not in DOWNLOADS:
         raise HTTPException(404, "there is no such file")
-    make, media = DOWNLOADS[what]
-    content = await run_in_threadpool(make, await _values(request))
-    return Response(content, media_type=media, headers=HEADERS)
+    reports = request.app.state.jobs.run("download", what, await _values(request))
+    async with aclosing(reports):
+        async for report in reports:
+            if await request.is_disconnected():
+                raise ClientDisconnect
+            if "error" in report:
+                raise HTTPException(400, report["error"])
+    return Response(report["answer"], media_type=DOWNLOADS[what][1], headers=HEADERS)
 
 
 def _guarded(endpoint: Endpoint) -> Endpoint:
@@ -173,25 +202,49 @@ def _stream(reports: AsyncIterator[dict[str, Any]]) -> Response:
     return StreamingResponse(lines(), media_type="application/x-ndjson", headers=HEADERS)
 
 
-async def _body(request: Request, largest: int) -> bytes:
-    """Return the body of a request; it is read no further than it may be long."""
-    found = bytearray()
-    async for part in request.stream():
-        found += part
-        if len(found) > largest:
-            raise HTTPException(
-                413, f"the data are longer than {largest / 1e6:g} MB; allowed: shorter"
-            )
-    return bytes(found)
+def _number(key: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        refuse(f"{key} = {shown(text)} is not a number", "a number", error)
+
+
+async def _with(
+    folder: TemporaryDirectory[str], reports: AsyncIterator[dict[str, Any]]
+) -> AsyncIterator[dict[str, Any]]:
+    """Yield reports, and remove a folder where they end."""
+    with folder:
+        async for report in reports:
+            yield report
+
+
+async def _body(request: Request, largest: int) -> AsyncIterator[bytes]:
+    """Yield the parts of a body; it is read no further than it may be long."""
+    length = 0
+    parts = request.stream()
+    while True:
+        try:
+            with anyio.fail_after(PATIENCE):
+                part = await anext(parts)
+        except StopAsyncIteration:
+            return
+        except TimeoutError:
+            message = f"no data came for {PATIENCE:g} s; allowed: less"
+            raise HTTPException(408, message) from None
+        length += len(part)
+        if length > largest:
+            message = f"the data are longer than {largest / 1e6:g} MB; allowed: shorter"
+            raise HTTPException(413, message)
+        yield part
 
 
 async def _values(request: Request) -> dict[str, dict[str, Any]]:
     """Return the values of keys by group that a request holds."""
     try:
-        values = json.loads(await _body(request, MAX_CASE))
+        values = json.loads(b"".join([part async for part in _body(request, MAX_CASE)]))
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
-    if not isinstance(values, dict) or not all(isinstance(one, dict) for one in values.values()):
+    if not isinstance(values, dict):
         raise HTTPException(400, "the request holds no groups of keys")
     return values
 

@@ -1,0 +1,75 @@
+"""A running server of the page, and users that ask it, for tests and benchmarks."""
+
+from __future__ import annotations
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from http.client import HTTPConnection
+from itertools import chain
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+START = "import sys; from thud_driver import main; sys.exit(main())"
+Served = tuple[str, "subprocess.Popen[str]"]
+
+
+@contextmanager
+def serve(*arguments: str) -> Iterator[Served]:
+    """Yield the address of a server, and its process."""
+    command = [sys.executable, "-c", START, "explore", "--no-browser", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        address = re.search(r"http\S+", process.stdout.readline())
+        assert address
+        try:
+            yield address[0], process
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait(20)
+
+
+def place_of(address: str) -> tuple[str, int, str]:
+    """Return host, port and token of an address."""
+    found = re.fullmatch(r"http://(.+):(\d+)/#token=(.+)", address)
+    assert found
+    return found[1], int(found[2]), found[3]
+
+
+def answer_of(connection: HTTPConnection, token: str, values: dict[str, Any]) -> dict[str, Any]:
+    """Return the answer to a case."""
+    connection.request("POST", "/solve", json.dumps(values), {"X-Thud-Token": token})
+    last = connection.getresponse().read().decode().splitlines()[-1]
+    answer: dict[str, Any] = json.loads(last)["answer"]
+    return answer
+
+
+def drag(address: str, users: int, steps: int) -> list[float]:
+    """Let users drag the height of models in turn, all at once; return the times of answers, s.
+
+    An answer that is not that of the user's own case is a failure.
+    """
+    host, port, token = place_of(address)
+
+    def ask(user: int) -> list[float]:
+        model = ("hollow_sphere", "modal_ball")[user % 2]
+        times = []
+        with closing(HTTPConnection(host, port, timeout=60)) as connection:
+            for step in range(steps):
+                height = 0.5 + 0.1 * user + 0.0005 * step
+                values = {"model": {"name": model}, "drop": {"height": height}}
+                start = time.perf_counter()
+                criteria = answer_of(connection, token, values)["criteria"]
+                times.append(time.perf_counter() - start)
+                assert abs(criteria[-1]["value"] - height) < 1e-6
+        return times
+
+    with ThreadPoolExecutor(users) as pool:
+        return list(chain(*pool.map(ask, range(users))))
