@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import asyncio
+import io
 import json
 import socket
+import tempfile
 import tomllib
 from typing import TYPE_CHECKING, Any
 
 import f90nml
+import h5py
 import numpy as np
 import pytest
+import scipy.io
 from conftest import REPOSITORY
 from starlette.testclient import TestClient
 
@@ -23,7 +27,7 @@ from thud.explorer.answer import new_case
 from thud.explorer.form import form
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Awaitable, Callable, Iterator
     from pathlib import Path
 
 TOKEN = "secret"  # noqa: S105 - of the test
@@ -68,7 +72,7 @@ def test_fields_are_those_of_the_schema() -> None:
     assert thickness["unit"] == "mm"
     assert thickness["power"] == -3
     assert thickness["default"] == thud.Ball().wall_thickness
-    low, high = thickness["slider"]
+    low, high = thickness["slider"]["ends"]
     assert low < 1e3 * thickness["default"] < high
     (law,) = (
         field for field in groups["model", "finite_element"]["fields"] if field["name"] == "law"
@@ -85,7 +89,7 @@ def test_ends_of_sliders_are_allowed() -> None:
         if group["name"] in empty:
             continue
         for field in group["fields"]:
-            for end in field.get("slider") or ():
+            for end in (field.get("slider") or {"ends": ()})["ends"]:
                 value = float(f"{end}e{field['power']}")
                 key = {field["name"]: int(value) if field["kind"] == "whole" else value}
                 case = {field["group"]: key} if group["name"] != "room" else {"room": key}
@@ -174,6 +178,58 @@ def test_hostile_recordings_get_a_sentence(client: TestClient, name: str) -> Non
     assert "/recording" not in report["error"]
 
 
+def claiming_hdf5() -> bytes:
+    """Return a small HDF5 file with a record of 800 GB."""
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        file.create_dataset("force", (10**11,), "f8", chunks=(2**20,), compression="gzip")
+    return content.getvalue()
+
+
+def unpacking_matlab() -> bytes:
+    """Return a small MATLAB file with a record of 160 MB."""
+    content = io.BytesIO()
+    scipy.io.savemat(content, {"force": np.zeros(2 * 10**7)}, do_compression=True)
+    return content.getvalue()
+
+
+WAV = (REPOSITORY / "inputs/recordings/drop_1.wav").read_bytes()
+# Place of the length of its samples.
+LENGTH = WAV.index(b"data") + 4
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.h5", claiming_hdf5(), "claims 800000000000 bytes"),
+        ("a.mat", unpacking_matlab(), "unpack to more than"),
+        ("a.wav", WAV[:LENGTH] + b"\xff" * 4 + WAV[LENGTH + 4 :], "cut off"),
+        ("a.wav", WAV[:1000], "cut off"),
+        ("a.flac", b"fLaC" + b"\xff" * 1000, "undamaged FLAC"),
+        ("a.tdms", b"TDSm" + b"\xff" * 1000, "cut off"),
+        ("a.csv", b"1," * 10**6, "longer than"),
+    ],
+)
+def test_recordings_that_do_harm_get_a_sentence(
+    client: TestClient, name: str, content: bytes, words: str
+) -> None:
+    report = last_report(client, "/measure", params={"name": name, "unit": "N"}, content=content)
+    assert words in report["error"]
+    assert repr(name) in report["error"]
+
+
+def test_recordings_and_works_leave_no_files(
+    client: TestClient, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
+    assert "answer" in last_report(client, "/measure", params=query, content=WAV)
+    assert client.post("/measure?height=high", content=WAV).status_code == 400
+    monkeypatch.setattr(server, "MAX_RECORDING", 1000)
+    assert client.post("/measure", params=query, content=WAV).status_code == 413
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(
     ("values", "words"),
     [
@@ -200,8 +256,11 @@ def test_bad_values_get_a_sentence(client: TestClient, values: object, words: st
 def test_only_the_page_with_its_token_is_answered(client: TestClient) -> None:
     assert client.get("/about").status_code == 200
     assert client.get("/about", headers={server.TOKEN: "guess"}).status_code == 403
-    assert client.get("/about", headers={"Origin": "http://elsewhere.example"}).status_code == 403
-    assert client.get("/about", headers={"Host": "rebound.example"}).status_code == 400
+    for origin in ("http://elsewhere.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"):
+        assert client.get("/about", headers={"Origin": origin}).status_code == 403
+    for path in ("/about", "/", "/page/explorer.js"):
+        for host in ("rebound.example", "rebound.example:80", "127.0.0.1.rebound.example", ""):
+            assert client.get(path, headers={"Host": host}).status_code == 400
     page = client.get("/", headers={server.TOKEN: ""})
     assert page.status_code == 200
     assert TOKEN not in page.text
@@ -285,11 +344,11 @@ def test_unusable_port_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> No
     assert "cannot be listened on; allowed: a free port" in capsys.readouterr().err
 
 
-def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> None:
-    async def leave() -> dict[str, Any]:
-        return {"type": "http.disconnect"}
-
-    sent: list[Any] = []
+def call(
+    client: TestClient, receive: Callable[[], Awaitable[dict[str, Any]]]
+) -> list[dict[str, Any]]:
+    """Return what the application sends to a case that comes by a function."""
+    sent: list[dict[str, Any]] = []
 
     async def send(message: Any) -> None:  # noqa: ANN401 - as the interface has it
         sent.append(message)
@@ -299,5 +358,22 @@ def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> 
         "server": ("127.0.0.1", 80), "root_path": "",
         "headers": [(b"host", b"127.0.0.1"), (server.TOKEN.encode(), TOKEN.encode())],
     }  # fmt: skip
-    asyncio.run(client.app(scope, leave, send))  # type: ignore[arg-type]
-    assert sent[0]["status"] == 400
+    asyncio.run(client.app(scope, receive, send))  # type: ignore[arg-type]
+    return sent
+
+
+def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> None:
+    async def leave() -> dict[str, Any]:
+        return {"type": "http.disconnect"}
+
+    assert call(client, leave)[0]["status"] == 400
+
+
+def test_body_that_rests_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "PATIENCE", 0.05)
+
+    async def rest() -> dict[str, Any]:
+        await asyncio.sleep(60)
+        raise AssertionError
+
+    assert call(client, rest)[0]["status"] == 408

@@ -34,7 +34,7 @@ def form() -> list[dict[str, Any]]:
 
     A field has the group and the name of its key, label, kind, help, choices and default. A number
     also has a unit, the power of ten that brings it to that of the key, limits of the allowed range
-    (None: open) and those of a slider, all in its unit.
+    (None: open) and ends and scale of a slider, all in its unit.
     """
     groups = [
         _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
@@ -78,7 +78,8 @@ def _field(key: Key, default: object) -> dict[str, Any]:
         # Times stay in seconds: a reverberation time of 500 ms is none that anybody knows.
         unit = key.unit if key.unit == "s" else handy_unit(key.unit, default)[0]
         power = power_of(unit or "1", key.unit, key.name)
-        allowed = f"allowed: {_end(key.lower, power)} to {_end(key.upper, power)} {_typeset(unit)}"
+        after = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
+        allowed = f"allowed: {_end(key.lower, power)} to {_end(key.upper, power)}{after}"
         value, lower, upper = (_shown(end, power) for end in (default, key.lower, key.upper))
         field |= {
             "unit": _typeset(unit),
@@ -120,16 +121,16 @@ def _end(end: float | str, power: int) -> str:
 
 def _slider(
     value: float, lower: float | None, upper: float | None, *, whole: bool
-) -> list[float] | None:
-    """Return the ends of a slider around a value; None where the value says no scale."""
+) -> dict[str, Any] | None:
+    """Return ends and scale of a slider around a value; None where the value says no scale."""
     if lower is not None and upper is not None and lower >= 0:
         length = upper - lower
         if length <= SHORT and (value <= 0 or value >= lower + PART * length):
             # Only the default shows that an end itself is allowed.
             inner = lower + INSET * length, upper - INSET * length
-            return [min(value, inner[0]), max(value, inner[1])]
+            return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}
     if value <= 0:
         return None
     low = max(value / SPAN, -math.inf if lower is None else lower)
     high = min(value * SPAN, math.inf if upper is None else upper)
-    return [math.ceil(low), math.floor(high)] if whole else [low, high]
+    return {"ends": [math.ceil(low), math.floor(high)] if whole else [low, high], "log": not whole}

@@ -6,10 +6,11 @@ import os
 import resource
 import tempfile
 import threading
-from multiprocessing import get_context
+from multiprocessing import forkserver, get_context
 from typing import TYPE_CHECKING, Any
 
 import anyio
+from tqdm import tqdm
 
 from thud._api import progress
 from thud.errors import InputError, ThudError
@@ -41,6 +42,7 @@ class Jobs:
         # A server that has modules loaded forks each process at once.
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([__name__])
+        forkserver.ensure_running()
         self._limit = anyio.CapacityLimiter(width)
 
     async def run(self, work: str, *arguments: object) -> AsyncIterator[dict[str, Any]]:
@@ -85,6 +87,8 @@ def _next(near: Connection) -> dict[str, Any]:
 def _work(far: Connection, folder: str, work: str, arguments: tuple[Any, ...]) -> None:
     """Do a work in this process, and report; end with the server."""
     tempfile.tempdir = folder
+    # The usual lock is a semaphore of the system, which a process that is killed leaves behind.
+    tqdm.set_lock(threading.RLock())
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     over = threading.Event()
 

@@ -161,13 +161,12 @@ function numberInput(field, id, take) {
   return slider ? [number, slider] : [number];
 }
 
-/** Return a slider; that of a positive number with a wide range moves in its logarithm. */
+/** Return a slider; that of a positive number moves in its logarithm. */
 function sliderInput(field, id, value, moved) {
-  const [low, high] = field.slider;
+  const { ends: [low, high], log } = field.slider;
   const whole = field.kind === "whole";
-  const logarithmic = low > 0 && high / low > 4 && !whole;
-  const to = logarithmic ? Math.log : (x) => x;
-  const from = logarithmic ? Math.exp : (x) => x;
+  const to = log ? Math.log : (x) => x;
+  const from = log ? Math.exp : (x) => x;
   const slider = element("input", { type: "range", "aria-labelledby": `${id}.label`, min: to(low), max: to(high), step: whole ? 1 : "any" });
   const say = (given) => slider.setAttribute("aria-valuetext", `${given} ${field.unit}`.trim());
   slider.place = (given) => { slider.value = to(given); say(given); };

@@ -70,7 +70,8 @@ function summarise({ name, answer }) {
   byId("verdict").textContent = `${name} ${answer.verdict}${words.length ? `: ${words.join(", ")}` : ""}`;
   byId("verdict").className = answer.conforms ? "conforms" : "fails";
   const numbers = answer.numbers.map(([what, value, unit]) => `${what} ${rounded(value, unit)}`);
-  byId("numbers").textContent = [...numbers, `computed in ${Number((1e3 * answer.seconds).toPrecision(2))} ms`].join(" · ");
+  const time = `computed in ${Number((1e3 * answer.seconds).toPrecision(2))} ms`;
+  byId("numbers").replaceChildren(numbers.join(" · "), element("span", { class: "extra" }, ` · ${time}`));
 }
 
 function showCriteria(variants) {
