@@ -55,11 +55,9 @@ highlight_language = "none"  # blocks without a language are what programs print
 
 html_theme = "furo"
 html_title = f"thud {release}"
-html_static_path = ["docs/site/static"]
-html_css_files = ["tutorials.css"]
 html_extra_path = ["../ford"]  # made by FORD
 html_static_path = ["docs/site/static"]
-html_css_files = ["site.css"]
+html_css_files = ["site.css", "tutorials.css"]
 html_theme_options = {
     f"{scheme}_css_variables": {"code-font-size": "76%"} for scheme in ("light", "dark")
 }
