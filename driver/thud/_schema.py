@@ -755,7 +755,7 @@ class MeasuredMobility(Group):
     pole_frequency : sequence of float
         Magnitudes of the poles over 2 pi, Hz; 1e-06 <= pole_frequency <= 1e+07.
     damping_ratio : sequence of float
-        Damping ratios of the poles, 1 of a real pole; 0 < damping_ratio <= 1.
+        Damping ratios of the poles, 1 of a real pole; 1e-12 <= damping_ratio <= 1.
     residue_real : sequence of float
         Real parts of the residues, of a pair of poles doubled, m/(N s2); -1e+12 <= residue_real <=
         1e+12.
@@ -970,7 +970,7 @@ KEYS = (
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "pole_frequency", "list", "Hz", "magnitudes of the poles over 2 pi", (), 1e-06, 10000000.0),
-    Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 0.0, 1.0),
+    Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles, 1 of a real pole", (), 1e-12, 1.0),
     Key("measured_mobility", "measured_mobility", "residue_real", "list", "m/(N s2)", "real parts of the residues, of a pair of poles doubled", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "first frequency of the measurement", (), 0.0, "highest_frequency"),

@@ -44,7 +44,7 @@ contains
          real_field('direct', options%direct, 'm/(N s)', 'mobility at high frequencies', '[0, 1000]'), &
          list_field('pole_frequency', options%pole_frequency, 'Hz', 'magnitudes of the poles over 2 pi', '[1e-6, 1e7]'), &
          list_field('damping_ratio', options%damping_ratio, '', 'damping ratios of the poles, 1 of a real pole', &
-         '(0, 1]'), &
+         '[1e-12, 1]'), &
          list_field('residue_real', options%residue_real, 'm/(N s2)', &
          'real parts of the residues, of a pair of poles doubled', '[-1e12, 1e12]'), &
          list_field('residue_imaginary', options%residue_imaginary, 'm/(N s2)', 'imaginary parts of the residues', &
@@ -104,7 +104,7 @@ contains
          conductance = get_conductance(receiver, omega/(2*pi))
          i = minloc(conductance, dim=1)
          error = input_error('&measured_mobility: the real part of the mobility is '//to_text(conductance(i)) &
-            //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: finite and not negative, see `thud-driver mobility`')
+            //' m/(N s) at '//to_text(omega(i)/(2*pi))//' Hz; allowed: not negative, see `thud-driver mobility`')
       end if
    end subroutine get_receiver
 

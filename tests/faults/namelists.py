@@ -98,10 +98,8 @@ def _effective(text: bytes) -> bytes:
 
 def _is_small(effective: bytes) -> bool:
     """Return whether a case is quickly computed."""
-    given = {
-        key.decode(): float(value)
-        for key, value in re.findall(rb"(\w+) += (-?\d[-+.\deE]*)", effective)
-    }
+    lines = re.findall(rb"^ +(\w+) += (\d[-+.\deE]*)", effective, re.MULTILINE)
+    given = {key.decode(): float(value) for key, value in lines}
     samples = given.get("sample_rate", 0) * given.get("duration", 0)
     elements = given.get("radial_elements", 0) * given.get("polar_elements", 0)
     return samples * given.get("substeps", 0) <= MANY_SAMPLES and elements <= MANY_ELEMENTS
