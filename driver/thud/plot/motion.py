@@ -173,9 +173,13 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
 def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
     """Show the size of a round velocity beside the label of the colours."""
     velocity = float(f"{impact.impact_velocity:.1g}")
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # noqa: S101 - the axes are new
+    # In parts of the figure: a key in inches would be lost where notebooks crop the figure.
+    x, y = np.array([WIDTH - 0.52, 0.11]) / figure.get_size_inches()
     key = QuiverKey(
-        arrows, WIDTH - 0.5, 0.11, velocity, f"{velocity:g} m/s", labelpos="E",
-        coordinates="inches", fontproperties={"size": SIZE},
+        arrows, x, y, velocity, f"{velocity:g} m/s", labelpos="E", coordinates="figure",
+        fontproperties={"size": SIZE},
     )  # fmt: skip
     axes.add_artist(key)
 
