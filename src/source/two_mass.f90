@@ -28,8 +28,8 @@ module thud_two_mass
    integer, parameter :: at_belt = 1, at_belt_velocity = 2, at_rim = 3, at_rim_velocity = 4, at_impulse = 5, at_loss = 6, &
       at_gap = 7, n_state = 7
 
-   !> Angle by which the fastest motion advances in a step, rad, on a rigid floor and on one that moves: Runge and Kutta's steps
-   !> lose angle**6/72 of its energy each, those of Radau IIA angle**6/3600, both 5e-11 in a radian or less.
+   !> Angle by which the fastest motion advances in a step, rad, on a rigid floor and on one that moves: Runge and
+   !> Kutta's steps lose angle**6/72 of its energy each, those of Radau IIA angle**6/3600, both 5e-11 in a radian or less.
    real(wp), parameter :: step_angle = 0.02_wp, coupled_angle = 0.1_wp
 
    !> Steps of one record; more would take longer than finite elements, and a tyre needs 1e4.
