@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.studies.fitting.force_target import ForceMisfit
+    from thud.studies.fitting.force_misfit import ForceMisfit
     from thud.studies.fitting.level_target import LevelMisfit
     from thud.studies.fitting.result import Fit, FittedTarget
 

@@ -3,31 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import stats
-from scipy.signal import ZoomFFT
 
 from thud.checks import refuse, refuse_value, require_choice, require_number, require_whole
 from thud.impact import FORCES, Impact
 from thud.levels import RECORDED_BAND
 from thud.record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
-from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit, require_positive
-from thud.studies.fitting.record_noise import (
-    MIN_HUM,
-    MIN_QUIET,
-    Quiet,
-    Weights,
-    find_pulse,
-    hum_harmonics,
-    new_weights,
-    trimmed,
-    wave_size,
-)
-from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
+from thud.studies.fitting.force_misfit import ForceMisfit
+from thud.studies.fitting.misfit import require_positive
+from thud.studies.fitting.record_noise import MIN_HUM, find_pulse, trimmed
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,23 +22,12 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud._schema import LevelsForce
-    from thud.recordings.noise import Background
 
-# Part of that frequency that rounded times leave open.
-SAME = 1e-5
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1
 END = 1e-3
 # Values that are compared at most: their covariances take memory with the square of it, 2 GB.
 MAX_COMPARED = 8000
-# A comparison of contact and quiet needs this many independent values of each, and any test a
-# residual above this part of the peak force, which exceeds sampling errors.
-MIN_FREEDOM = 5
-NUMERICAL = 1e-4
-# Standard errors of hum that make it worth telling: noise alone has as much with UNLIKELY.
-NOTABLE = float(np.sqrt(-2 * np.log(UNLIKELY)))
-# Scale of a shift in time, s.
-SHIFT_SCALE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,256 +178,3 @@ def _cut(
             f"begin and end, s, of an impact between {time[0]:g} and {time[-1]:g}",
         )
     return time[inside], force[inside]
-
-
-class ForceMisfit(Misfit):
-    """How far the force of an impact is from a record, by frequency."""
-
-    deviation_unit = "N"
-    deviation_source = "noise, or 50 independent values of quiet,"
-
-    def __init__(self, target: ForceTarget, record: Record, pulse: tuple[int, int]) -> None:
-        self.time, self.force, self.sample_rate = record
-        self.target, self.below = target, target.below
-        given = target.record
-        self.exact = isinstance(given, Impact)
-        self.kind = target.force or (given.judged() if isinstance(given, Impact) else "floor")
-        self.period = len(self.time) / self.sample_rate
-        self.frequency = np.arange(int(self.below * self.period * (1 + SAME)) + 1) / self.period
-        self.count = 2 * len(self.frequency) - 1
-        self.spectrum = np.fft.rfft(self.force, norm="ortho")[: len(self.frequency)]
-        self.quiet = Quiet(self.force, self.sample_rate, pulse, self.below)
-        shown = self.quiet.known and self.quiet.deviation() > NUMERICAL * self.force.max()
-        self.offset = self.quiet.known if target.offset is None else target.offset
-        self.known_noise = shown or target.noise is not None
-        self.noise_freedom = self.quiet.freedom if shown and target.noise is None else None
-        self._shown = shown
-        self.own = {}
-        if not self.exact if target.time_shift is None else target.time_shift:
-            self.own[SHIFT] = "s", SHIFT_SCALE
-        if target.gain is not None:
-            self.own[GAIN] = "", 1.0
-        # What is known of the gain is one more residual.
-        self.prior = target.gain if target.gain is not None and target.gain < np.inf else None
-        if self.prior is not None and not self.known_noise:
-            refuse(
-                f"target: gain = {self.prior:g} is not allowed without a known noise",
-                f"noise, {MIN_QUIET / 2 / self.below:.3g} s of quiet, or inf",
-            )
-        self.size = self.count + (self.prior is not None)
-        self._transforms: dict[tuple[int, float], ZoomFFT] = {}
-
-    @cached_property
-    def tones(self) -> tuple[float, ...]:
-        """Frequencies of hum that are nuisance parameters, Hz."""
-        if self.target.hum is not None:
-            return hum_harmonics(self.target.hum, self.below)
-        return self.quiet.tones() if self._shown else ()
-
-    @cached_property
-    def background(self) -> Background | None:
-        """The noise of the quiet parts; None where they do not tell."""
-        return self.quiet.background(self.tones) if self._shown else None
-
-    @cached_property
-    def weights(self) -> Weights:
-        """The weights of the residuals."""
-        return new_weights(
-            self.quiet,
-            self.count,
-            background=self.background,
-            noise=self.target.noise,
-            offset=self.offset,
-            tones=self.tones,
-            mains=self.target.hum is None,
-        )
-
-    @property
-    def band_share(self) -> float:
-        """Part of the deviation of white noise that lies in the compared band."""
-        return float(np.sqrt(self.count / len(self.time)))
-
-    @property
-    def absorbed(self) -> int:
-        """Number of nuisance parameters that were projected out of the residuals."""
-        return self.offset + 2 * len(self.tones)
-
-    @cached_property
-    def unit_deviation(self) -> float:
-        """Deviation of white noise with the power of the noise below `below`, N; 1: not known."""
-        return self.target.noise or (self.weights.deviation() if self.known_noise else 1.0)
-
-    def model_spectrum(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Return the transform of the force of an impact as the record would show it."""
-        count = len(self.frequency)
-        shape = len(impact.time), impact.sample_rate
-        if shape not in self._transforms:
-            band = [0.0, count / self.period]
-            self._transforms[shape] = ZoomFFT(shape[0], band, count, fs=shape[1])
-        turned = self._transforms[shape](impact.force(self.kind)).astype(np.complex128)
-        turned *= self.sample_rate / impact.sample_rate / np.sqrt(len(self.time))
-        shift = self.value(SHIFT, own)
-        phase = np.exp(-2j * np.pi * self.frequency * (shift - self.time[0]))
-        result: NDArray[np.complex128] = self.value(GAIN, own) * turned * phase
-        return result
-
-    def value(self, name: str, own: NDArray[np.float64]) -> float:
-        """Return one of its own parameters, or what it is where it is not fitted."""
-        place = list(self.own).index(name) if name in self.own else None
-        return {SHIFT: 0.0, GAIN: 1.0}[name] if place is None else float(own[place])
-
-    def residual(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return model minus target over standard deviation, shape (size,)."""
-        rest = self._grid(self.model_spectrum(impact, own) - self.spectrum)
-        return self._with_prior(self.weights.matrix @ rest, (self.value(GAIN, own) - 1))
-
-    def own_derivatives(self, impact: Impact, own: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the derivatives of the residual by its own parameters, shape (size, n_own)."""
-        model = self.model_spectrum(impact, own)
-        slopes = {
-            SHIFT: (-2j * np.pi * self.frequency * model, 0.0),
-            GAIN: (model / self.value(GAIN, own), 1.0),
-        }
-        columns = [
-            self._with_prior(self.weights.matrix @ self._grid(slopes[name][0]), slopes[name][1])
-            for name in self.own
-        ]
-        return np.column_stack(columns) if columns else np.empty((self.size, 0))
-
-    def _with_prior(self, weighted: NDArray[np.float64], gain: float) -> NDArray[np.float64]:
-        return weighted if self.prior is None else np.append(weighted, gain / self.prior)
-
-    def own_start(self, impact: Impact) -> NDArray[np.float64]:
-        """Return where impact and record correlate most, s, and a gain of 1."""
-        start = {SHIFT: self.time[0], GAIN: 1.0}
-        own = np.array([start[name] for name in self.own])
-        if SHIFT not in self.own:
-            return own
-        product = self.spectrum * self.model_spectrum(impact, own).conj()
-        count = 16 * len(product)
-        lag = np.argmax(np.fft.irfft(product, count)) / count
-        # A pulse that begins shortly before the record does not begin at its end.
-        own[0] += (lag - (lag > 3 / 4)) * self.period
-        return own
-
-    def target_vector(self) -> NDArray[np.float64]:
-        """Return the target over standard deviation, shape (size,)."""
-        return self._with_prior(self.weights.matrix @ self._grid(self.spectrum), 1.0)
-
-    def data(self) -> NDArray[np.float64]:
-        """Return the record, N."""
-        return self.force
-
-    def history_columns(
-        self, impact: Impact, own: NDArray[np.float64]
-    ) -> dict[str, NDArray[np.float64]]:
-        """Return target and model side by side, s and N: columns by their names."""
-        model = self.model_spectrum(impact, own)
-        under = self.weights.background(self._grid(self.spectrum - model))
-        background = self.history(np.fft.rfft(under, norm="ortho"))
-        target, force = self.history(self.spectrum), self.history(model)
-        return {
-            "time_s": self.time,
-            "record_N": self.force,
-            "target_N": target,
-            "background_N": background,
-            "model_N": force,
-            "residual_N": force + background - target,
-        }
-
-    def columns(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, list[object]]:
-        """Return target and model side by side, s and N: columns by their names."""
-        columns = self.history_columns(impact, own)
-        return {name: column.tolist() for name, column in columns.items()}
-
-    def nuisances(self, impact: Impact, own: NDArray[np.float64]) -> dict[str, tuple[float, float]]:
-        """Return offset and amplitude of hum where they are fitted, and their errors, N."""
-        value, covariance = self.weights.estimates(
-            self._grid(self.spectrum - self.model_spectrum(impact, own))
-        )
-        found = {}
-        if self.offset:
-            found["offset"] = float(value[0]), float(np.sqrt(covariance[0, 0]))
-        for place, tone in enumerate(self.tones, start=int(self.offset)):
-            pair = np.array([place, place + len(self.tones)])
-            found[f"hum of {tone:.4g} Hz"] = wave_size(value[pair], covariance[np.ix_(pair, pair)])
-        if self.background is not None and self.target.hum is None:
-            mains, size, error = self.quiet.mains(self.background, self.tones)
-            if size > NOTABLE * error:
-                found[f"hum of {mains:g} Hz"] = size, error
-        return found
-
-    def doubts(
-        self, impact: Impact, own: NDArray[np.float64], deviation: float, count: int
-    ) -> list[str]:
-        """Return what residuals of a deviation show that `count` parameters cannot explain.
-
-        Noise is the same throughout and independent once it is weighted; what the model cannot
-        follow is there during the contact only.
-        """
-        rest = self._grid(self.spectrum - self.model_spectrum(impact, own))
-        left = rest - self.weights.background(rest)
-        if np.sqrt(np.mean(left**2)) < NUMERICAL * self.force.max():
-            return []
-        weighted = self.weights.matrix @ rest / deviation
-        time = self.time[0] + np.arange(self.count) * self.period / self.count
-        begin = self.value(SHIFT, own)
-        inside = (time >= begin) & (time <= begin + impact.contact_time)
-        unit = deviation * self.unit_deviation
-        found = _contact_doubt(weighted, inside, count, unit)
-        if not found:
-            found = residual_doubts(weighted, time)
-            found += _change_doubt(weighted, time < begin, time > begin + impact.contact_time)
-        if not (self.quiet.known or self.target.offset is not None or self.exact):
-            found.append(
-                f"the record has {1e3 * self.quiet.seconds:.3g} ms of quiet: offset, hum and "
-                "colour of the noise are not known, and the intervals hold for white noise alone"
-            )
-        return found
-
-    def history(self, spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Return the history of a transform, N, shape (n_sample,)."""
-        whole: NDArray[np.float64] = np.fft.irfft(spectrum, len(self.time), norm="ortho")
-        return whole
-
-    def _grid(self, spectrum: NDArray[np.complex128]) -> NDArray[np.float64]:
-        """Return the history of a transform on the grid."""
-        grid: NDArray[np.float64] = np.fft.irfft(spectrum, self.count, norm="ortho")
-        return grid
-
-
-def _contact_doubt(
-    weighted: NDArray[np.float64], inside: NDArray[np.bool_], count: int, unit: float
-) -> list[str]:
-    """Return how residuals differ during contact from before and after, where they do."""
-    during, other = int(inside.sum()) - count, int((~inside).sum())
-    if min(during, other) < MIN_FREEDOM:
-        return []
-    square = float((weighted[inside] ** 2).sum()) / during
-    quiet = float((weighted[~inside] ** 2).sum()) / other
-    if square < stats.f.isf(UNLIKELY, during, other) * quiet:
-        return []
-    told = (
-        f"the residual is {unit * np.sqrt(square):.3g} N during the contact and "
-        f"{unit * np.sqrt(quiet):.3g} N otherwise: the model does not follow the force to within "
-        "the noise, and the intervals are too narrow"
-    )
-    return [told]
-
-
-def _change_doubt(
-    weighted: NDArray[np.float64], before: NDArray[np.bool_], after: NDArray[np.bool_]
-) -> list[str]:
-    """Return how residuals before contact differ from those behind it, where they do."""
-    counts = int(before.sum()), int(after.sum())
-    if min(counts) < MIN_FREEDOM:
-        return []
-    ratio = float(np.mean(weighted[after] ** 2) / np.mean(weighted[before] ** 2))
-    tail = min(stats.f.sf(ratio, *counts[::-1]), stats.f.cdf(ratio, *counts[::-1]))
-    if 2 * tail > UNLIKELY:
-        return []
-    told = (
-        f"the residuals are {np.sqrt(ratio):.3g} times as large behind the contact as before it: "
-        "the noise is not the same throughout, and the intervals do not hold"
-    )
-    return [told]
