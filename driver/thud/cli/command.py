@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.errors import InputError, ThudError
+from thud.files import replace_file
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
+
+    from thud.floors.mobility_fit import MobilityFit
+    from thud.floors.survey import RoomLevels
 
 # Names or flags of an argument, and its settings for argparse.
 Argument = tuple[tuple[str, ...], dict[str, Any]]
@@ -52,6 +58,37 @@ NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 def channel_of(text: str | None) -> int | str | None:
     """Return the number or the name of a channel."""
     return int(text) if text is not None and text.isdecimal() else text
+
+
+def tell(remarks: Iterable[object]) -> None:
+    """Print remarks."""
+    for remark in remarks:
+        print(f"thud-driver: {remark}", file=sys.stderr)
+
+
+def conclude(
+    options: argparse.Namespace,
+    found: MobilityFit | RoomLevels,
+    shown: str,
+    file: tuple[str, bytes],
+    figure: str,
+) -> int:
+    """Save a file and the figure of a result, print its text and remarks; return the exit code."""
+    folder = Path(options.output or Path("outputs", found.name))
+    figures = {} if options.no_figures else {figure: found.plot()}
+    folder.mkdir(parents=True, exist_ok=True)
+    name, content = file
+    replace_file(folder / name, content)
+    if figures:
+        from thud.plot.look import save_all  # noqa: PLC0415 - Matplotlib takes its time
+
+        save_all(figures, folder)
+    if not options.quiet:
+        print(shown)
+    tell(found.remarks)
+    if not options.quiet:
+        print(f"Results: {folder}")
+    return 0
 
 
 def exit_code(error: Exception) -> int:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.case import read_case
 from thud.checks import refuse
-from thud.cli.command import QUIET, Command, argument, output
+from thud.cli.command import QUIET, Command, argument, output, tell
 from thud.impact import compute
 
 if TYPE_CHECKING:
@@ -36,8 +35,7 @@ def run_export(options: argparse.Namespace) -> int:
     if not chosen:
         refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read(options.source, options.config)
-    for remark in source.remarks:
-        print(f"thud-driver: {remark}", file=sys.stderr)
+    tell(source.remarks)
     force = export_force.blocked_force(source, drop=options.drop, rate=options.rate)
     folder = Path(options.output)
     folder.mkdir(parents=True, exist_ok=True)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
+from thud.cli.command import tell
 from thud.errors import PlausibilityWarning
 from thud.tables import format_rows
 
@@ -29,8 +30,7 @@ def compare_cases(options: argparse.Namespace) -> int:
             options.source,
             progress=not options.quiet and sys.stderr.isatty(),
         )
-    for remark in page.remarks:
-        print(f"thud-driver: {remark}", file=sys.stderr)
+    tell(page.remarks)
     paths = page.save(options.output)
     if not options.quiet:
         print(format_rows(page.table()))

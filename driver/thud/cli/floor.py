@@ -7,7 +7,7 @@ import warnings
 from typing import TYPE_CHECKING
 
 from thud.case import read_case
-from thud.cli.command import QUIET, Command, argument, output
+from thud.cli.command import QUIET, Command, argument, output, tell
 from thud.errors import InputError, PlausibilityWarning
 from thud.tables import format_rows
 
@@ -31,8 +31,7 @@ def compare(options: argparse.Namespace) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         found = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
-    for remark in found.remarks:
-        print(f"thud-driver: {remark}", file=sys.stderr)
+    tell(found.remarks)
     paths = found.save(options.output)
     if not options.quiet:
         print(format_rows(found.rows()))

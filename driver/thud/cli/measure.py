@@ -8,7 +8,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, channel_of, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, channel_of, output, tell
 from thud.errors import ReportWarning
 from thud.levels import SOURCES
 from thud.tables import format_rows
@@ -65,10 +65,7 @@ def measure(options: argparse.Namespace) -> int:
             print(f"  {step}")
         print(f"  {results.verdict_sentence(recording)}")
     told = results.sentences(recording, "remarks")
-    for remark in (*recording.doubts, *recording.outliers, *told):
-        print(f"thud-driver: {remark}", file=sys.stderr)
-    for warning in found:
-        print(f"thud-driver: {warning.message}", file=sys.stderr)
+    tell((*recording.doubts, *recording.outliers, *told, *(w.message for w in found)))
     if not options.quiet:
         print(f"Results: {folder}")
     return NOT_CONFORMING if options.check and not verdict else 0
