@@ -6,8 +6,8 @@ import hashlib
 import json
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any, TypeAlias, Unpack
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Unpack
 
 from thud.case import Case, check_case
 from thud.checks import (
@@ -15,30 +15,23 @@ from thud.checks import (
     refuse,
     refuse_value,
     require_kind,
-    require_number,
     require_whole,
-    require_words,
 )
-from thud.columns import read_table
 from thud.errors import FitWarning, InputError
 from thud.key import check_keywords
-from thud.record import read_record
-from thud.recordings.formats import FORMATS as RECORDING_FORMATS
-from thud.recordings.read_recording import read_recording
 from thud.studies.directory import FORMATS
 from thud.studies.emulation.answered_levels import answered, confirmed, within_region
 from thud.studies.emulation.plan import read_plan
 from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
-from thud.studies.fitting.level_target import LevelTarget
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
+from thud.studies.fitting.read_target import Target, read_target
 from thud.studies.fitting.result import Fit, file_ends
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
-from thud.studies.parameter import quantity
 from thud.studies.study import Study, fix_keys, table_of, with_density
-from thud.units import power_of, scaled
+from thud.units import scaled
 
 if TYPE_CHECKING:
     import os
@@ -60,14 +53,6 @@ if TYPE_CHECKING:
 OPTIONS = {"confidence": 0.95, "starts": 1, "seed": 0, "max_steps": 100}
 # Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
-# What [target] may hold, and the units of its numbers.
-FORCE_KEYS = ("file", "config", *(f.name for f in fields(ForceTarget) if f.name != "record"))
-LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
-TARGET_UNITS = {
-    "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "hum": "Hz", "gain": "",
-}  # fmt: skip
-
-Target: TypeAlias = ForceTarget | LevelTarget
 
 
 @check_keywords
@@ -285,7 +270,7 @@ class FitKind(Kind[FitStudy, Fit]):
             tables = [table_of(given, "target")]
         elif not tables or not all(isinstance(table, dict) for table in tables):
             refuse_value("target", tables, "a table [target], or several [[target]]")
-        targets = tuple(_read_target(table, folder) for table in tables)
+        targets = tuple(read_target(table, folder) for table in tables)
         options = {name: given.get(name, default) for name, default in OPTIONS.items()}
         _require_options(options)
         get_ranges(case, study.parameters)
@@ -358,60 +343,3 @@ class FitKind(Kind[FitStudy, Fit]):
 
 
 KIND = FitKind()
-
-
-def _read_target(table: dict[str, Any], folder: Path) -> Target:
-    if ("file" in table) == ("levels" in table):
-        refuse("[target] takes one of file and levels", "file = 'record.csv' or levels = [...]")
-    require_words("[target]", table, FORCE_KEYS if "file" in table else LEVEL_KEYS)
-    options = {
-        name: quantity(f"[target] {name}", value, TARGET_UNITS[name])
-        if name in TARGET_UNITS
-        else value
-        for name, value in table.items()
-    }
-    if "levels" in table:
-        for name, unit in (("contact_time", "s"), ("restitution", "")):
-            if name in options:
-                options[name] = _measured(f"[target] {name}", options[name], unit)
-        return LevelTarget(**options)
-    paths = {word: options.pop(word) for word in ("file", "config") if word in options}
-    for word, name in paths.items():
-        if not isinstance(name, str) or not name.strip():
-            refuse_value(f"[target] {word}", name, "text in quotes")
-    return ForceTarget(
-        _read_record(
-            folder / paths["file"],
-            folder / paths["config"] if "config" in paths else None,
-            measured=bool({"config", "drop"} & set(table)),
-        ),
-        **options,
-    )
-
-
-def _read_record(
-    path: Path, config: Path | None, *, measured: bool
-) -> Recording | tuple[ArrayLike, ArrayLike]:
-    """Return the record of a file.
-
-    Tables of time and force are taken as they are unless they shall be measured; a model, or
-    another program, may have written them.
-    """
-    others = {end for one in RECORDING_FORMATS if one.module != "text" for end in one.suffixes}
-    if measured or path.suffix.lower() in others:
-        return read_recording(path, config=config)
-    samples = read_table(path)
-    read_record(samples, str(path))  # refuses what is not a record
-    return samples[:, 0], samples[:, 1]
-
-
-def _measured(place: str, given: object, unit: str) -> tuple[float, float]:
-    """Return value and standard deviation of a table in the unit of a key."""
-    words = ("value", "uncertainty")
-    if not isinstance(given, dict) or not set(words) <= set(given):
-        refuse_value(place, given, "a table of value, uncertainty, unit")
-    require_words(place, given, (*words, "unit"))
-    power = power_of(given.get("unit", unit or "1"), unit, place)
-    for word in words:
-        require_number(f"{place}: {word}", given[word])
-    return scaled(given["value"], power), scaled(given["uncertainty"], power)

@@ -1,0 +1,88 @@
+"""Targets of fits, as a study file describes them."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from thud.checks import refuse, refuse_value, require_number, require_words
+from thud.columns import read_table
+from thud.record import read_record
+from thud.recordings.formats import FORMATS
+from thud.recordings.read_recording import read_recording
+from thud.studies.fitting.force_target import ForceTarget
+from thud.studies.fitting.level_target import LevelTarget
+from thud.studies.parameter import quantity
+from thud.units import power_of, scaled
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import ArrayLike
+
+    from thud.recordings.recording import Recording
+
+# What [target] may hold, and the units of its numbers.
+_FORCE_KEYS = ("file", "config", *(f.name for f in fields(ForceTarget) if f.name != "record"))
+_LEVEL_KEYS = tuple(f.name for f in fields(LevelTarget))
+_UNITS = {
+    "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "hum": "Hz", "gain": "",
+}  # fmt: skip
+
+Target: TypeAlias = ForceTarget | LevelTarget
+
+
+def read_target(table: dict[str, Any], folder: Path) -> Target:
+    """Return the target of a table [target]; its paths are relative to a folder."""
+    if ("file" in table) == ("levels" in table):
+        refuse("[target] takes one of file and levels", "file = 'record.csv' or levels = [...]")
+    require_words("[target]", table, _FORCE_KEYS if "file" in table else _LEVEL_KEYS)
+    options = {
+        name: quantity(f"[target] {name}", value, _UNITS[name]) if name in _UNITS else value
+        for name, value in table.items()
+    }
+    if "levels" in table:
+        for name, unit in (("contact_time", "s"), ("restitution", "")):
+            if name in options:
+                options[name] = _measured(f"[target] {name}", options[name], unit)
+        return LevelTarget(**options)
+    paths = {word: options.pop(word) for word in ("file", "config") if word in options}
+    for word, name in paths.items():
+        if not isinstance(name, str) or not name.strip():
+            refuse_value(f"[target] {word}", name, "text in quotes")
+    return ForceTarget(
+        _read_record(
+            folder / paths["file"],
+            folder / paths["config"] if "config" in paths else None,
+            measured=bool({"config", "drop"} & set(table)),
+        ),
+        **options,
+    )
+
+
+def _read_record(
+    path: Path, config: Path | None, *, measured: bool
+) -> Recording | tuple[ArrayLike, ArrayLike]:
+    """Return the record of a file.
+
+    Tables of time and force are taken as they are unless they shall be measured; a model, or
+    another program, may have written them.
+    """
+    others = {end for one in FORMATS if one.module != "text" for end in one.suffixes}
+    if measured or path.suffix.lower() in others:
+        return read_recording(path, config=config)
+    samples = read_table(path)
+    read_record(samples, str(path))  # refuses what is not a record
+    return samples[:, 0], samples[:, 1]
+
+
+def _measured(place: str, given: object, unit: str) -> tuple[float, float]:
+    """Return value and standard deviation of a table in the unit of a key."""
+    words = ("value", "uncertainty")
+    if not isinstance(given, dict) or not set(words) <= set(given):
+        refuse_value(place, given, "a table of value, uncertainty, unit")
+    require_words(place, given, (*words, "unit"))
+    power = power_of(given.get("unit", unit or "1"), unit, place)
+    for word in words:
+        require_number(f"{place}: {word}", given[word])
+    return scaled(given["value"], power), scaled(given["uncertainty"], power)
