@@ -6,8 +6,9 @@ module thud_elastic_body
       new_element_row
    use thud_kinds, only: wp
    use thud_material, only: material_type
+   use thud_maxwell_branches, only: add_branch_stress
    use thud_mesh, only: mesh_type
-   use thud_rubber, only: add_branch_stress, add_viscous_stress, get_elastic_stress, get_volume_ratios
+   use thud_rubber, only: add_viscous_stress, get_elastic_stress, get_volume_ratios
    implicit none (type, external)
    private
 
