@@ -4,6 +4,7 @@
 !> them. No number of a drop depends on the threads, on the other drops or on its place among them.
 module thud_many
    use thud_band, only: band_type, get_level_bands, octave_count
+   use thud_batch_sets, only: fill_sets, suits_batch
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields, get_model_number
    use thud_column, only: column_type
@@ -13,12 +14,11 @@ module thud_many
    use thud_field, only: check_fields, field_type
    use thud_force_history, only: force_count, get_scalars, outcome_count
    use thud_further_results, only: further_length, get_further_names, solve_further
-   use thud_hollow_sphere, only: flux_choices, hollow_sphere_type
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
    use thud_sampling, only: check_sampling, get_sample_count
-   use thud_shell_sets, only: get_set_fields, set_outcome_type, set_type
+   use thud_shell_sets, only: set_outcome_type, set_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
    use thud_text, only: to_text
    implicit none (type, external)
@@ -317,26 +317,6 @@ contains
       end associate
    end subroutine judge
 
-   !> Whether drops can be computed in batches: by the shell model, with exact levels, if they differ in nothing
-   !> but ball, drop and the options of the model.
-   function suits_batch(case, columns) result(suits)
-      type(case_type), intent(in), target :: case
-      !> In what the drops differ: [n_column].
-      type(column_type), intent(in) :: columns(:)
-      logical :: suits
-      type(field_type), allocatable :: fields(:)
-      integer :: i
-
-      suits = .false.
-      select type (model => case%models(get_model_number(case))%model)
-      type is (hollow_sphere_type)
-         allocate (fields, source=get_active_fields(case))
-         fields = fields(columns%place)
-         suits = case%level_method == 'exact' .and. .not. case%has_floor .and. all([(fields(i)%group == 'ball' &
-            .or. fields(i)%group == 'drop' .or. fields(i)%owner == case%model, i=1, size(fields))])
-      end select
-   end function suits_batch
-
    !> Drops of the shell model in batches.
    subroutine solve_batch(case, columns, values, threads, many, error)
       type(case_type), intent(in), target :: case
@@ -366,44 +346,5 @@ contains
          if (many%judged .and. many%status(i) == 0) call judge(case, i, many)
       end do
    end subroutine solve_batch
-
-   !> Parameter sets of the shell model.
-   subroutine fill_sets(case, columns, values, sets)
-      !> The case, which gives what is not in the columns.
-      type(case_type), intent(in), target :: case
-      !> In what the drops differ: [n_column].
-      type(column_type), intent(in) :: columns(:)
-      !> Their values: [n_column, n_drop].
-      real(wp), intent(in) :: values(:, :)
-      !> The sets: [n_drop].
-      type(set_type), intent(out) :: sets(:)
-      type(set_type), target :: set
-      type(field_type), allocatable :: fields(:), set_fields(:)
-      integer :: place(size(columns))
-      integer :: i, j
-
-      set%ball = case%ball
-      set%drop = case%drop
-      allocate (fields, source=get_active_fields(case))
-      allocate (set_fields, source=get_set_fields(set))
-      ! The only other key is the choice of the flux term.
-      place = [(findloc(set_fields%key == fields(columns(j)%place)%key, .true., dim=1), j=1, size(columns))]
-      select type (model => case%models(get_model_number(case))%model)
-      type is (hollow_sphere_type)
-         set%flux = findloc(flux_choices == model%momentum_flux, .true., dim=1)
-      end select
-      do i = 1, size(sets)
-         do j = 1, size(columns)
-            if (place(j) > 0) then
-               set_fields(place(j))%real_value = values(j, i)
-            else
-               set%flux = nint(values(j, i))
-               ! A number that is not whole chooses nothing.
-               if (abs(values(j, i) - set%flux) > 0.0_wp) set%flux = 0
-            end if
-         end do
-         sets(i) = set
-      end do
-   end subroutine fill_sets
 
 end module thud_many
