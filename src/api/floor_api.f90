@@ -14,7 +14,7 @@ module thud_floor_api
    use thud_receiver, only: get_mobility, receiver_type
    use thud_remarks, only: add_floor_remark, remark_length
    use thud_result_bundle, only: add_history, add_remarks
-   use thud_room, only: get_room_bands, room_level_type
+   use thud_room, only: few_modes, get_room_bands, room_level_type
    use thud_system, only: begin_call, end_call
    implicit none (type, external)
    private
@@ -190,6 +190,7 @@ contains
       if (.not. allocated(error)) then
          n = n_band
          call bundle%add_number('surface_mass', prediction%surface_mass)
+         call bundle%add_number('few_modes', few_modes)
          call bundle%add_array('bands.conductance', n, prediction%conductance)
          call bundle%add_array('bands.frequency', n, prediction%bands%nominal)
          call bundle%add_array('bands.energy', n, prediction%energy)

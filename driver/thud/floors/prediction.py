@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from thud._schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
-# Modes of a third below which a statistical answer is doubtful.
-FEW_MODES = 5
 # Change of the force by a floor that gives way, dB, from which it is remarked.
 NOTICED = 0.1
 
@@ -53,6 +51,8 @@ class RoomPrediction(Displayed):
         Reverberation time of the room, s.
     floor_modes, room_modes : ndarray, shape (12,)
         Expected number of modes in each third.
+    few_modes : float
+        Number of modes below which the statistical answer of a third is doubtful.
     surface_mass : float
         Mass of the radiating plate over its area, kg/m2.
     spread : ndarray, shape (12,)
@@ -91,6 +91,7 @@ class RoomPrediction(Displayed):
     floor_modes: NDArray[np.float64]
     room_modes: NDArray[np.float64]
     conductance: NDArray[np.float64]
+    few_modes: float
     surface_mass: float
     spread: NDArray[np.float64]
     octave_level: NDArray[np.float64]
@@ -135,7 +136,7 @@ class RoomPrediction(Displayed):
     @property
     def has_few_modes(self) -> NDArray[np.bool_]:
         """Whether a third has few modes of floor or room, shape (12,)."""
-        return np.minimum(self.floor_modes, self.room_modes) < FEW_MODES
+        return np.minimum(self.floor_modes, self.room_modes) < self.few_modes
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -145,9 +146,9 @@ class RoomPrediction(Displayed):
         if few.any():
             bands = ", ".join(f"{f:g}" for f in self.frequency[few])
             found.append(
-                f"fewer than {FEW_MODES} modes of floor or room at {bands} Hz: levels there are "
-                "means over many floors and rooms; single positions are expected to differ with a "
-                f"standard deviation of {self.spread[few].max():.1f} to "
+                f"fewer than {self.few_modes:g} modes of floor or room at {bands} Hz: levels there "
+                "are means over many floors and rooms; single positions are expected to differ "
+                f"with a standard deviation of {self.spread[few].max():.1f} to "
                 f"{self.spread[few].min():.1f} dB"
             )
         if self.force == "blocked" and abs(self.force_change) > NOTICED:
@@ -250,6 +251,7 @@ def predict_level(
         force_change=change,
         floor_remarks=tuple(map(text, found.get("remarks", {}).values())),
         time_of_maximum=bands.pop("time"),
+        few_modes=found["few_modes"],
         surface_mass=found["surface_mass"],
         octave_level=found["octaves"]["level"],
         octave_time=found["octaves"]["time"],
