@@ -22,9 +22,10 @@ from thud.display import MAKERS
 from thud.ensemble import solve_many
 from thud.errors import FitWarning, InputError, NumericalError, PlausibilityWarning, ThudError
 from thud.extras import require_extra
+from thud.floor_impact import FloorEnergy, FloorImpact, new_floor_impact
 from thud.floors.mobility import mobility
 from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import FloorEnergy, FloorImpact, Impact, solve_case
+from thud.impact import Impact, solve_case
 from thud.levels import Bands, force_exposure_levels, get_bands, judge
 from thud.motion import Motion
 from thud.outcomes import Ensemble
@@ -183,6 +184,7 @@ def _maker(module: str, function: str) -> Callable[..., object]:
 MAKERS.update(
     figure=_maker("plot.overview", "overview"),
     floor=_maker("plot.floor", "draw_floor"),
+    floor_impact=new_floor_impact,
     impedance=_maker("plot.impedance", "ball_impedances"),
     compression=_maker("plot.compression", "compression"),
     compression_table=_maker("export", "compression_table"),

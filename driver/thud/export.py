@@ -10,7 +10,8 @@ import pandas as pd
 import xarray as xr
 
 from thud._schema import SCALARS
-from thud.impact import FloorImpact, Impact
+from thud.floor_impact import FloorImpact
+from thud.impact import Impact
 from thud.keys import find_key, users
 from thud.levels import BANDWIDTHS
 from thud.outcomes import FURTHER, ROOM_LEVEL

@@ -19,7 +19,8 @@ from thud.case import Case
 from thud.checks import refuse
 from thud.errors import PlausibilityWarning, ThudError
 from thud.files import MANIFEST, locked, read_manifest
-from thud.impact import FloorImpact, Impact
+from thud.floor_impact import FloorImpact
+from thud.impact import Impact
 from thud.motion import Motion
 
 if TYPE_CHECKING:

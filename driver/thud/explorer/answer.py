@@ -11,8 +11,9 @@ from thud.case import tables_case
 from thud.checks import refuse, shown
 from thud.ensemble import get_cost
 from thud.errors import ThudError
+from thud.floor_impact import FloorImpact
 from thud.floors.prediction import predict_level
-from thud.impact import FloorImpact, compute
+from thud.impact import compute
 from thud.keys import plain_words
 from thud.levels import get_bands
 from thud.plot.force_history import contact_force

@@ -13,7 +13,8 @@ from thud._schema import BandSet, InfinitePlate
 from thud.case import Case, case_text
 from thud.checks import refuse, refuse_value, require_array, require_kind, require_real
 from thud.display import MAKERS, Displayed
-from thud.impact import Impact, new_floor_impact
+from thud.floor_impact import new_floor_impact
+from thud.impact import Impact
 from thud.levels import force_exposure_levels, get_bands
 
 if TYPE_CHECKING:

@@ -12,9 +12,10 @@ from thud._api import call, floor_api, text
 from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
+from thud.floor_impact import FloorImpact, new_floor_impact
 from thud.floors.rating import Rating, rated_bands, rating, standardised_level
 from thud.floors.survey import RoomLevels
-from thud.impact import FloorImpact, Impact, new_floor_impact
+from thud.impact import Impact
 from thud.levels import BANDWIDTHS, get_bands
 from thud.recordings.recording import Recording
 

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.impact import FloorImpact, Impact
+    from thud.floor_impact import FloorImpact
+    from thud.impact import Impact
 
 THIRDS = BANDWIDTHS[1]
 # Contact times that are drawn.
