@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import fields, replace
+from functools import cache
 from typing import TYPE_CHECKING
 
 import thud
@@ -25,13 +26,15 @@ FLOOR_SHARE = {"infinite_plate": 80, "oscillator": 60, "measured_mobility": 30, 
 MOST_STEPS = {"": 20_000, "infinite_plate": 1500, "oscillator": 1500, "measured_mobility": 1500}
 FEW_STEPS = 300
 # Steps of a tyre, which chooses them itself.
-TYRE_STEPS = 3e5
+TYRE_STEPS = 1e5
 
 
-def draw_case(model: str, chance: random.Random) -> thud.Case:
+def draw_case(
+    model: str, chance: random.Random, floors: int = sum(FLOOR_SHARE.values())
+) -> thud.Case:
     """Return a case that takes no long time."""
     while True:
-        case = _any_case(model, chance)
+        case = _any_case(model, chance, floors)
         if not isinstance(case.model, thud.TwoMass) or _tyre_steps(case) < TYRE_STEPS:
             return case
 
@@ -48,7 +51,7 @@ def _tyre_steps(case: thud.Case) -> float:
     return sampling.substeps * sampling.duration * steps
 
 
-def _any_case(model: str, chance: random.Random) -> thud.Case:
+def _any_case(model: str, chance: random.Random, floors: int) -> thud.Case:
     """Return a case; keys that are not drawn from their whole range are near their defaults."""
     part = chance.choice([0.1, 0.2, 0.4, 1.0])
     ball = _vary(thud.Ball(), "", "ball", chance, part)
@@ -59,7 +62,7 @@ def _any_case(model: str, chance: random.Random) -> thud.Case:
         _vary(MODELS[model](), model, "", chance, part), ball, chance
     )
     floor = None
-    if model != "measured_modes" and chance.random() * 1000 < sum(FLOOR_SHARE.values()):
+    if model != "measured_modes" and chance.random() * 1000 < floors:
         name = chance.choices(list(FLOOR_SHARE), list(FLOOR_SHARE.values()))[0]
         floor = _vary(FLOORS[name](), name, "", chance, part)
         if name == "measured_mobility":
@@ -71,9 +74,7 @@ def _any_case(model: str, chance: random.Random) -> thud.Case:
 def _vary(group: Group, owner: str, name: str, chance: random.Random, part: float) -> Group:
     """Return a group with a part of its keys drawn from their whole ranges."""
     values = {one.name: getattr(group, one.name) for one in fields(group)}
-    for key in KEYS:
-        if key.owner != owner or (name and key.group != name) or key.kind in ("list", "text"):
-            continue
+    for key in _keys(owner, name):
         if chance.random() < part:
             values[key.name] = _draw(key, values, chance)
         elif key.kind == "real" and chance.random() < 0.5:
@@ -81,6 +82,13 @@ def _vary(group: Group, owner: str, name: str, chance: random.Random, part: floa
             near = values[key.name] * math.exp(chance.gauss(0, 0.5))
             values[key.name] = min(max(near, low), high)
     return type(group)(**values)
+
+
+@cache
+def _keys(owner: str, name: str) -> list[Key]:
+    """Return the keys of an owner, or of a group, but for lists and texts."""
+    found = [key for key in KEYS if key.owner == owner and name in ("", key.group)]
+    return [key for key in found if key.kind not in ("list", "text")]
 
 
 def _draw(key: Key, values: dict[str, object], chance: random.Random) -> object:
@@ -100,9 +108,9 @@ def _draw(key: Key, values: dict[str, object], chance: random.Random) -> object:
 
 def _end(end: float | str, values: dict[str, object]) -> float:
     """Return the end of a range; a text is a product or quotient of numbers and keys."""
-    known = {word: str(value) for word, value in values.items()}
     if isinstance(end, float):
         return end
+    known = {word: str(value) for word, value in values.items()}
     first, *rest = re.split(r"([*/])", end)
     value = float(known.get(first, first))
     for sign, word in zip(rest[::2], rest[1::2], strict=True):

@@ -10,10 +10,11 @@ import multiprocessing
 import warnings
 from typing import TYPE_CHECKING
 
+import numpy as np
 from campaign import Finding
 from edge_cases import LUMPED, WEIGHTS, draw_case
 from edge_comparisons import COMPARISONS
-from edge_laws import get_fault
+from edge_laws import BALANCE, get_fault
 
 import thud
 from thud.case import case_text
@@ -27,6 +28,43 @@ if TYPE_CHECKING:
 def check_lumped(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
     """Try lumped models."""
     return [_try(chance.choices(LUMPED, WEIGHTS)[0], chance) for _, chance in tries]
+
+
+def check_many(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+    """Try lumped models on a rigid floor by `thud.solve_many`."""
+    models = LUMPED[:2]
+    cases = [draw_case(chance.choices(models, WEIGHTS[:2])[0], chance, 0) for _, chance in tries]
+    found: dict[int, Finding] = {}
+    for name in models:
+        places = [place for place, case in enumerate(cases) if case.model.name == name]
+        found |= zip(places, _many([cases[place] for place in places]), strict=True)
+    return [found[place] for place in range(len(cases))]
+
+
+def _many(cases: list[thud.Case]) -> Iterable[Finding]:
+    """Yield what becomes of cases of one model."""
+    if not cases:
+        return
+    groups = [(case.ball, case.drop, case.sampling, case.model) for case in cases]
+    values = [{key: value for group in one for key, value in vars(group).items()} for one in groups]
+    columns = {key: [one[key] for one in values] for key in values[0]}
+    many = thud.solve_many(columns, thud.Case(model=type(cases[0].model)()), threads=1)
+    for i, case in enumerate(cases):
+        if many.status[i] != 0:
+            yield Finding("refused")
+            continue
+        velocity = (2 * case.drop.gravity * case.drop.height) ** 0.5
+        rebound = many.impulse[i] / (case.ball.mass * velocity) - 1
+        numbers = (many.contact_time[i], many.peak_force[i], many.max_deflection[i])
+        levels = many.levels["floor", "octave"][i]
+        right = (
+            all(0 < number < np.inf for number in numbers)
+            and -BALANCE <= many.restitution[i] <= 1 + BALANCE
+            and abs(rebound - many.restitution[i]) < 3 * BALANCE
+            and many.contact_time[i] <= case.sampling.duration + 1 / case.sampling.sample_rate
+            and np.isfinite(levels).all()
+        )
+        yield Finding("computed") if right else Finding("wrong", f"{many.restitution[i]} {case!r}")
 
 
 def check_modal(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:

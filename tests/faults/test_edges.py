@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-@pytest.mark.parametrize("name", ["lumped", "modal", "elements"])
+@pytest.mark.parametrize("name", ["many", "lumped", "modal", "elements"])
 def test_no_wrong_number_without_a_word(name: str, tmp_path: Path) -> None:
     seed = time.time_ns()
     report = Report(seed)
