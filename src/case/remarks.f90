@@ -90,7 +90,7 @@ contains
       integer :: i
 
       associate (model => case%models(get_model_number(case))%model)
-         limits = [get_rate_limit(case%sampling), model%get_theory_limits(case%ball, case%drop, history), &
+         limits = [get_rate_limit(case%sampling), model%get_theory_limits(case%ball, case%drop, case%sampling, history), &
             theory_limit_type('model', 'restitution less 1', history%restitution - 1, highest=restitution_error, &
             reason='it gives energy to the source'), &
             theory_limit_type('floor', 'restitution', history%restitution, lowest=-restitution_error, &

@@ -93,10 +93,11 @@ contains
    end function get_paper_modulus
 
    !> Limits of what the mesh resolves: beyond them octaves are off by more than about 0.5 dB (docs/finite_elements.md).
-   function get_theory_limits(ball, drop, options, history) result(limits)
+   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(finite_element_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       !> The answer.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].

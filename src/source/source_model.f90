@@ -103,10 +103,11 @@ contains
    end function get_paper_modulus
 
    !> Limits of the theory of the model in an answer; by default gravity, which models leave out.
-   function get_theory_limits(ball, drop, options, history) result(limits)
+   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(source_model_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       !> The answer.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].

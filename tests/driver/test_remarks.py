@@ -89,6 +89,10 @@ OUTSIDE = {
     "&mesh: radius of the contact over the length of an element is 2.2": "&drop height = 0.01 /"
     " &ball youngs_modulus = 2.08e6 / &model name = 'finite_element' / &mesh polar_elements = 32 /",
     "&modal_ball: rings in contact is 1": "&drop height = 0.03 / &model name = 'modal_ball' /",
+    "&sampling: sample_rate in Hz times substeps is 12000.0, the theory holds from 1": "&sampling"
+    " sample_rate = 12000 / &model name = 'modal_ball' /",
+    "&modal_ball: radial_modes is 4.0, the theory holds from 5.0": "&model name = 'modal_ball' /"
+    " &modal_ball radial_modes = 4 /",
     "&modal_ball: harmonics times the angle of the contact is 6": "&model name = 'modal_ball' /"
     " &modal_ball harmonics = 12 /",
     "&modal_ball: harmonics times wall_thickness over outer_radius is 1": "&ball mass = 0.2,"

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 # What must never happen; every other finding is fine.
-FAULTS = ("crashed", "hung", "NaN", "lost", "mixed", "raw", "grown", "left behind")
+FAULTS = ("crashed", "hung", "NaN", "lost", "mixed", "raw", "grown", "left behind", "wrong")
 
 
 class Finding(NamedTuple):

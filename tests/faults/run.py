@@ -1,4 +1,4 @@
-"""The campaign of faults: nothing crashes, hangs, is lost or mixed, and no result is not a number.
+"""The campaign of faults: nothing crashes, hangs, is lost or mixed, no number is wrong.
 
 `python tests/faults/run.py` makes all of it, which takes hours, and goes on after an interrupt;
 `--small` makes tries spread over all of it. Exit code 1 where a fault was found.
@@ -15,6 +15,7 @@ from pathlib import Path
 from attempts import attempts
 from campaign import Part, Report
 from directories import check_calls, check_damage, check_races, plan
+from edges import check_elements, check_lumped, check_many, check_modal
 from memory import check_memory
 
 
@@ -29,6 +30,10 @@ def parts() -> dict[str, Part]:
         "recordings": Part(100_000, 60, attempts("damaged_recordings"), share=2000),
         "studies": Part(100_000, 60, attempts("study_files"), share=2000),
         "tables": Part(10_000, 60, attempts("table_files"), share=1000),
+        "many": Part(100_000, 200, check_many, share=2000),
+        "lumped": Part(20_000, 60, check_lumped, share=100),
+        "modal": Part(10_000, 8, check_modal, share=10),
+        "elements": Part(1000, 4, check_elements, share=4),
     }
 
 

@@ -88,10 +88,11 @@ contains
    end function get_paper_modulus
 
    !> Limits of shell theory, of a wall that stays near the sphere, and of a contact without gravity.
-   function get_theory_limits(ball, drop, options, history) result(limits)
+   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(hollow_sphere_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       !> The answer.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].

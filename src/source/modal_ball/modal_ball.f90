@@ -73,10 +73,11 @@ contains
 
    !> Limits of linear modes, and of what rings and harmonics resolve: beyond them the octave of 500 Hz is off by more than
    !> about 0.5 dB (docs/modal_ball.md).
-   function get_theory_limits(ball, drop, options, history) result(limits)
+   function get_theory_limits(ball, drop, options, sampling, history) result(limits)
       type(ball_type), intent(in) :: ball
       type(drop_type), intent(in) :: drop
       class(modal_ball_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
       !> The answer.
       type(force_history_type), intent(in) :: history
       !> The limits: [n_limit].
@@ -85,6 +86,11 @@ contains
 
       angle = asin(min(1.0_wp, maxval(history%channel(:, 1))/ball%outer_radius))
       limits = [get_wall_limits(ball, history), &
+         theory_limit_type('sampling', 'sample_rate in Hz times substeps', &
+         sampling%sample_rate*real(sampling%substeps, wp), lowest=16000.0_wp, &
+         reason='longer steps leave fast modes out'), &
+         theory_limit_type('modal_ball', 'radial_modes', real(options%radial_modes, wp), lowest=5.0_wp, &
+         reason='with fewer the level at 500 Hz is off, by up to 13 dB'), &
          theory_limit_type('modal_ball', 'rings in contact', angle/outermost_angle*options%rings, lowest=14.0_wp, &
          reason='fewer rings do not resolve the contact'), &
          theory_limit_type('modal_ball', 'harmonics times the angle of the contact', options%harmonics*angle, &

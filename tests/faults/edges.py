@@ -1,0 +1,109 @@
+"""Numbers at the edges: keys over their whole ranges; no wrong number without a word.
+
+What `edge_cases` draws and thud does not refuse is held against `edge_laws` and, of a share,
+`edge_comparisons`.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+from campaign import Finding
+from edge_cases import LUMPED, WEIGHTS, draw_case
+from edge_comparisons import COMPARISONS
+from edge_laws import BALANCE, get_fault
+
+import thud
+from thud.case import case_text
+
+if TYPE_CHECKING:
+    import random
+    from collections.abc import Iterable
+    from pathlib import Path
+
+
+def check_lumped(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+    """Try lumped models."""
+    return [_try(chance.choices(LUMPED, WEIGHTS)[0], chance) for _, chance in tries]
+
+
+def check_many(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+    """Try lumped models on a rigid floor by `thud.solve_many`."""
+    models = LUMPED[:2]
+    cases = [draw_case(chance.choices(models, WEIGHTS[:2])[0], chance, 0) for _, chance in tries]
+    found: dict[int, Finding] = {}
+    for name in models:
+        places = [place for place, case in enumerate(cases) if case.model.name == name]
+        found |= zip(places, _many([cases[place] for place in places]), strict=True)
+    return [found[place] for place in range(len(cases))]
+
+
+def _many(cases: list[thud.Case]) -> Iterable[Finding]:
+    """Yield what becomes of cases of one model."""
+    if not cases:
+        return
+    groups = [(case.ball, case.drop, case.sampling, case.model) for case in cases]
+    values = [{key: value for group in one for key, value in vars(group).items()} for one in groups]
+    columns = {key: [one[key] for one in values] for key in values[0]}
+    many = thud.solve_many(columns, thud.Case(model=type(cases[0].model)()), threads=1)
+    for i, case in enumerate(cases):
+        if many.status[i] != 0:
+            yield Finding("refused")
+            continue
+        velocity = (2 * case.drop.gravity * case.drop.height) ** 0.5
+        rebound = many.impulse[i] / (case.ball.mass * velocity) - 1
+        numbers = (many.contact_time[i], many.peak_force[i], many.max_deflection[i])
+        levels = many.levels["floor", "octave"][i]
+        right = (
+            all(0 < number < np.inf for number in numbers)
+            and -BALANCE <= many.restitution[i] <= 1 + BALANCE
+            and abs(rebound - many.restitution[i]) < 3 * BALANCE
+            and many.contact_time[i] <= case.sampling.duration + 1 / case.sampling.sample_rate
+            and np.isfinite(levels).all()
+        )
+        yield Finding("computed") if right else Finding("wrong", f"{many.restitution[i]} {case!r}")
+
+
+def check_modal(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+    """Try the modal ball."""
+    return [_try_in_time("modal_ball", chance, 20) for _, chance in tries]
+
+
+def check_elements(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+    """Try finite elements, with small meshes."""
+    return [_try_in_time("finite_element", chance, 15) for _, chance in tries]
+
+
+def _try_in_time(model: str, chance: random.Random, seconds: float) -> Finding:
+    """Try in another process, which is stopped after some time."""
+    context = multiprocessing.get_context("fork")
+    here, there = context.Pipe(duplex=False)
+    process = context.Process(target=lambda: there.send(_try(model, chance)))
+    process.start()
+    there.close()
+    try:
+        found: Finding = here.recv() if here.poll(seconds) else Finding("stopped")
+    except EOFError:
+        found = Finding("crashed", model)
+    process.kill()
+    process.join()
+    return found
+
+
+def _try(model: str, chance: random.Random) -> Finding:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            case = draw_case(model, chance)
+            impact = thud.solve_case(case)
+            wrong = get_fault(impact)
+            if not wrong and chance.random() < (0.1 if model in LUMPED else 0.05):
+                wrong = chance.choice(COMPARISONS)(impact, chance)
+        except thud.ThudError as error:
+            return Finding("NaN", str(error)) if "NaN" in str(error) else Finding("refused")
+    if wrong:
+        return Finding("wrong", f"{wrong}; {case_text(case).decode().split()} {impact.remarks}")
+    return Finding("remarked" if impact.remarks else "computed")
