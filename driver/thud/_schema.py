@@ -380,8 +380,8 @@ class FiniteElement(Group):
         Law of viscosity; "none", "kelvin_voigt", "fractional", "constant_loss", "prony"; group
         ``&material``.
     loss_factor : float
-        Loss factor at loss_frequency, of kelvin_voigt and fractional; over 10 to 1000 Hz, of
-        constant_l; 0 < loss_factor <= 1; group ``&material``.
+        Loss factor at loss_frequency, of kelvin_voigt, fractional; over 10 to 1000 Hz, of
+        constant_loss; 0 < loss_factor <= 1; group ``&material``.
     loss_frequency : float
         Where the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <= 10000; group
         ``&material``.
@@ -880,7 +880,7 @@ KEYS = (
     Key("finite_element", "material", "mooney_share", "real", "", "part of the shear modulus with the second invariant, of mooney_rivlin", (), 0.0, 1.0),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
     Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony')),
-    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt and fractional; over 10 to 1000 Hz, of constant_l", (), 0.0, 1.0),
+    Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt, fractional; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
     Key("finite_element", "material", "loss_frequency", "real", "Hz", "where the ball's modulus is the storage modulus", (), 1.0, 10000.0),
     Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, of fractional; 1: kelvin_voigt", (), 0.0, 1.0),
     Key("finite_element", "material", "prony_share", "list", "", "moduli over the long-term modulus, of prony", (), 0.0, 1000.0),

@@ -75,7 +75,7 @@ contains
          "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &
          [character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
-         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt and ' &
+         real_field('loss_factor', options%loss_factor, '', 'loss factor at loss_frequency, of kelvin_voigt, ' &
          //'fractional; over 10 to 1000 Hz, of constant_loss', '(0, 1]'), &
          real_field('loss_frequency', options%loss_frequency, 'Hz', &
          "where the ball's modulus is the storage modulus", '[1, 10000]'), &

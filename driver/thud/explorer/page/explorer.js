@@ -143,7 +143,12 @@ async function link() {
 
 function listen() {
   byId("form").addEventListener("submit", (event) => event.preventDefault());
-  const rebuild = () => { build(changed); changed(); };
+  const rebuild = () => {
+    // What is being typed counts before its field is replaced.
+    if (byId("form").contains(document.activeElement) && document.activeElement.matches("input")) document.activeElement.blur();
+    build(changed);
+    changed();
+  };
   byId("model").addEventListener("change", (event) => { state.model = event.target.value; rebuild(); });
   byId("floor").addEventListener("change", (event) => {
     state.floor = event.target.value;

@@ -101,7 +101,7 @@ function groupElement(group, open, changed) {
 
 function fieldElement(field, changed) {
   const id = `${field.group}.${field.name}`;
-  const label = element("label", { for: id, id: `${id}.label`, title: field.help }, field.unit ? `${field.label}, ${field.unit}` : field.label);
+  const label = element("label", { for: id, title: field.help }, field.unit ? `${field.label}, ${field.unit}` : field.label);
   const take = (value) => { put(field, value); changed(); };
   const make = { choice: choiceInput, flag: flagInput, list: listInput }[field.kind] ?? numberInput;
   const inputs = make(field, id, take);
@@ -146,7 +146,7 @@ function numberInput(field, id, take) {
     state.moved[key] = [Math.min(ends[0], found), Math.max(ends[1], found)];
     take(found);
   };
-  const slider = field.slider ? sliderInput(field, id, value, (given) => {
+  const slider = field.slider ? sliderInput(field, value, (given) => {
     number.value = given;
     number.setAttribute("aria-invalid", "false");
     send(given);
@@ -162,12 +162,12 @@ function numberInput(field, id, take) {
 }
 
 /** Return a slider; that of a positive number moves in its logarithm. */
-function sliderInput(field, id, value, moved) {
+function sliderInput(field, value, moved) {
   const { ends: [low, high], log } = field.slider;
   const whole = field.kind === "whole";
   const to = log ? Math.log : (x) => x;
   const from = log ? Math.exp : (x) => x;
-  const slider = element("input", { type: "range", "aria-labelledby": `${id}.label`, min: to(low), max: to(high), step: whole ? 1 : "any" });
+  const slider = element("input", { type: "range", "aria-label": field.label, min: to(low), max: to(high), step: whole ? 1 : "any" });
   const say = (given) => slider.setAttribute("aria-valuetext", `${given} ${field.unit}`.trim());
   slider.place = (given) => { slider.value = to(given); say(given); };
   slider.place(value);

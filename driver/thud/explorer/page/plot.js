@@ -33,7 +33,7 @@ function render(host) {
   const given = shown.get(host);
   const [width, height] = [host.clientWidth, host.clientHeight];
   if (!given || !width || !height) return;
-  const small = width < 260;
+  const small = width < 260 || height < 160;
   const across = given.x.bands ? [-0.5, given.x.bands.length - 0.5] : range(given.curves.map((one) => one.x));
   const up = padded(range([...given.curves.map((one) => one.y), (given.limits ?? []).flat(), given.y.zero ? [0] : []]));
   const marksUp = ticks(up, height < 180 ? 4 : 6);
@@ -80,6 +80,8 @@ function render(host) {
     const inside = event.offsetX >= box.left && event.offsetX <= box.right;
     reading.setAttribute("visibility", inside ? "visible" : "hidden");
     words.hidden = !inside;
+    // Beside the cursor, not under it.
+    words.classList.toggle("left", event.offsetX > (box.left + box.right) / 2);
   });
   image.addEventListener("pointerleave", () => { words.hidden = true; reading.setAttribute("visibility", "hidden"); });
   host.replaceChildren(image, words);
