@@ -17,4 +17,4 @@ endforeach()
 # The executable stands beside the library; a script of its name starts it.
 set_target_properties(thud PROPERTIES INSTALL_RPATH "$ORIGIN")
 install(TARGETS thud_library thud DESTINATION ${place})
-install(PROGRAMS "${PROJECT_SOURCE_DIR}/driver/start_executable.py" DESTINATION "${SKBUILD_SCRIPTS_DIR}" RENAME thud)
+install(PROGRAMS "${PROJECT_SOURCE_DIR}/driver/start_executable.sh" DESTINATION "${SKBUILD_SCRIPTS_DIR}" RENAME thud)
