@@ -15,6 +15,7 @@ from pathlib import Path
 from attempts import attempts
 from campaign import Part, Report
 from directories import check_calls, check_damage, check_races, plan
+from kills import check_kills, check_slow_kills
 from memory import check_memory
 
 
@@ -24,6 +25,8 @@ def parts() -> dict[str, Part]:
         "calls": Part(len(plan()), 60, check_calls),
         "races": Part(80, 8, check_races),
         "damage": Part(10_000, 60, check_damage, share=100),
+        "kills": Part(10_000, 20, check_kills),
+        "slow kills": Part(500, 1, check_slow_kills),
         "memory": Part(1000, 12, check_memory),
         "namelists": Part(1_000_000, 400, attempts("namelists"), share=5000),
         "recordings": Part(100_000, 60, attempts("damaged_recordings"), share=2000),
