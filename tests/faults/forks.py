@@ -220,7 +220,9 @@ def _log_work() -> None:
 
         def log(self: object, first: object, *rest: object) -> None:
             usual(self, first, *rest)
-            done = f"{getattr(first, 'start', first)}\n".encode()
+            if "FAULT_AT" in os.environ:
+                return
+            done = f"{getattr(self, 'path', '')}:{getattr(first, 'start', first)}\n".encode()
             descriptor = os.open(WORK, os.O_WRONLY | os.O_CREAT | os.O_APPEND)
             os.write(descriptor, done)
             os.close(descriptor)
