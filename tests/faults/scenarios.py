@@ -71,7 +71,7 @@ class Scenario(NamedTuple):
         """Return the command with the older or the newer input."""
         found = [word.replace("IN", which) for word in self.command]
         if "SCHEDULER" in found:
-            found[found.index("SCHEDULER")] = scheduler()
+            found[found.index("SCHEDULER")] = cluster()[0]
         return [*found, "--replace"] if self.study else found
 
 
@@ -101,13 +101,13 @@ SCENARIOS = {
 
 
 @cache
-def scheduler() -> str:
+def cluster() -> tuple[str, subprocess.Popen[str]]:
     """Return the address of a scheduler of Dask with two workers, which end with this process."""
     process = subprocess.Popen(
         [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     )
     assert process.stdout
-    return process.stdout.readline().strip()
+    return process.stdout.readline().strip(), process
 
 
 @cache
