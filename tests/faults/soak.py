@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import os
 from functools import cache
@@ -50,6 +51,8 @@ def check_soak(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Find
         name = chance.choice(list(calls))
         found.append(Finding("same" if same(calls[name](), expected[name]) else "mixed", name))
     gc.collect()
+    # The pool of freed memory changes by itself.
+    ctypes.CDLL(None).malloc_trim(0)
     _sizes().append(int(Path("/proc/self/statm").read_text().split()[1]) * PAGE)
     if _handles() > handles or growth() > GROWTH:
         detail = (
