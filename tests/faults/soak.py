@@ -58,7 +58,7 @@ def check_soak(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Find
         detail = (
             f"{_handles() - handles} descriptors, {growth():.3%} of {_sizes()[-1] / 1e6:.0f} MB"
         )
-        found[-1] = Finding("leaked", detail)
+        found[-1] = Finding("grown", detail)
     return found
 
 
