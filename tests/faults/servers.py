@@ -97,6 +97,8 @@ def check_explorer(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[
             found = f"hung: {error!r}"
         except OSError as error:
             found = f"crashed: {error!r}"
+        except (http.client.HTTPException, ValueError, LookupError) as error:
+            found = f"lost: {error!r}"
         word, _, what = (found or _well(explorer())).partition(": ")
         if explorer().process.poll() is not None:
             word, what = "crashed", f"the server has ended: {what}"
@@ -109,8 +111,8 @@ def _well(server: Explorer) -> str:
     if "Traceback" in (said := server.screen.read_text()):
         server.screen.write_text("")
         return f"crashed: {said[-1000:]}"
-    status, content = server.ask("/solve", json.dumps({"drop": {"height": 1.0}}).encode())
-    if status != 200 or json.loads(content) | {"seconds": 0} != _expected(1.0):
+    status, content = server.ask("/solve", _case(1.0, "hollow_sphere"))
+    if status != 200 or not _same(content, 1.0, "hollow_sphere"):
         return f"mixed: {status}, {content[:300]!r}"
     until = time.monotonic() + PATIENCE
     while server.workers():
@@ -120,12 +122,24 @@ def _well(server: Explorer) -> str:
     return ""
 
 
+def _case(height: float, model: str) -> bytes:
+    """Return the request of a case; one of the models is answered at once, one by a process."""
+    mesh = {"mesh": {"polar_elements": 8}} if model == "finite_element" else {}
+    return json.dumps({"drop": {"height": height}, "model": {"name": model}, **mesh}).encode()
+
+
 @cache
-def _expected(height: float) -> dict[str, Any]:
+def _expected(height: float, model: str) -> dict[str, Any]:
     from thud.explorer.answer import answer_case, new_case  # noqa: PLC0415 - an extra
 
-    found = answer_case(new_case({"drop": {"height": height}}))
+    found = answer_case(new_case(json.loads(_case(height, model))))
     return json.loads(json.dumps(found)) | {"seconds": 0}  # type: ignore[no-any-return]
+
+
+def _same(content: bytes, height: float, model: str) -> bool:
+    """Return whether the last report of an answer is that of a case."""
+    answer = json.loads(content.splitlines()[-1])["answer"]
+    return bool(answer | {"seconds": 0} == _expected(height, model))
 
 
 def _judged(status: int, content: bytes) -> str:
@@ -146,7 +160,7 @@ def _hostile_case(server: Explorer, chance: random.Random) -> str:
     if chance.random() < 0.3:
         at = chance.randrange(len(body) + 1)
         body = body[:at] + chance.randbytes(3) + body[at:]
-    path = chance.choice(["/solve", "/solve_slowly", "/download/case.nml", "/download/force.csv"])
+    path = chance.choice(["/solve", "/download/case.nml", "/download/force.csv"])
     return _judged(*server.ask(path, body))
 
 
@@ -179,24 +193,18 @@ def _stranger(server: Explorer, chance: random.Random) -> str:
 
 def _two_users(server: Explorer, chance: random.Random) -> str:
     def use(height: float) -> bool:
-        asked = json.dumps({"drop": {"height": height}}).encode()
-        paths = [chance.choice(["/solve", "/solve_slowly"]) for _ in range(3)]
-        return all(_same(server.ask(path, asked)[1], height) for path in paths)
+        models = [chance.choice(["hollow_sphere", "finite_element"]) for _ in range(3)]
+        return all(_same(server.ask("/solve", _case(height, m))[1], height, m) for m in models)
 
     with ThreadPoolExecutor(4) as users:
         well = all(users.map(use, (0.5, 1.0, 0.7, 1.3)))
     return "" if well else "mixed: the answer of another user"
 
 
-def _same(content: bytes, height: float) -> bool:
-    last = json.loads(content.splitlines()[-1])
-    return last.get("answer", last) | {"seconds": 0} == _expected(height)
-
-
 def _work(server: Explorer) -> http.client.HTTPConnection:
     """Begin work that takes minutes; return its connection once it is under way."""
     connection = http.client.HTTPConnection(HOST, server.port, timeout=PATIENCE)
-    connection.request("POST", "/solve_slowly", json.dumps(LONG), {TOKEN: server.token})
+    connection.request("POST", "/solve", json.dumps(LONG), {TOKEN: server.token})
     until = time.monotonic() + PATIENCE
     while not server.workers() and time.monotonic() < until:
         time.sleep(0.01)
@@ -228,8 +236,8 @@ def _stop_work(server: Explorer, chance: random.Random) -> str:
     time.sleep(chance.uniform(0, 0.1))
     for worker in server.workers():
         os.kill(worker.pid, signal.SIGSTOP)
-    asked = json.dumps({"drop": {"height": 0.7}}).encode()
-    well = _same(server.ask("/solve_slowly", asked)[1], 0.7)
+    asked = _case(0.7, "finite_element")
+    well = _same(server.ask("/solve", asked)[1], 0.7, "finite_element")
     connection.close()
     return "" if well else "mixed: the answer beside a stopped one"
 
