@@ -76,7 +76,7 @@ class Done(NamedTuple):
 
 
 class Forks:
-    """A process that has imported thud and forks for each command; a context manager."""
+    """A process that has imported thud and forks for each command."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
@@ -94,12 +94,6 @@ class Forks:
         self._process.stdin.write(json.dumps(order) + "\n")
         self._process.stdin.flush()
         return Done(*json.loads(self._process.stdout.readline()))
-
-    def close(self) -> None:
-        """End the process."""
-        assert self._process.stdin
-        self._process.stdin.close()
-        self._process.wait(PATIENCE)
 
 
 @cache
