@@ -70,7 +70,7 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a file atomically, also over an existing one; an OSError names the path."""
     try:
         target = Path(path)
-        _replace(target, content, target.with_name(f".{target.name}.{os.getpid()}.part"))
+        _replace(target, content, target.with_name(f".{target.name}.part"))
     except ValueError as error:  # a path that no file system can hold
         message = f"{path!r} is not allowed; allowed: the path of a file"
         raise InputError(message) from error
@@ -123,31 +123,47 @@ def _markers(folder: Path) -> Iterator[bytes]:
 @contextmanager
 def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
     """Hold the lock of a result directory, so that no other run switches or adds to it."""
+    with _held(folder, os.O_RDONLY | os.O_DIRECTORY, kind):
+        yield
+
+
+@contextmanager
+def _held(path: Path, flags: int, kind: int) -> Iterator[int]:
+    """Open what has a path, by a descriptor that holds the lock of it."""
     while True:
-        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        descriptor = os.open(path, flags, 0o666)
         # Some file systems have no locks.
         with suppress(OSError):
             fcntl.flock(descriptor, kind)
-        # The previous holder of the lock may have switched the directory.
+        # The previous holder of the lock may have renamed it, or switched the directory.
         with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), folder.stat()):
+            if os.path.samestat(os.fstat(descriptor), path.stat()):
                 break
         os.close(descriptor)
     try:
-        yield
+        yield descriptor
     finally:
         os.close(descriptor)
 
 
 def _replace(target: Path, content: bytes, part: Path) -> None:
-    """Write a file under a temporary name in the same directory, then rename it."""
+    """Write a file under a temporary name in the same directory, then rename it.
+
+    The name is always the same, and one writer at a time has it: what a killed one leaves is
+    taken up by the next.
+    """
     try:
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
-        try:
-            part.write_bytes(content)
-            part.replace(target)
-        finally:
-            part.unlink(missing_ok=True)
+        with _held(part, os.O_WRONLY | os.O_CREAT, fcntl.LOCK_EX) as descriptor:
+            try:
+                # Closed before it is renamed: some disks are found to be full only then.
+                with os.fdopen(os.dup(descriptor), "wb") as file:
+                    file.truncate(0)
+                    file.write(content)
+                part.replace(target)
+            except BaseException:
+                part.unlink(missing_ok=True)
+                raise
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(target)) from error

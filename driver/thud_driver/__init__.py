@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
     from io import TextIOWrapper
-    from types import FrameType
+    from types import FrameType, TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Time in which another signal is a copy of the first: some callers send it to process and group, s.
@@ -33,10 +33,11 @@ def main() -> int:
 
     interrupt = _Interrupt()
     sys.unraisablehook = interrupt.retry
+    sys.excepthook = interrupt.show
     _handle(interrupt)
     try:
         code = run()
-    except Exception:
+    except (Exception, KeyboardInterrupt):
         # Compiled modules, such as those that draw, turn an interrupt into an error of their own.
         if not interrupt.number:
             raise
@@ -111,6 +112,13 @@ class _Interrupt:
             self.again(*lost.exc_value.args or SIGNALS[:1])
         else:
             sys.__unraisablehook__(lost)
+
+    def show(
+        self, kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    ) -> None:
+        """Show an error; compiled modules show an interrupt before `retry` takes it up."""
+        if not isinstance(error, KeyboardInterrupt):
+            sys.__excepthook__(kind, error, trace)
 
 
 def _open_screen() -> None:

@@ -28,14 +28,17 @@ static const int ending_signals[] = {SIGINT, SIGTERM};
 static void interrupt(int number)
 {
    static time_t first;
+   struct timespec now;
 
+   // The clock of the day may be set back meanwhile.
+   clock_gettime(CLOCK_MONOTONIC, &now);
    if (deferred && !thud_latest_signal) {
       thud_latest_signal = number;
-      first = time(NULL);
+      first = now.tv_sec;
       return;
    }
    // Some callers send a signal to the process and to its group.
-   if (deferred && time(NULL) <= first + 1) return;
+   if (deferred && now.tv_sec <= first + 1) return;
 
    // The terminal has shown ^C, perhaps after a line of progress.
    const char *text = isatty(STDERR_FILENO) ? interruption : interruption + 1;

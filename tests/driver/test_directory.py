@@ -227,8 +227,8 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     (tmp_path / "e.partial").mkdir()
     (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
     # Kills leave half a file.
-    (tmp_path / "e.partial/.study.7.part").write_text("")
-    (tmp_path / ".e.nc.7.part").write_text("")
+    (tmp_path / "e.partial/.study.part").write_text("")
+    (tmp_path / ".e.nc.part").write_text("")
     with pytest.raises(thud.InputError, match="holds no finished sets"):
         thud.read_sweep(tmp_path / "e.partial")
     assert thud.sweep({**other, "name": "e"}, tmp_path).sizes["height"] == 1

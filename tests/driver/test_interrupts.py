@@ -228,6 +228,29 @@ sys.exit(thud_driver.main())
     assert done.returncode == 130
 
 
+def test_interrupt_that_a_compiled_module_shows_and_forgets_is_one_sentence() -> None:
+    code = """
+import ast, signal, sys, time, thud_driver
+from scipy.stats import qmc
+from thud import cli
+
+def draw(*_):
+    usual = ast.literal_eval
+    def interrupted(text):
+        ast.literal_eval = usual
+        signal.raise_signal(signal.SIGINT)
+    ast.literal_eval = interrupted
+    qmc.Sobol(2).random(2)
+    time.sleep(20)
+
+cli.main = lambda: draw()
+sys.exit(thud_driver.main())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stderr == KEPT
+    assert done.returncode == 130
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_cases_keep_those_that_are_done(number: int, tmp_path: Path) -> None:
     (tmp_path / "short.nml").write_text(MINIMAL)

@@ -54,6 +54,11 @@ def test_indices_of_ishigami() -> None:
     assert np.all(total_interval < 0.1)
 
 
+def test_intervals_of_seed_0_are_always_the_same() -> None:
+    values = np.random.default_rng(1).normal(size=5 * 16)
+    np.testing.assert_array_equal(sobol_indices(values, 3, 0), sobol_indices(values, 3, 0))
+
+
 def test_indices_of_a_source_whose_levels_are_a_sum(lumped: Sensitivity) -> None:
     m, h = np.linspace(2, 3, 10001), np.linspace(0.5, 2, 10001)
     share = np.array([np.var(20 * np.log10(m)), np.var(10 * np.log10(h)), 0])

@@ -27,8 +27,8 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    tries : int
-        Tries of the whole campaign.
+    tries : int or callable
+        Tries of the whole campaign, or what counts them.
     small : int
         Tries of the small one.
     check : callable
@@ -37,7 +37,7 @@ class Part(NamedTuple):
         Tries that `check` makes at a time.
     """
 
-    tries: int
+    tries: int | Callable[[], int]
     small: int
     check: Callable[[list[tuple[int, random.Random]], Path], Iterable[Finding]]
     share: int = 1
@@ -60,9 +60,9 @@ class Report:
     def run(self, name: str, part: Part, tries: int, folder: Path, *, spread: bool = False) -> None:
         """Make the tries of a part that are still to be made, or some of them spread over all."""
         counts = self.counts.setdefault(name, Counter())
-        numbers = range(part.tries)
+        numbers = range(part.tries if isinstance(part.tries, int) else part.tries())
         if spread:
-            numbers = random.Random(f"{self.seed}/{name}").sample(numbers, min(tries, part.tries))  # type: ignore[assignment]  # noqa: S311
+            numbers = random.Random(f"{self.seed}/{name}").sample(numbers, min(tries, len(numbers)))  # type: ignore[assignment]  # noqa: S311
         for start in range(counts.total(), len(numbers), part.share):
             share = [
                 (number, random.Random(f"{self.seed}/{name}/{number}"))  # noqa: S311

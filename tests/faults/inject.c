@@ -2,7 +2,9 @@
 //   FAULT_AT=5                    number of the call, counted from 1; 0 only counts
 //   FAULT_CALLS=write,rename      calls that count (default: all)
 //   FAULT_ACTION=28               number of the error, or kill, term, int, or 0.5s for a delay before the call
+//   FAULT_UNDER=/path             only calls on files, by relative paths or by those that begin like this
 //   FAULT_FROM=1                  all calls from that one on go wrong
+//   FAULT_CLOCK=-3600             the clock of the day is off by so many seconds
 //   FAULT_LOG=path                each counted call, one line
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -15,7 +17,9 @@
 #include <string.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
+#include <sys/time.h>
 #include <sys/types.h>
+#include <time.h>
 #include <unistd.h>
 
 static int count = 0;
@@ -37,10 +41,13 @@ static void note(const char *call, const char *subject)
 static int fault(const char *call, const char *subject)
 {
    const char *calls = getenv("FAULT_CALLS"), *at = getenv("FAULT_AT"), *action = getenv("FAULT_ACTION"), *found;
+   const char *under = getenv("FAULT_UNDER");
    size_t length = strlen(call);
    int error, number;
 
    if (!at) return 0;
+   // Descriptors without a file have names such as socket:[1].
+   if (under && strncmp(subject, under, strlen(under)) != 0 && (subject[0] == '/' || strstr(subject, ":["))) return 0;
    if (calls) {
       for (found = strstr(calls, call); found; found = strstr(found + 1, call))
          if ((found == calls || found[-1] == ',') && (!found[length] || found[length] == ',')) break;
@@ -160,4 +167,35 @@ int renameat2(int old, const char *path, int new, const char *other, unsigned fl
 {
    if (fault("renameat2", other)) return -1;
    return NEXT(int, renameat2, int, const char *, int, const char *, unsigned)(old, path, new, other, flags);
+}
+
+static time_t shift(void)
+{
+   const char *seconds = getenv("FAULT_CLOCK");
+
+   return seconds ? (time_t)atoll(seconds) : 0;
+}
+
+int clock_gettime(clockid_t clock, struct timespec *now)
+{
+   int status = NEXT(int, clock_gettime, clockid_t, struct timespec *)(clock, now);
+
+   if (status == 0 && clock == CLOCK_REALTIME) now->tv_sec += shift();
+   return status;
+}
+
+int gettimeofday(struct timeval *restrict now, void *restrict zone)
+{
+   int status = NEXT(int, gettimeofday, struct timeval *restrict, void *restrict)(now, zone);
+
+   if (status == 0) now->tv_sec += shift();
+   return status;
+}
+
+time_t time(time_t *copy)
+{
+   time_t now = NEXT(time_t, time, time_t *)(NULL) + shift();
+
+   if (copy) *copy = now;
+   return now;
 }

@@ -14,17 +14,34 @@ from pathlib import Path
 
 from attempts import attempts
 from campaign import Part, Report
-from directories import check_calls, check_damage, check_races, plan
+from crowds import check_crowds, check_starts, check_threads
+from directories import check_calls, check_damage, check_races
+from directories import plan as plan_calls
 from edges import check_elements, check_lumped, check_many, check_modal
+from kills import check_kills, check_slow_kills
 from memory import check_memory
+from places import check_places
+from servers import check_explorer
+from soak import check_soak
+from steps import check_steps
+from steps import plan as plan_steps
 
 
 def parts() -> dict[str, Part]:
     """Return the parts of the campaign by name."""
     return {
-        "calls": Part(len(plan()), 60, check_calls),
+        "calls": Part(lambda: len(plan_calls()), 60, check_calls),
         "races": Part(80, 8, check_races),
         "damage": Part(10_000, 60, check_damage, share=100),
+        "kills": Part(10_000, 15, check_kills),
+        "slow kills": Part(500, 1, check_slow_kills),
+        "steps": Part(lambda: len(plan_steps()), 4, check_steps),
+        "places": Part(3000, 12, check_places),
+        "crowds": Part(1000, 4, check_crowds),
+        "threads": Part(3000, 100, check_threads, share=100),
+        "starts": Part(100, 1, check_starts),
+        "explorer": Part(2000, 8, check_explorer),
+        "soak": Part(100_000, 100, check_soak, share=100),
         "memory": Part(1000, 12, check_memory),
         "namelists": Part(1_000_000, 400, attempts("namelists"), share=5000),
         "recordings": Part(100_000, 60, attempts("damaged_recordings"), share=2000),
@@ -54,8 +71,7 @@ def main() -> int:
         for name, part in parts().items():
             if options.part and name not in options.part:
                 continue
-            tries = part.small if options.small else part.tries
-            report.run(name, part, tries, Path(folder), spread=options.small)
+            report.run(name, part, part.small, Path(folder), spread=options.small)
             print(report, flush=True)
     return 1 if report.faults else 0
 

@@ -78,6 +78,9 @@ class Jobs:
 def _next(near: Connection) -> dict[str, Any]:
     """Return the next report of a process."""
     try:
+        # A process that was stopped says nothing, and its page may leave.
+        while not near.poll(INTERVAL):
+            anyio.from_thread.check_cancelled()
         report: dict[str, Any] = near.recv()
     except EOFError:
         report = {"error": "the work ended without an answer, perhaps for want of memory"}

@@ -90,10 +90,6 @@ class Blocks:
             else:
                 self._write_zarr(paths)
         shutil.rmtree(self._partial, ignore_errors=True)
-        # Left by an earlier run that was killed while it joined blocks.
-        for path in self.path.parent.iterdir():
-            if path.name.startswith(f".{self.path.name}.") and path.suffix == ".part":
-                path.unlink(missing_ok=True)
 
     def _write_zarr(self, paths: list[Path]) -> None:
         """Write a Zarr group, some variables at a time: only these have to fit into memory."""

@@ -1,0 +1,169 @@
+"""Many at once: processes in one directory, calls in threads, and every way to start processes."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from functools import cache
+from multiprocessing import get_context
+from pathlib import Path
+from threading import Event, Thread
+from typing import TYPE_CHECKING
+
+from campaign import Finding
+from directories import INPUTS, files_of, owner_of
+from injection import PATIENCE, executable
+from public_calls import fast_calls, quiet, same
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from public_calls import Calls
+
+    Tries = list[tuple[int, random.Random]]
+
+CROWD = 8
+# Ways to start what works at the same time; the last forks while threads compute.
+STARTS = ("threads", "fork", "spawn", "forkserver", "fork beside threads")
+
+
+def check_crowds(tries: Tries, folder: Path) -> Iterable[Finding]:
+    """Let eight runs write into one directory at once, in half of the rounds one is killed."""
+    place = folder / "crowd"
+    for number, chance in tries:
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir()
+        for name, text in INPUTS.items():
+            (place / f"{name}.nml").write_text(text)
+        names = [chance.choice("ab") for _ in range(CROWD)]
+        running = [
+            subprocess.Popen(
+                [executable(), f"{name}.nml", "-q", "-o", "o"],
+                cwd=place,
+                stderr=subprocess.DEVNULL,
+            )
+            for name in names
+        ]
+        if number % 2:
+            running[chance.randrange(CROWD)].send_signal(signal.SIGKILL)
+        try:
+            codes = [process.wait(PATIENCE) for process in running]
+        except subprocess.TimeoutExpired:
+            for process in running:
+                process.kill()
+                process.wait()
+            yield Finding("hung", f"{names}")
+            continue
+        yield Finding(_left(place, codes), f"{names}: {codes}, {sorted(place.rglob('*'))}")
+
+
+def _left(place: Path, codes: list[int]) -> str:
+    """Return what a crowd has left."""
+    if set(codes) - {0, -signal.SIGKILL}:
+        return "crashed"
+    # The next one takes up what a killed one left.
+    last = subprocess.run([executable(), "a.nml", "-q", "-o", "o"], cwd=place, check=False,
+                          capture_output=True, timeout=PATIENCE)  # fmt: skip
+    before = owner_of(files_of(place / "o"))
+    rest = [path.name for path in place.iterdir() if path.name not in ("a.nml", "b.nml", "o")]
+    if last.returncode or rest or before != "a":
+        return "mixed"
+    return "killed" if min(codes) else "whole"
+
+
+@cache
+def expected() -> tuple[Calls, dict[str, object]]:
+    """Return the calls, and what they return where nothing else is at work."""
+    folder = Path(tempfile.mkdtemp(prefix="thud_faults_"))
+    quiet()
+    calls = fast_calls(folder)
+    return calls, {name: call() for name, call in calls.items()}
+
+
+def check_threads(tries: Tries, _: Path) -> Iterable[Finding]:
+    """Call public functions at once in eight threads."""
+    calls, results = expected()
+
+    def attempt(name: str) -> Finding:
+        try:
+            return Finding(name if same(calls[name](), results[name]) else "mixed", name)
+        except Exception as error:  # noqa: BLE001 - that is the question
+            return Finding("crashed", f"{name}: {error!r}")
+
+    with ThreadPoolExecutor(CROWD) as threads:
+        yield from threads.map(attempt, [chance.choice(list(calls)) for _, chance in tries])
+
+
+def check_starts(tries: Tries, _: Path) -> Iterable[Finding]:
+    """Use threads and ways to start processes after each other in a process of their own."""
+    for _, chance in tries:
+        order = chance.choices(STARTS, k=chance.randint(2, 5))
+        command = [sys.executable, __file__, json.dumps(order), str(chance.getrandbits(30))]
+        try:
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=5 * PATIENCE, check=False
+            )
+        except subprocess.TimeoutExpired:
+            yield Finding("hung", f"{command}")
+            continue
+        word = done.stdout.strip() if done.returncode == 0 else "crashed"
+        yield Finding(word, f"{command}: {done.returncode}, {done.stderr[-500:]}")
+
+
+def _call(name: str) -> object:
+    return expected()[0][name]()
+
+
+def _stage(way: str, names: list[str]) -> list[object]:
+    """Return the results of calls that are made in a way."""
+    if way == "threads":
+        with ThreadPoolExecutor(3) as pool:
+            return list(pool.map(_call, names))
+    if way == "fork beside threads":
+        return _beside_threads(lambda: _stage("fork", names))
+    with ProcessPoolExecutor(2, get_context(way)) as processes:  # type: ignore[arg-type]
+        return list(processes.map(_call, names, chunksize=len(names)))
+
+
+def _beside_threads(work: Callable[[], list[object]]) -> list[object]:
+    """Return what work gives while two threads compute."""
+    over = Event()
+
+    def compute() -> None:
+        while not over.is_set():
+            _call("modal ball")
+            _call("solve_many")
+
+    threads = [Thread(target=compute) for _ in range(2)]
+    for thread in threads:
+        thread.start()
+    try:
+        return work()
+    finally:
+        over.set()
+        for thread in threads:
+            thread.join()
+
+
+def main() -> None:
+    """Carry out the ways of the arguments; write what became of it."""
+    order, seed = json.loads(sys.argv[1]), int(sys.argv[2])
+    chance = random.Random(seed)  # noqa: S311
+    calls, results = expected()
+    for way in order:
+        names = chance.choices(list(calls), k=6)
+        for name, found in zip(names, _stage(way, names), strict=True):
+            if not same(found, results[name]):
+                sys.stdout.write("mixed")
+                return
+    sys.stdout.write("same")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,101 @@
+"""Commands with few descriptors, small files, no place to write, and clocks set back."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from campaign import Finding
+from forks import Order, forks
+from kills import judge_again, judge_end, judge_files, prepare
+from scenarios import NEW, OUT, SCENARIOS
+
+if TYPE_CHECKING:
+    import random
+    from collections.abc import Iterable
+
+NAMES = [name for name, one in SCENARIOS.items() if one.weight]
+# Variables that say where programs keep what is no result.
+HOMES = ("HOME", "TMPDIR", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
+
+
+def check_places(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+    """Run a command where something is missing, then where nothing is."""
+    for number, chance in tries:
+        name = NAMES[number % len(NAMES)]
+        old = chance.random() < 0.5
+        place = folder / "places"
+        _free(place)
+        prepare(place, name, old=old)
+        kind = chance.choice(list(KINDS))
+        order, told = KINDS[kind](Order(SCENARIOS[name].given(NEW), str(place)), chance)
+        done = forks().run(order)
+        _free(place)
+        word = _judge_words(done.code, done.said) or judge_end(done)
+        word = word or judge_files(name, place, old=old, done=done.code == 0)
+        again = forks().run(Order(SCENARIOS[name].given(NEW), str(place)))
+        word, _, what = (word or judge_again(name, place, again, old=old)).partition(": ")
+        detail = f"{name}, old {old}, {kind} {told}: {done}, {again}, {what}"
+        yield Finding(word or f"{kind} {'done' if done.code == 0 else 'refused'}", detail)
+
+
+def _judge_words(code: int, said: str) -> str:
+    """Return the fault of an end that is no sentence, if any."""
+    if code == 0:
+        return ""
+    last = (said.splitlines() or [""])[-1]
+    return "" if code in (1, 2) and last.startswith("thud") else "crashed: no sentence"
+
+
+def _free(place: Path) -> None:
+    """Let everything be written again."""
+    for path in (place, *place.rglob("*")) if place.exists() else ():
+        if path.is_dir():
+            path.chmod(0o755)
+
+
+def _few_descriptors(order: Order, chance: random.Random) -> tuple[Order, str]:
+    most = chance.randint(3, 20)
+    return order._replace(limits={"RLIMIT_NOFILE": most}), str(most)
+
+
+def _small_files(order: Order, chance: random.Random) -> tuple[Order, str]:
+    # Words on the screen are a file here.
+    most = int(10 ** chance.uniform(3, 5))
+    return order._replace(limits={"RLIMIT_FSIZE": most}), str(most)
+
+
+def _read_only(order: Order, chance: random.Random) -> tuple[Order, str]:
+    place = Path(order.folder)
+    path = chance.choice([place, place / OUT] if (place / OUT).exists() else [place])
+    path.chmod(0o555)
+    return order._replace(humble=True), path.name
+
+
+def _no_homes(order: Order, chance: random.Random) -> tuple[Order, str]:
+    names = chance.sample(HOMES, chance.randint(1, len(HOMES)))
+    where = chance.choice(["/nonexistent", "/dev/null", "/proc/self", "/dev/full"])
+    return order._replace(env=dict.fromkeys(names, where), humble=True), f"{names} {where}"
+
+
+def _other_clock(order: Order, chance: random.Random) -> tuple[Order, str]:
+    seconds = chance.choice((-1, 1)) * 10 ** chance.uniform(0, 8)
+    return order._replace(env={"FAULT_CLOCK": f"{seconds:.0f}"}), f"{seconds:.0f}"
+
+
+def _interrupted(order: Order, chance: random.Random) -> tuple[Order, str]:
+    """Kill it first, so that the clock goes back between two runs of one study."""
+    usual = 0.5 * chance.random()
+    forks().run(order._replace(signals=[(usual, signal.SIGKILL)]))
+    return _other_clock(order, chance)
+
+
+KINDS = {
+    "descriptors": _few_descriptors,
+    "file size": _small_files,
+    "read-only": _read_only,
+    "homes": _no_homes,
+    "clock": _other_clock,
+    "clock and kill": _interrupted,
+}

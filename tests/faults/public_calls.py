@@ -1,0 +1,158 @@
+"""Short calls of every public function; each returns numbers or words that are always the same."""
+
+from __future__ import annotations
+
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import thud
+from thud.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    Calls = dict[str, Callable[[], Any]]
+
+MASS = {"mass": thud.Parameter(low=2.4, high=2.6)}
+HEIGHTS = {"height": thud.Parameter(values=[0.9, 1.0, 1.1])}
+PLATE, ROOM = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
+MESH = {"radial_elements": 2, "polar_elements": 8}
+
+
+def fast_calls(folder: Path) -> Calls:
+    """Return calls that take some milliseconds, by name; they read and write in a directory."""
+    case = thud.Case("mine", sampling=thud.Sampling(duration=0.04))
+    impact = thud.solve()
+    light = thud.solve(floor=thud.InfinitePlate(1600.0))
+    pressed = thud.compress(model="modal_ball", points=5)
+    (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
+    thud.write_case(case, folder / "mine.nml")
+    rate = impact.sample_rate
+
+    def write() -> str:
+        thud.write_case(case, folder / "written.nml")
+        return (folder / "written.nml").read_text()
+
+    def refused() -> str:
+        try:
+            thud.solve(thud.Ball(mass=-1.0))
+        except thud.InputError as error:
+            return str(error)
+        return ""
+
+    return {
+        "solve": lambda: thud.solve().floor_force,
+        "modal ball": lambda: thud.solve(model="modal_ball", rings=10, harmonics=4).floor_force,
+        "lumped": lambda: (
+            thud.solve(model=thud.HuntCrossley(contact_time=0.02, restitution=0.8)).floor_force
+        ),
+        "solve_case": lambda: thud.solve_case(case).elastic_force,
+        "on a floor": lambda: thud.solve(floor=thud.Oscillator()).on_floor.floor_velocity,  # type: ignore[union-attr]
+        "solve_many": lambda: thud.solve_many({"height": [0.5, 1.0, 1.5]}, threads=2).floor_octaves,
+        "levels": lambda: impact.levels("third"),
+        "force_exposure_levels": lambda: thud.force_exposure_levels(impact.floor_force, rate),
+        "conformity": lambda: [one.value for one in impact.conformity().criteria],
+        "judge": lambda: str(thud.judge([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0)),
+        "get_bands": lambda: thud.get_bands("third").nominal,
+        "quantity": lambda: thud.quantity("8.9 cm"),
+        "loss_factors": lambda: thud.loss_factors(thud.FiniteElement(), [50.0, 100.0]),
+        "mobility": lambda: thud.mobility(PLATE, [25.0, 100.0]),
+        "ball_impedance": lambda: str(thud.ball_impedance(light, [1e4, 1e5])),
+        "injected_energy": lambda: str(light.on_floor.injected_energy()),  # type: ignore[union-attr]
+        "predict_level": lambda: str(thud.predict_level(impact, PLATE, ROOM)),
+        "tapping_level": lambda: str(thud.tapping_level(PLATE)),
+        "rating": lambda: str(thud.rating([65.0, 64.0, 58.0, 56.0])),
+        "standardised_level": lambda: thud.standardised_level([65.0, 64.0], 0.6, 40.0),
+        "read_room_levels": lambda: str(thud.read_room_levels(folder / "levels.csv", volume=40.0)),
+        "compress": lambda: thud.compress(points=5).force,
+        "fit_compression": lambda: str(
+            thud.fit_compression(pressed.deflection, pressed.force, model="modal_ball")
+        ),
+        "read_case": lambda: str(thud.read_case(folder / "mine.nml")),
+        "read_all": lambda: str(thud.read_all([folder / "mine.nml"])),
+        "write_case": write,
+        "read_study": lambda: thud.read_study({"parameters": HEIGHTS}).name,
+        "refused": refused,
+    }
+
+
+def slow_calls(folder: Path) -> Calls:
+    """Return calls that take longer."""
+    impact = thud.solve()
+    force = np.pad(impact.floor_force, 8000)
+    force += np.random.default_rng(1).normal(scale=0.5, size=force.size)
+    np.savetxt(folder / "record.csv", np.c_[np.arange(force.size) / impact.sample_rate, force])
+    table = ([10.0, 20.0, 40.0], [1e-5, 2e-5, 1e-5])
+    set_study: Any = {"design": {"size": 8}, "parameters": MASS}
+    learned = thud.surrogate({"parameters": MASS, "surrogate": {"size": 64}})
+    learned.save(folder / "mass.npz")
+    thud.sweep({"name": "kept", "parameters": HEIGHTS}, folder)
+    results = folder / "results"
+    _run(folder, results)
+
+    def saved() -> int:
+        thud.plot.save(impact.plot(), folder / "figure.png")
+        return (folder / "figure.png").stat().st_size
+
+    def measured() -> str:
+        return str(thud.read_recording(folder / "record.csv", height=1.0, mass=2.5).levels())
+
+    return {
+        "finite elements": lambda: thud.solve(model="finite_element", **MESH).floor_force,
+        "free_modes": lambda: thud.free_modes(count=2, polar_elements=16).frequency,
+        "sets of elements": lambda: (
+            thud.solve_many({"height": [0.9, 1.0]}, model="finite_element", threads=2).peak_force
+        ),
+        "modal_room": lambda: str(thud.modal_room(impact, PLATE, ROOM, balls=1, microphones=2)),
+        "compare": lambda: thud.compare([impact, thud.solve(model="modal_ball")]).rows(),
+        "compare_floors": lambda: str(
+            thud.compare_floors({"thin": thud.predict_level(impact, PLATE, ROOM)})
+        ),
+        "fit": lambda: str(thud.fit(impact, ["youngs_modulus"]).values),
+        "fit_mobility": lambda: str(thud.fit_mobility(table, order=1)),
+        "read_results": lambda: thud.read_results(results).floor_force,
+        "read_recording": measured,
+        "from_array": lambda: str(
+            Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5).levels()
+        ),
+        "sweep": lambda: thud.sweep({"parameters": HEIGHTS}).peak_elastic_force,
+        "read_sweep": lambda: thud.read_sweep(folder / "kept.nc").peak_elastic_force,
+        "uncertainty": lambda: str(thud.uncertainty(set_study).table()),
+        "sensitivity": lambda: str(thud.sensitivity(set_study).table()),
+        "design_map": lambda: str(thud.design_map({"parameters": _plane()}).table()),
+        "surrogate": lambda: str(thud.surrogate({"parameters": MASS})),
+        "read_surrogate": lambda: str(thud.read_surrogate(folder / "mass.npz")),
+        "plot": saved,
+        "to_xarray": lambda: impact.to_xarray().floor_force,
+        "to_dataframe": lambda: impact.to_dataframe().to_numpy(),
+    }
+
+
+def _plane() -> dict[str, Any]:
+    return {
+        "height": thud.Parameter(values=[0.5, 1.0]),
+        "youngs_modulus": thud.Parameter(values=[1.6, 2.08], unit="MPa"),
+    }
+
+
+def _run(folder: Path, results: Path) -> None:
+    from thud.cli import main  # noqa: PLC0415 - takes its time
+
+    (folder / "run.nml").write_text("&ball / &drop / &model /")
+    main(["run", "-q", "--no-figures", str(folder / "run.nml"), "-o", str(results)])
+
+
+def same(one: Any, other: Any) -> bool:  # noqa: ANN401 - whatever a call returns
+    """Return whether two results are equal."""
+    if isinstance(one, str):
+        return bool(one == other)
+    first, second = np.asarray(one), np.asarray(other)
+    return np.array_equal(first, second, equal_nan=first.dtype.kind == "f")
+
+
+def quiet() -> None:
+    """Let no warning be shown: implausible values are meant."""
+    warnings.simplefilter("ignore")
