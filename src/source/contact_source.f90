@@ -95,7 +95,7 @@ contains
       character(len=:), allocatable :: shown
 
       shown = finding
-      if (index(finding, 'NaN') > 0) shown = 'the motion leaves the range of numbers'
+      if (index(finding, 'NaN') + index(finding, 'Infinity') > 0) shown = 'the motion leaves the range of numbers'
       error = numerical_error('&sampling: substeps is too low for this source: '//shown &
          //'; allowed: more substeps, a higher sample_rate, or a source of lower stiffness over mass')
    end function coarse_error

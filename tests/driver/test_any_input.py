@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import pytest
 from conftest import REPOSITORY
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -136,3 +137,11 @@ def test_any_record(force: list[float], sample_rate: float, bands: str, method: 
         assert str(error)
     else:
         assert np.isfinite(levels).all()
+
+
+def test_motion_beyond_all_numbers_has_no_infinity_in_its_sentence() -> None:
+    with pytest.raises(
+        thud.NumericalError, match=r"leaves the range of numbers; allowed: "
+    ) as said:
+        thud.solve(thud.Ball(mass=5e-324), momentum_flux="conservative")
+    assert "Infinity" not in str(said.value)
