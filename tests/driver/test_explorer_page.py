@@ -12,6 +12,8 @@ import pytest
 from conftest import REPOSITORY
 from explorer_server import Served, serve
 
+import thud
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -164,6 +166,21 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page.locator("#floor").select_option("")
     sync_api.expect(page.locator("#room_section")).to_be_hidden()
     sync_api.expect(page.locator("#floor_section")).to_be_hidden()
+
+
+def test_files_are_downloaded(browser: Browser, server: Served, tmp_path: Path) -> None:
+    page = new_page(browser, server[0])
+    page.locator("button", has_text="Study").click()
+    sync_api.expect(page.locator("#message")).to_contain_text("no slider of the case was moved")
+    fill(page, "drop.height", "0.8")
+    for name in ("case.nml", "force.csv", "report.html", "study.toml"):
+        with page.expect_download() as found:
+            page.locator(f"[data-file='{name}']").click()
+        assert found.value.suggested_filename == name
+        found.value.save_as(tmp_path / name)
+    assert thud.read_case(tmp_path / "case.nml").drop.height == 0.8
+    (height,) = thud.read_study(tmp_path / "study.toml", "sweep").parameters
+    assert (height.name, height.low, height.high) == ("height", 0.8, 1.0)
 
 
 def test_ball_plays(browser: Browser, server: Served) -> None:
