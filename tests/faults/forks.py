@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 FOLLOWING = 20.0
 PR_SET_CHILD_SUBREAPER = 36
 # Modules that thud imports when it needs them.
-FURTHER = ("distributed", "h5netcdf", "zarr", "matplotlib.backends.backend_agg",
+FURTHER = ("thud_driver", "distributed", "h5netcdf", "zarr", "matplotlib.backends.backend_agg",
            "matplotlib.backends.backend_svg", "xarray.backends.zarr")  # fmt: skip
 # What is written where a study keeps a block, or a measurement a drop; see `_log_work`.
 WORK = "work.log"

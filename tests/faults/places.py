@@ -56,7 +56,8 @@ def _free(place: Path) -> None:
 
 
 def _few_descriptors(order: Order, chance: random.Random) -> tuple[Order, str]:
-    most = chance.randint(3, 20)
+    # With fewer an interpreter does not begin.
+    most = chance.randint(3 if order.command[0] == "thud" else 8, 24)
     return order._replace(limits={"RLIMIT_NOFILE": most}), str(most)
 
 
