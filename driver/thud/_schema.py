@@ -213,7 +213,7 @@ class Compression(Group):
     Attributes
     ----------
     max_deflection : float
-        Maximum approach of the plates, m; 0 < max_deflection <= 10.
+        Maximum approach of the plates, m; 1e-15 <= max_deflection <= 10.
     points : int
         Points of the curve, the undeformed ball included; 2 <= points <= 10000.
     gas : str
@@ -434,7 +434,7 @@ class MeasuredModes(Group):
     damping_ratio : sequence of float
         Damping ratios, one per mode; 0 <= damping_ratio < 1.
     effective_mass : sequence of float
-        Effective masses, one per mode, kg; 0 < effective_mass <= 1e+06.
+        Effective masses, one per mode, kg; 1e-12 <= effective_mass <= 1e+06.
     allow_mass_mismatch : bool
         Effective masses need not add up to the mass of the ball.
     """
@@ -851,7 +851,7 @@ KEYS = (
     Key("modes", "modes", "count", "whole", "", "number of elastic free modes", (), 1.0, 100.0, True),
     Key("modes", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0, True),
     Key("modes", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
-    Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 0.0, 10.0),
+    Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 1e-15, 10.0),
     Key("compression", "compression", "points", "whole", "", "points of the curve, the undeformed ball included", (), 2.0, 10000.0, True),
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves by the hole, or is sealed in", ('vented', 'isothermal', 'adiabatic')),
     Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 0.0, 1000000.0),
@@ -890,7 +890,7 @@ KEYS = (
     Key("finite_element", "output", "snapshot_interval", "real", "s", "time between snapshots of the deformed ball; 0: none", (), 0.0, 10.0),
     Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
     Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),
-    Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 0.0, 1000000.0),
+    Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 1e-12, 1000000.0),
     Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball"),
     Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "stiffness, N/m^exponent; 0: from contact_time", (), 0.0, 1000000000000000.0),
     Key("hunt_crossley", "hunt_crossley", "contact_time", "real", "s", "wanted contact time; 0: from stiffness", (), 0.0, 10.0),

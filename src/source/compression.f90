@@ -40,7 +40,7 @@ contains
       type(field_type) :: fields(3)
 
       fields = [ &
-         real_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '(0, 10]'), &
+         real_field('max_deflection', options%max_deflection, 'm', 'maximum approach of the plates', '[1e-15, 10]'), &
          integer_field('points', options%points, 'points of the curve, the undeformed ball included', '[2, 10000]'), &
          choice_field('gas', options%gas, 'gas in the ball: leaves by the hole, or is sealed in', &
          [character(len=10) :: 'vented', 'isothermal', 'adiabatic'])]

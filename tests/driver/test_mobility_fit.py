@@ -242,7 +242,7 @@ def test_quantity_in_the_titles_counts(tmp_path: Path, exact: thud.MobilityFit) 
         (([], []), "0 lines"),
         ((["a"], ["b"]), "real numbers"),
         ((FREQUENCY, MOBILITY, MOBILITY), "a tuple of 3"),
-        (([10, 20, 30], [1, np.nan, 1]), "value at 20 Hz is nan"),
+        (([10, 20, 30], [1, np.nan, 1]), "value at 20 Hz is not finite"),
         (None, "table = None"),
         (7, "table = 7"),
     ],

@@ -220,10 +220,8 @@ def fit_mobility(
         refuse(f"{place}: {n_line} lines above 0 Hz", "two or more")
     if not (good := np.isfinite(values) & (values != 0)).all():
         line = good.argmin()
-        refuse(
-            f"{place}: the value at {frequency[line]:g} Hz is {abs(values[line]):g}",
-            "finite, not 0",
-        )
+        shown = "not finite" if values[line] else "0"
+        refuse(f"{place}: the value at {frequency[line]:g} Hz is {shown}", "finite, not 0")
     if order is not None:
         require_whole("order", order, 1, _ORDERS[-1])
     try:

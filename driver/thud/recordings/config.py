@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.checks import refuse, require_choice, require_number, shown
+from thud.errors import InputError
 from thud.levels import SOURCES, get_bands, judge
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
@@ -224,8 +225,13 @@ def _calibration(value: object, place: str) -> str | float:
     """Return a chain of factors or N per unit."""
     if not isinstance(value, str):
         return _number(value, place, -1e30, 1e30)
-    read_chain(_text(value, place))
-    return value
+    text = _text(value, place)
+    try:
+        read_chain(text)
+    except InputError as error:
+        message = f"{place}: {error}"
+        raise InputError(message) from error
+    return text
 
 
 def _channel(value: object, place: str) -> int | str:
