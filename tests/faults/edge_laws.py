@@ -37,6 +37,8 @@ def _laws(impact: thud.Impact) -> dict[str, bool]:
     octave = [impact.levels("octave", force=kind) for kind in ("elastic", "floor")]
     arrays = (force, impact.elastic_force, impact.deflection, impact.velocity, *third, *octave)
     total = 10 * np.log10(np.sum(force**2) * step)
+    # A ball that leaves the floor before it is round again is lower than at first touch.
+    fall = case.ball.mass * case.drop.gravity * impact.max_deflection + balance * energy
     laws = {
         "numbers are finite": all(np.isfinite(values).all() for values in arrays),
         "thirds hold no more than all": _energy(third[1]) <= total + 1e-6,
@@ -48,7 +50,7 @@ def _laws(impact: thud.Impact) -> dict[str, bool]:
         "samples hold the impulse": abs(force.sum() * step / impact.impulse - 1) <= 0.02,
         "balances close": max(impact.impulse_residual, impact.energy_residual) <= balance,
         "restitution": (-1 if moves else 0) - 1e-6 <= impact.restitution <= 1 + 1e-6 or feeds
-        or (gravity and impact.restitution <= 1 + balance),
+        or (gravity and energy * (impact.restitution**2 - 1) <= fall),
         "contact lasts": 0 < impact.contact_time <= case.sampling.duration + step,
         "no sample exceeds the peak": elements or force.max() <= impact.peak_force * (1 + 1e-9),
         "no sample exceeds the deflection": impact.deflection.max()
@@ -56,12 +58,14 @@ def _laws(impact: thud.Impact) -> dict[str, bool]:
     }  # fmt: skip
     if isinstance(impact, thud.FloorImpact):
         power = force * impact.floor_velocity
+        # Contact takes or gives some energy within the steps of the modal ball.
+        missing = balance * energy + abs(impact.facts.get("contact_loss", 0.0))
         spread = step * (
             np.abs(np.diff(power, prepend=0, append=0)).sum() + 2 * np.abs(power).max()
         )
         laws |= {
-            "the floor takes energy": -balance * energy <= impact.floor_work
-            <= (1 + balance) * energy or gravity,
+            "the floor takes energy": -missing <= impact.floor_work
+            <= energy + missing or gravity,
             "samples hold the work": abs(power.sum() * step - impact.floor_work)
             <= spread + balance * energy,
         }  # fmt: skip
