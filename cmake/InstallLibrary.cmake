@@ -23,5 +23,7 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/thudConfig.cmake" "${CMAKE_CURRENT_BI
 
 list(JOIN LAPACK_LIBRARIES " " lapack_libraries)
 list(JOIN OpenMP_Fortran_FLAGS " " openmp_flags)
+# The prefix is known only when thud is installed, and may be moved.
+file(RELATIVE_PATH to_prefix "/${CMAKE_INSTALL_LIBDIR}/pkgconfig" "/")
 configure_file("${PROJECT_SOURCE_DIR}/cmake/thud.pc.in" thud.pc @ONLY)
 install(FILES "${CMAKE_CURRENT_BINARY_DIR}/thud.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from thud.checks import refuse
 from thud.errors import InputError
+from thud.extras import packages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -106,7 +107,7 @@ def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
     except (ImportError, OSError) as error:  # soundfile raises OSError without its library
         refuse(
             f"{kind} files need the package {name}, which is not installed",
-            "pip install thud[recordings]",
+            f"pip install {' '.join(packages('recordings'))}",
             error,
         )
 

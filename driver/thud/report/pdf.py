@@ -7,7 +7,7 @@ import io
 import logging
 
 NEEDED = (
-    "pip install 'thud[report]' and Debian's libpango-1.0-0, libpangoft2-1.0-0 and "
+    "pip install weasyprint, and Debian's libpango-1.0-0, libpangoft2-1.0-0 and "
     "libharfbuzz-subset0, or print report.html with a browser"
 )
 
