@@ -54,6 +54,11 @@ contains
       character(len=24) :: text
       real(wp) :: near
 
+      if (.not. abs(value) < 1.0e300_wp) then
+         ! A quotient may overflow, and no sentence says Infinity.
+         text = 'beyond 1e300'
+         return
+      end if
       write (text, '(es24.2e3)') value
       read (text, *) near
       text = to_text(near)
