@@ -155,7 +155,9 @@ def _replace(target: Path, content: bytes, part: Path) -> None:
     try:
         if target.is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
-        with _held(part, os.O_WRONLY | os.O_CREAT, fcntl.LOCK_EX) as descriptor:
+        # A link of this name may be another user's, to a file of ours.
+        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW
+        with _held(part, flags, fcntl.LOCK_EX) as descriptor:
             try:
                 # Closed before it is renamed: some disks are found to be full only then.
                 with os.fdopen(os.dup(descriptor), "wb") as file:

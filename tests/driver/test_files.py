@@ -6,6 +6,8 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
+import pytest
+
 from thud.files import replace_file
 
 if TYPE_CHECKING:
@@ -32,3 +34,11 @@ def test_what_a_killed_writer_left_is_taken_up(tmp_path: Path) -> None:
     replace_file(tmp_path / "file", b"whole")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_bytes() == b"whole"
+
+
+def test_link_of_the_temporary_name_is_not_followed(tmp_path: Path) -> None:
+    (tmp_path / "other").write_bytes(b"kept")
+    (tmp_path / ".file.part").symlink_to(tmp_path / "other")
+    with pytest.raises(OSError, match="symbolic links"):
+        replace_file(tmp_path / "file", b"new")
+    assert (tmp_path / "other").read_bytes() == b"kept"
