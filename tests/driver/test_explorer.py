@@ -244,6 +244,7 @@ def test_recordings_and_works_leave_no_files(
         ({"floor": {"name": 3}}, "floor"),
         ({"ball": {"mass": 1e300}}, "mass"),
         ({"ball": {"mass": {"a": 1}}}, "mass"),
+        ({"sampling": {"substeps": 10**400}}, "too large"),
     ],
 )
 def test_bad_values_get_a_sentence(client: TestClient, values: object, words: str) -> None:
@@ -305,6 +306,16 @@ def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> Non
     found = thud.sweep(path)
     assert found.sizes == {**found.sizes, "height": 11}
     assert client.post("/download/study.toml", json=SHELL).status_code == 400
+
+
+@pytest.mark.parametrize(
+    "moved",
+    [[], {"drop.height": []}, {"drop.height": ["a", 1]}, {"sampling.substeps": [1, 10**400]}],
+)
+def test_study_of_no_moves_gets_a_sentence(client: TestClient, moved: object) -> None:
+    answer = client.post("/download/study.toml", json=SHELL | {"moved": moved})
+    assert answer.status_code == 400
+    assert "want of memory" not in answer.text
 
 
 def test_study_varies_model_floor_and_room(client: TestClient, tmp_path: Path) -> None:

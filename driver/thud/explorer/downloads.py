@@ -62,13 +62,12 @@ def report(values: Values) -> bytes:
 
 def study(values: Values) -> bytes:
     """Return the file of a sweep over the keys that were moved, between the ends of their moves."""
-    moved = {name: sorted(map(float, ends)) for name, ends in values.pop(MOVED, {}).items()}
+    moves = dict(values.pop(MOVED, {}))
+    moved = {key: (float(min(ends)), float(max(ends))) for key, ends in moves.items()}
     case = new_case(values)
     check_case(case)
     names = {f"{key.group}.{key.name}": name for name, key in known_keys(users(case)).items()}
-    ranges = {
-        names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[-1]
-    }
+    ranges = {names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[1]}
     if not ranges:
         refuse("no slider of the case was moved", "a study of one or more")
     lines = ["# A sweep over what was moved: thud-driver sweep <this file>"]
@@ -80,7 +79,7 @@ def study(values: Values) -> bytes:
     lines += ["", "[design]"]
     lines += ['kind = "grid"'] if grid else ['kind = "sobol"', f"size = {SETS}", "seed = 1"]
     lines += ["", "[parameters]"]
-    for name, (low, *_, high) in ranges.items():
+    for name, (low, high) in ranges.items():
         key = find_key(name, users(case))[0]
         count = f", count = {_count(key, low, high)}" if grid else ""
         ends = [round(low), round(high)] if key.kind == "whole" else [low, high]

@@ -27,6 +27,8 @@ WORKS: dict[str, Callable[..., Any]] = {
     "recording": answer_recording,
     "download": lambda what, values: DOWNLOADS[what][0](values),
 }
+# What bad values raise: those of wrong types stop where they are first used.
+REFUSALS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
 # Time between two reports, s, and the longest that a work may take.
 INTERVAL = 0.05
 LONGEST = 300.0
@@ -109,7 +111,7 @@ def _work(far: Connection, folder: str, work: str, arguments: tuple[Any, ...]) -
         last = {"answer": WORKS[work](*arguments)}
     except MemoryError:
         last = {"error": f"the work needs more than {MEMORY / 1e9:g} GB of memory; allowed: less"}
-    except (ThudError, OSError, TypeError, ValueError, KeyError) as error:
+    except (*REFUSALS, OSError) as error:
         last = {"error": str(error) or InputError.__name__}
     over.set()
     thread.join()

@@ -24,11 +24,10 @@ from thud._api import version
 from thud.case import read_case
 from thud.checks import refuse, shown
 from thud.cli.command import channel_of
-from thud.errors import ThudError
 from thud.explorer.answer import answer_case, is_quick, new_case
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import form
-from thud.explorer.jobs import Jobs
+from thud.explorer.jobs import REFUSALS, Jobs
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
@@ -91,9 +90,7 @@ def new_application(
             ),
         ],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
-        # Values of wrong types stop where they are first used.
-        exception_handlers=dict.fromkeys((ThudError, TypeError, ValueError, KeyError), _refuse)
-        | {ClientDisconnect: _forget},
+        exception_handlers=dict.fromkeys(REFUSALS, _refuse) | {ClientDisconnect: _forget},
     )
     application.state.about = {
         "form": form(),
