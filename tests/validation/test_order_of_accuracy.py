@@ -68,6 +68,7 @@ def test_linear_source_on_a_resistance(oracle: Callable[..., None]) -> None:
     )
 
 
+# Models refuse answers that miss 1e-6 of the energy, elements 5e-3; default steps miss far less.
 @pytest.mark.parametrize(
     "model",
     [
@@ -81,10 +82,10 @@ def test_linear_source_on_a_resistance(oracle: Callable[..., None]) -> None:
 def test_momentum_and_energy_balance(model: thud.ModelOptions, oracle: Callable[..., None]) -> None:
     impact = thud.solve(thud.Ball(mass=7.3 if model.name == "two_mass" else 2.5), model=model)
     oracle("impulse less change of momentum", "balance", impact.impulse_residual, 1e-8)
-    oracle("energy of shell, modes and lumped sources", "balance", impact.energy_residual, 1e-6)
+    oracle("energy of shell, modes and lumped sources", "balance", impact.energy_residual, 1e-8)
 
 
 def test_energy_of_the_elements_balances(oracle: Callable[..., None]) -> None:
     impact = thud.solve(thud.Ball.standard(), model="finite_element", snapshot_interval=0)
     oracle("impulse less change of momentum, elements", "balance", impact.impulse_residual, 1e-8)
-    oracle("energy of the elements", "balance", impact.energy_residual, 5e-3)
+    oracle("energy of the elements", "balance", impact.energy_residual, 1e-3)
