@@ -7,9 +7,9 @@ import socket
 import time
 from contextlib import closing
 from http.client import HTTPConnection
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+import psutil
 import pytest
 from explorer_server import Served, answer_of, drag, place_of, serve
 
@@ -27,28 +27,16 @@ def server() -> Iterator[Served]:
         yield found
 
 
-def processes_of(process: int) -> set[int]:
-    """Return the processes that a process has started, and theirs."""
-    parents = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            try:
-                parents[int(entry.name)] = int(
-                    (entry / "stat").read_text().rpartition(")")[2].split()[1]
-                )
-            except OSError:
-                continue
-    found = {process}
-    while more := {one for one, parent in parents.items() if parent in found} - found:
-        found |= more
-    return found - {process}
+def processes_of(server: Served) -> set[psutil.Process]:
+    """Return the processes that a server has started, and theirs."""
+    return set(psutil.Process(server[1].pid).children(recursive=True))
 
 
-def alive(process: int) -> bool:
+def alive(process: psutil.Process) -> bool:
     """Return whether a process runs; one that has ended may still be listed."""
     try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
+        return bool(process.status() != psutil.STATUS_ZOMBIE)
+    except psutil.NoSuchProcess:
         return False
 
 
@@ -73,16 +61,16 @@ def test_works_end_with_their_user_and_their_server(server: Served) -> None:
     with closing(HTTPConnection(host, port, timeout=60)) as connection:
         # Starts the process that forks the others.
         assert answer_of(connection, token, {**SHELL, "sampling": {"substeps": 1000}})
-    before = processes_of(server[1].pid)
+    before = processes_of(server)
 
     def begin() -> HTTPConnection:
         connection = HTTPConnection(host, port, timeout=60)
         connection.request("POST", "/solve", json.dumps(SLOW), {"X-Thud-Token": token})
         return connection
 
-    def await_works(count: int) -> set[int]:
+    def await_works(count: int) -> set[psutil.Process]:
         end = time.monotonic() + 20
-        while len(works := processes_of(server[1].pid) - before) != count:
+        while len(works := processes_of(server) - before) != count:
             assert time.monotonic() < end
             time.sleep(0.05)
         return works
@@ -94,7 +82,7 @@ def test_works_end_with_their_user_and_their_server(server: Served) -> None:
     server[1].kill()
     server[1].wait(20)
     end = time.monotonic() + 20
-    while any(alive(work) for work in works):
+    while any(map(alive, works)):
         assert time.monotonic() < end
         time.sleep(0.05)
     other.close()
