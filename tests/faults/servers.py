@@ -33,7 +33,7 @@ HOST = "127.0.0.1"
 # Answers of a server that is well.
 WELL = (200, 400, 403, 404, 405, 411, 413, 422, 431)
 VALUES: list[Any] = [0, -1, 1e300, 1e-300, "NaN", "1", None, True, [], [1, [2]], {}, "x" * 2000,
-                     2**70, "é\0", -0.0, 1.5, [1e9] * 500]  # fmt: skip
+                     2**70, 10**400, "é\0", -0.0, 1.5, [1e9] * 500]  # fmt: skip
 LONG = {
     "model": {"name": "finite_element"},
     "mesh": {"radial_elements": 16, "polar_elements": 512},
@@ -152,16 +152,16 @@ def _judged(status: int, content: bytes) -> str:
 def _hostile_case(server: Explorer, chance: random.Random) -> str:
     groups: Any = {}
     for _ in range(chance.randint(0, 4)):
-        name = chance.choice([*GROUPS, *MODELS, "model", "floor", "room", "x"])
+        name = chance.choice([*GROUPS, *MODELS, "model", "floor", "room", "moved", "x"])
         known = vars(GROUPS[name]()) if name in GROUPS else ("mass",)
-        keys = [*known, "name", "é"]
+        keys = [*known, "name", "drop.height", "é"]
         groups[name] = {chance.choice(keys): chance.choice(VALUES) for _ in range(2)}
     body = json.dumps(chance.choice([groups, groups, [groups], chance.choice(VALUES)])).encode()
     if chance.random() < 0.3:
         at = chance.randrange(len(body) + 1)
         body = body[:at] + chance.randbytes(3) + body[at:]
-    path = chance.choice(["/solve", "/download/case.nml", "/download/force.csv"])
-    return _judged(*server.ask(path, body))
+    downloads = [f"/download/{name}" for name in ("case.nml", "force.csv", "study.toml")]
+    return _judged(*server.ask(chance.choice(["/solve", *downloads]), body))
 
 
 def _hostile_record(server: Explorer, chance: random.Random) -> str:
