@@ -102,7 +102,7 @@ contains
             theory_limit_type('drop', 'deflection over wall_thickness', history%max_deflection/wall, highest=2.0_wp, &
             reason='a wall that is pressed further buckles inwards'), &
             get_wave_limit(ball, history, 0.25_wp), &
-            theory_limit_type('ball', 'strain of the wall by gauge_pressure', &
+            theory_limit_type('ball', 'stress of the wall by gauge_pressure over youngs_modulus', &
             ball%gauge_pressure*(radius - wall)/(2*wall*ball%youngs_modulus), highest=0.1_wp, &
             reason='the wall is free of stress before first touch')]
       end associate

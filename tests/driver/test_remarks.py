@@ -76,7 +76,8 @@ OUTSIDE = {
     "&drop: deflection over outer_radius is 0.": "&drop height = 3 /",
     "&drop: deflection over wall_thickness is 4.0": "&ball wall_thickness = 0.01, mass = 1 /",
     "&drop: velocity at first touch over sqrt(youngs_modulus/density) is 0.3": "&drop height = 7 /",
-    "&ball: strain of the wall by gauge_pressure is 0.1": "&ball gauge_pressure = 3e5 /",
+    "&ball: stress of the wall by gauge_pressure over youngs_modulus is 0.1": "&ball"
+    " gauge_pressure = 3e5 /",
     "&drop: gravity times contact time over velocity at first touch is 0.4": "&drop"
     " height = 0.01 /",
     "&sampling: sample_rate in Hz is 4000.0, the theory holds from 8000.0": "&sampling"
