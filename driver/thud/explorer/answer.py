@@ -129,7 +129,7 @@ def _answer(
         "numbers": [
             ["peak", float(peak), "N"],
             ["contact", 1e3 * source.contact_time, "ms"],
-            ["restitution", float(source.restitution), ""],
+            ["restitution", *_plain([source.restitution]), ""],
         ],
         "remarks": [],
     }
