@@ -171,6 +171,14 @@ def test_recording_is_judged(client: TestClient) -> None:
     assert answer["drops"] == 1
 
 
+def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> None:
+    content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
+    report = last_report(client, "/measure", params={"name": "drop_1.csv"}, content=content)
+    assert ["restitution", None, ""] in report["answer"]["numbers"]
+    remarks = report["answer"]["remarks"]
+    assert any("drop_1.csv: the force rings on" in remark for remark in remarks)
+
+
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])
 def test_hostile_recordings_get_a_sentence(client: TestClient, name: str) -> None:
     report = last_report(client, "/measure", params={"name": name}, content=b"\0" * 100)

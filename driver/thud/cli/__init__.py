@@ -173,7 +173,7 @@ def new_parser() -> argparse.ArgumentParser:
         prog="thud-driver",
         description="Cases with figures, recordings, floors, fits and studies.",
         epilog="Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, "
-        "3 not conforming (run --check), 130 interrupted, 143 terminated.",
+        "3 not conforming (--check), 130 interrupted, 143 terminated.",
     )
     parser.add_argument("--version", action="version", version=f"thud {version()}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", dest="name")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -109,6 +110,8 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
         raise type(error)(str(error).replace(path, shown(name))) from error
     found["seconds"] = time.perf_counter() - start
     found["drops"] = len(recording.drops)
+    copy = Path(path).name
+    found["remarks"] += [remark.replace(copy, name) for remark in recording.remarks]
     return found
 
 
@@ -129,7 +132,7 @@ def _answer(
         "numbers": [
             ["peak", float(peak), "N"],
             ["contact", 1e3 * source.contact_time, "ms"],
-            ["restitution", float(source.restitution), ""],
+            ["restitution", *_plain([source.restitution]), ""],
         ],
         "remarks": [],
     }

@@ -194,7 +194,7 @@ async def _forget(request: Request, error: Exception) -> Response:  # noqa: ARG0
 def _stream(reports: AsyncIterator[dict[str, Any]]) -> Response:
     async def lines() -> AsyncIterator[str]:
         async for report in reports:
-            yield json.dumps(report) + "\n"
+            yield json.dumps(report, allow_nan=False) + "\n"
 
     return StreamingResponse(lines(), media_type="application/x-ndjson", headers=HEADERS)
 

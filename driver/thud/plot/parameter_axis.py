@@ -35,7 +35,8 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
     if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:
         unit, size = handy_unit(unit, maximum)
         factor = 1 / size
-    label = words(parameter) if unit == "1" else f"{words(parameter)}, {unit}"
+    shown = unit.replace("degC", "°C")
+    label = words(parameter) if unit == "1" else f"{words(parameter)}, {shown}"
     axes.set(**{f"{which}label": label})
     axis: Axis = getattr(axes, f"{which}axis")
     axis.label.set_fontsize(SIZE)

@@ -76,7 +76,7 @@ function summarise({ name, answer }) {
 
 function showCriteria(variants) {
   const cell = (one) => {
-    const found = element("td", { class: one.verdict === "conforms" ? "conforms" : "fails" }, rounded(one.value, one.unit).replace(` ${one.unit}`, ""));
+    const found = element("td", { class: one.verdict === "conforms" ? "conforms" : "fails" }, rounded(one.value, one.unit).replace(one.unit && ` ${one.unit}`, ""));
     if (one.uncertainty) found.append(` ± ${Number(one.uncertainty.toPrecision(2))}`);
     const exact = one.lower === one.upper || one.value === null;
     return [found, element("td", { class: "margin" }, exact ? "" : signed(margin(one), one.unit), " ", away(one))];
