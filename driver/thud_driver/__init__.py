@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 from contextlib import suppress
-from threading import Timer
+from threading import Thread, main_thread
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
@@ -71,6 +71,7 @@ class _Interrupt:
         self.first = 0.0
         self.number = 0
         self.heard = False
+        self.sender: Thread | None = None
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         if not self.first:
@@ -81,11 +82,14 @@ class _Interrupt:
             _end(number, frame)
 
     def attempt(self, number: int, frame: FrameType | None) -> None:
-        """Raise it, but not during an import: modules lose or print what they do not expect."""
-        self.heard = True
-        while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        """Raise it, but not in imports and `retry`: they lose or print what they do not expect."""
+        while frame and not (
+            frame.f_code.co_filename.startswith("<frozen importlib")
+            or frame.f_code is _Interrupt.retry.__code__
+        ):
             frame = frame.f_back
         if not frame:
+            self.heard = True
             signal.signal(number, self)
             raise KeyboardInterrupt(number)
         if time.monotonic() > self.first + _PATIENCE:
@@ -96,15 +100,17 @@ class _Interrupt:
         """Try again a little later."""
         signal.signal(number, self.attempt)
         self.heard = False
-        timer = Timer(_PAUSE, self._send, (number,))
-        timer.daemon = True
-        timer.start()
+        if not self.sender:
+            self.sender = Thread(target=self._send, args=(number,), daemon=True)
+            self.sender.start()
 
     def _send(self, number: int) -> None:
-        # A call of the library that begins just then leaves the first unheard, and hears the next.
-        while not self.heard:
-            signal.raise_signal(number)
+        # A call of the library that begins just then leaves the first unheard, and hears the next;
+        # the main thread may wait for the system, which a signal to another would not end.
+        while True:
             time.sleep(_PAUSE)
+            if not self.heard:
+                signal.pthread_kill(cast("int", main_thread().ident), number)
 
     def retry(self, lost: sys.UnraisableHookArgs) -> None:
         """Take up what a callback, such as one of a weak reference, could not raise."""
