@@ -81,9 +81,12 @@ class _Interrupt:
             _end(number, frame)
 
     def attempt(self, number: int, frame: FrameType | None) -> None:
-        """Raise it, but not during an import: modules lose or print what they do not expect."""
+        """Raise it, but not during imports and `retry`, which lose or print what they do not expect."""
         self.heard = True
-        while frame and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        while frame and not (
+            frame.f_code.co_filename.startswith("<frozen importlib")
+            or frame.f_code is _Interrupt.retry.__code__
+        ):
             frame = frame.f_back
         if not frame:
             signal.signal(number, self)

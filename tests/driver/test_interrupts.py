@@ -293,3 +293,35 @@ def test_main_thread_alone_defers_signals() -> None:
     with ThreadPoolExecutor(1) as thread:
         thread.submit(defer).result()
     assert done == [1, 1]
+
+
+def test_interrupt_that_comes_while_a_lost_one_is_taken_up_is_heard() -> None:
+    script = """
+import signal, time
+import sys, thud_driver
+
+class Slow(thud_driver.Timer):
+    pauses = [0.1]
+
+    def start(self):
+        super().start()
+        time.sleep(self.pauses.pop() if self.pauses else 0)
+
+class Deaf:
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+thud_driver.Timer = Slow
+interrupt = thud_driver._Interrupt()
+sys.unraisablehook = interrupt.retry
+thud_driver._handle(interrupt)
+try:
+    Deaf()
+    time.sleep(20)
+except KeyboardInterrupt:
+    print("heard")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=LIMIT
+    )
+    assert (done.stdout, done.stderr) == ("heard\n", "")
