@@ -84,6 +84,17 @@ def scale_figures(app: Sphinx, document: nodes.document) -> None:
         image["classes"] += ["wide"] * (width > 1.1 * COLUMN)
 
 
+def keep_punctuation(_: Sphinx, document: nodes.document) -> None:
+    """Let no line begin with the punctuation behind a formula."""
+    for formula in list(document.findall(nodes.math)):
+        line, place = formula.parent, formula.parent.index(formula)
+        behind = line[place + 1 : place + 2]
+        mark = behind and re.match(r"[.,:;)]+", behind[0].astext())
+        if mark and isinstance(behind[0], nodes.Text):
+            kept = nodes.inline("", "", formula, nodes.Text(mark[0]), classes=["formula"])
+            line[place : place + 2] = [kept, nodes.Text(behind[0][mark.end() :])]
+
+
 def write_mathml(translator: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
     """Write a formula as MathML, with the spaces of TeX, which browsers set by themselves."""
     block = isinstance(node, nodes.math_block)
@@ -94,11 +105,12 @@ def write_mathml(translator: HTML5Translator, node: nodes.math | nodes.math_bloc
     formula = re.sub(rf"(?<![^9];</mo>)(?<!<mrow>)(?={name})", thin, formula)
     formula = re.sub(rf"({name})(?!<mo)", rf"\1{thin}", formula)
     formula = formula.replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">/</mo>')
-    translator.body.append(f'<div class="math">{formula}</div>' if block else f"{formula}&NoBreak;")
+    translator.body.append(f'<div class="math">{formula}</div>' if block else formula)
     raise nodes.SkipNode
 
 
 def setup(app: Sphinx) -> None:
-    """Write formulas as MathML, and scale figures when a page was read."""
+    """Write formulas as MathML; scale figures and join punctuation when a page was read."""
     app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))
     app.connect("doctree-read", scale_figures)
+    app.connect("doctree-read", keep_punctuation)
