@@ -7,12 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from docutils import nodes
+from latex2mathml.converter import convert
 from matplotlib.image import imread
 
 import thud
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
+    from sphinx.writers.html5 import HTML5Translator
 
 project = "thud"
 author = "The thud developers"
@@ -27,7 +29,7 @@ extensions = [
     "sphinx.ext.viewcode",
     "sphinx_copybutton",
 ]
-myst_enable_extensions = ["colon_fence", "deflist"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 source_suffix = {".md": "myst-nb", ".rst": "restructuredtext"}
 templates_path = ["docs/site/templates"]
@@ -53,6 +55,7 @@ add_module_names = False
 
 highlight_language = "none"  # blocks without a language are what programs print
 
+html_math_renderer = "mathml"
 html_theme = "furo"
 html_title = f"thud {release}"
 html_extra_path = ["../ford"]  # made by FORD
@@ -81,6 +84,33 @@ def scale_figures(app: Sphinx, document: nodes.document) -> None:
         image["classes"] += ["wide"] * (width > 1.1 * COLUMN)
 
 
+def keep_punctuation(_: Sphinx, document: nodes.document) -> None:
+    """Let no line begin with the punctuation behind a formula."""
+    for formula in list(document.findall(nodes.math)):
+        line, place = formula.parent, formula.parent.index(formula)
+        behind = line[place + 1 : place + 2]
+        mark = behind and re.match(r"[.,:;)]+", behind[0].astext())
+        if mark and isinstance(behind[0], nodes.Text):
+            kept = nodes.inline("", "", formula, nodes.Text(mark[0]), classes=["formula"])
+            line[place : place + 2] = [kept, nodes.Text(behind[0][mark.end() :])]
+
+
+def write_mathml(translator: HTML5Translator, node: nodes.math | nodes.math_block) -> None:
+    """Write a formula as MathML, with the spaces of TeX, which browsers set by themselves."""
+    block = isinstance(node, nodes.math_block)
+    text = node.astext().replace("''", "\u2033").replace("'", "\u2032")  # else small superscripts
+    formula = convert(text, display="block" if block else "inline")
+    # A name stands apart from a number, a symbol or a closing bracket (&#x00029;).
+    name, thin = r"<mi>\w\w+</mi>", '<mspace width="0.17em"/>'
+    formula = re.sub(rf"(?<![^9];</mo>)(?<!<mrow>)(?={name})", thin, formula)
+    formula = re.sub(rf"({name})(?!<mo)", rf"\1{thin}", formula)
+    formula = formula.replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">/</mo>')
+    translator.body.append(f'<div class="math">{formula}</div>' if block else formula)
+    raise nodes.SkipNode
+
+
 def setup(app: Sphinx) -> None:
-    """Scale figures when a page was read."""
+    """Write formulas as MathML; scale figures and join punctuation when a page was read."""
+    app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))
     app.connect("doctree-read", scale_figures)
+    app.connect("doctree-read", keep_punctuation)

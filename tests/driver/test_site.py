@@ -16,6 +16,11 @@ import thud
 if TYPE_CHECKING:
     from pathlib import Path
 
+THEORY = (
+    *("hollow_sphere", "lumped_models", "modal_ball", "finite_elements", "compression"),
+    *("ball_impedance", "floors", "rooms", "levels", "recordings_theory"),
+)
+
 
 class Page(HTMLParser):
     """Links and anchors of a page, and what it loads."""
@@ -92,3 +97,14 @@ def test_every_page_of_the_documentation_is_in_the_site(site: Path) -> None:
     for page in [*docs.glob("*.md"), *docs.glob("tutorials/*.md")]:
         place = page.relative_to(REPOSITORY).with_suffix(".html").as_posix()
         assert f'href="{place}"' in menu, page
+
+
+def test_formulas_are_set(site: Path) -> None:
+    raw, formulas = {}, {}
+    for path in site.glob("docs/*.html"):
+        text = path.read_text(encoding="utf-8")
+        formulas[path.stem] = text.count("<math")
+        words = re.sub(r"<(script|pre|code)\b.*?</\1>", "", text, flags=re.DOTALL)
+        raw[path.stem] = re.findall(r"\\[a-z]+|\$", words)
+    assert not any(raw.values()), raw
+    assert all(formulas[page] for page in THEORY), formulas
