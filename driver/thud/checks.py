@@ -135,4 +135,6 @@ def require_words(
             listed = ", ".join(allowed)
             if new in allowed:
                 refuse(f"{place}: {word!r} is now {new!r}", listed)
-            refuse(f"{place}: {word!r} is not known{suggestion(word, [*allowed, *also])}", listed)
+            long = isinstance(word, str) and len(word) > LONGEST_SHOWN
+            name = f"a word of {len(word)} characters" if long else repr(word)
+            refuse(f"{place}: {name} is not known{suggestion(word, [*allowed, *also])}", listed)

@@ -267,7 +267,7 @@ contains
 
       call read_text_file(path, text, error)
       if (.not. allocated(error)) call read_case(text, get_file_stem(path), case, error, unchecked)
-      if (allocated(error)) error%message = path//': '//error%message
+      if (allocated(error)) error = input_error(path//': '//error%message)
    end subroutine load_case
 
 end module thud_run

@@ -288,6 +288,27 @@ def test_replace_keeps_what_is_of_this_version(tmp_path: Path) -> None:
     assert (tmp_path / "python.nc").read_bytes() == before
 
 
+def test_interrupt_of_a_removal_leaves_no_half_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = {**HEIGHTS, "format": "zarr", "name": "heights"}
+    thud.sweep(study, tmp_path)
+    changed = {**study, "parameters": {"height": {"values": [0.7]}}}
+
+    def interrupt(path: Path, *, ignore_errors: bool = False) -> None:
+        if not ignore_errors:
+            next(path.rglob("zarr.json")).unlink()
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr("shutil.rmtree", interrupt)
+        with pytest.raises(KeyboardInterrupt):
+            thud.sweep(changed, tmp_path, replace=True)
+    found = thud.sweep(changed, tmp_path)
+    assert found["height"].values.tolist() == [0.7]
+    assert [path.name for path in tmp_path.iterdir()] == ["heights.zarr"]
+
+
 def test_replace_does_not_remove_what_is_of_something_else(tmp_path: Path) -> None:
     (tmp_path / "python.nc").write_text("a paper")
     with pytest.raises(thud.InputError, match="cannot be read; allowed: results of a study"):

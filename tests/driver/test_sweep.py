@@ -384,6 +384,15 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("", r"\[parameters\] is empty; allowed: one"),
         ("[parameters]\n[parameters]", "allowed: TOML"),
         ("sets = 3", "'sets' is not known; allowed: name, case"),
+        (f"{'12' * 50} = 3", "the study: a word of 100 characters is not known; allowed: name"),
+        (
+            "parameters.temperature.values = [19]\ntemperature.c1 = 8\ntemperature.c2 = 120",
+            r"\[temperature\] has no reference; allowed: reference with coefficient, or",
+        ),
+        (
+            'case = "\\n"\nparameters.height.values = [1]',
+            r"\?: there is no such file; allowed: the path of a namelist",
+        ),
         ("parameters = 3", r"parameters = 3 .*allowed: a table"),
         ("name = 'a/b'\nparameters.height.values = [1]", "name = 'a/b'.*without folders"),
         ("name = '..'\nparameters.height.values = [1]", r"name = '\.\.' .*without folders"),
@@ -457,10 +466,10 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ),
         ("fixed.temperature = 1\nparameters.mass.values = [1]", r"temperature in \[parameters\]"),
         ("parameters.temperature.values = [1]", "allowed: reference, degC, and coefficient"),
-        ("temperature.reference = 1\nparameters.temperature.values = [1]", "coefficient = None"),
+        ("temperature.reference = 1\nparameters.temperature.values = [1]", "has no coefficient"),
         (
             "temperature = {reference=1, c1=8}\nparameters.temperature.values = [1]",
-            r"\[temperature\] c2 = None",
+            r"\[temperature\] has no c2",
         ),
         (
             "temperature = {reference=1, c1=8, c2=-1}\nparameters.temperature.values = [1]",

@@ -101,9 +101,12 @@ def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a directory, if it exists."""
+    """Remove a file or a directory, if it exists; an interrupt leaves its name all or nothing."""
     if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
+        gone = path.with_name(f".{path.name}.part")
+        shutil.rmtree(gone, ignore_errors=True)
+        path.rename(gone)
+        shutil.rmtree(gone)
     else:
         path.unlink(missing_ok=True)
 

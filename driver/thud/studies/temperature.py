@@ -108,11 +108,11 @@ def read_temperature(
     require_words("[temperature]", given, _WORDS)
     shifts = ["c1", "c2"] if {"c1", "c2"} & set(given) else []
     changes = ["coefficient"] if "coefficient" in given or not shifts else []
-    words = ["reference", *changes, *shifts]
-    numbers = {
-        word: float(checked(f"[temperature] {word}", TEMPERATURE, given.get(word), 0))
-        for word in words
-    }
+    numbers = {}
+    for word in ["reference", *changes, *shifts]:
+        if word not in given:
+            refuse(f"[temperature] has no {word}", "reference with coefficient, or with c1 and c2")
+        numbers[word] = float(checked(f"[temperature] {word}", TEMPERATURE, given[word], 0))
     for word in ("c1", "c2"):
         if numbers.get(word, 1.0) <= 0:
             refuse_value(f"[temperature] {word}", given[word], f"0 < {word}")
