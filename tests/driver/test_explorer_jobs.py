@@ -4,12 +4,22 @@ from __future__ import annotations
 
 import os
 import signal
+import struct
+import time
+from multiprocessing import forkserver
 from threading import Timer
+from typing import TYPE_CHECKING, Any
 
 import anyio
 import psutil
 
+from thud.explorer import jobs as module
 from thud.explorer.jobs import Jobs
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
+    import pytest
 
 LONG = {
     "model": {"name": "finite_element"},
@@ -49,3 +59,52 @@ def test_process_that_was_stopped_ends_with_its_page() -> None:
     anyio.run(stop_and_leave)
     assert not late
     assert not workers()
+
+
+def send_half(far: Connection, *_: object) -> None:
+    """Send the length of a report without the report."""
+    os.write(far.fileno(), struct.pack("!i", 1000))
+    time.sleep(60)
+
+
+async def reports_of(jobs: Jobs) -> list[dict[str, Any]]:
+    """Return the reports of a quick work."""
+    return [report async for report in jobs.run("case", {"model": {"name": "hollow_sphere"}})]
+
+
+def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "LONGEST", 0.5)
+    monkeypatch.setattr(module, "_work", send_half)
+    last = anyio.run(reports_of, Jobs(1))[-1]
+    assert last == {"error": "the work takes longer than 0.5 s; allowed: less"}
+    assert not workers()
+
+
+def test_lost_server_of_forks_is_a_sentence_and_begins_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async def lose(jobs: Jobs) -> None:
+        forks = vars(forkserver)["_forkserver"]
+        with monkeypatch.context() as patch:
+            # As where it is killed after it was found to run.
+            patch.setattr(forks, "ensure_running", lambda: None)
+            os.kill(vars(forks)["_forkserver_pid"], signal.SIGKILL)
+            assert "without an answer" in (await reports_of(jobs))[-1]["error"]
+        assert "answer" in (await reports_of(jobs))[-1]
+
+    anyio.run(lose, Jobs(1))
+
+
+def test_reports_are_ended_by_another_task() -> None:
+    async def end_elsewhere(jobs: Jobs) -> None:
+        reports = jobs.run("case", LONG)
+        async with anyio.create_task_group() as group:
+            group.start_soon(anext, reports)
+        async with anyio.create_task_group() as group:
+            group.start_soon(anext, reports)
+        await reports.aclose()
+        assert not workers()
+        with anyio.fail_after(60):
+            assert "answer" in (await reports_of(jobs))[-1]
+
+    anyio.run(end_elsewhere, Jobs(1))

@@ -136,6 +136,19 @@ def test_recording_on_the_page_is_judged(browser: Browser, server: Served) -> No
     sync_api.expect(page.locator("#message")).to_contain_text("<b>note</b>.wav", timeout=60_000)
 
 
+def test_recording_is_seen_and_cancelled_before_the_server_answers(
+    browser: Browser, server: Served
+) -> None:
+    page = new_page(browser, server[0])
+    page.route("**/measure*", lambda _: None)
+    page.locator("summary", has_text="Recording").click()
+    page.locator("#file").set_input_files(RECORDING)
+    sync_api.expect(page.locator(".work")).to_contain_text("Measuring drop_1.wav")
+    page.locator(".work button").click()
+    sync_api.expect(page.locator(".work")).to_have_count(0)
+    sync_api.expect(page.locator("#message")).to_be_hidden()
+
+
 def test_slow_work_is_cancelled(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     page.locator("#model").select_option("finite_element")
@@ -162,8 +175,16 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     page.locator("#floor").select_option("joist_floor")
     sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
     sync_api.expect(page.locator("#floor_words")).to_contain_text("energy into the floor 2.7")
+    page.locator("#pin").click()
     sync_api.expect(page.locator("#ball_words")).to_contain_text("times as large")
     page.locator("#floor").select_option("")
+    sync_api.expect(page.locator("#variants li")).to_have_text(
+        [
+            re.compile(r"^\s*Hollow sphere\s*$"),
+            re.compile("A: Hollow sphere Floor: Joist floor, Room below"),
+        ]
+    )
+    page.locator("#variants button").click()
     sync_api.expect(page.locator("#room_section")).to_be_hidden()
     sync_api.expect(page.locator("#floor_section")).to_be_hidden()
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import secrets
+import signal
 import socket
 import sys
 import webbrowser
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from thud.checks import refuse
@@ -16,7 +18,7 @@ from thud.extras import require_extra
 if TYPE_CHECKING:
     import argparse
 
-# Names of this machine for itself.
+# Names of this machine for itself, as addresses of pages hold them.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 
@@ -28,15 +30,19 @@ def explore(options: argparse.Namespace) -> int:
         from thud.explorer.server import new_application, start_with  # noqa: PLC0415 - likewise
     start = start_with(options.case)
     token = secrets.token_urlsafe(16)
-    hosts = LOOPBACK if options.host in LOOPBACK else ("*",)
+    version_6 = ":" in options.host
+    host = f"[{options.host}]" if version_6 else options.host
+    hosts = LOOPBACK if host in LOOPBACK else ("*",)
     application = new_application(start, token=token, hosts=hosts)
     if not 0 <= options.port < 2**16:
         refuse(f"--port = {options.port} is no port", f"0 (any that is free) to {2**16 - 1}")
     try:
-        listener = socket.create_server((options.host, options.port))
+        listener = socket.create_server(
+            (options.host, options.port), family=socket.AF_INET6 if version_6 else socket.AF_INET
+        )
     except OSError as error:
-        refuse(f"{options.host}:{options.port} cannot be listened on", "a free port", error)
-    address = f"http://{options.host}:{listener.getsockname()[1]}/#token={token}"
+        refuse(f"{host}:{options.port} cannot be listened on", "a free port", error)
+    address = f"http://{host}:{listener.getsockname()[1]}/#token={token}"
     if not options.quiet:
         print(f"Page: {address}")
         print("Ctrl-C ends it.")
@@ -47,11 +53,25 @@ def explore(options: argparse.Namespace) -> int:
             "who has the address can compute here",
             file=sys.stderr,
         )
-    if not options.no_browser:
-        webbrowser.open(address)
     config = uvicorn.Config(application, log_level="warning", timeout_graceful_shutdown=1)
-    uvicorn.Server(config).run(sockets=[listener])
+    # The server raises again, when it has ended, the signal that ended it.
+    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
+    with listener, TemporaryDirectory() as folder:
+        if not options.no_browser:
+            webbrowser.open(_redirect(Path(folder), address))
+        uvicorn.Server(config).run(sockets=[listener])
     return 0
+
+
+def _redirect(folder: Path, address: str) -> str:
+    """Return the address of a file that leads to a page.
+
+    Other users of the machine see the arguments of the browser, but cannot read the file.
+    """
+    path = folder / "open.html"
+    path.touch(0o600)
+    path.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">')
+    return path.as_uri()
 
 
 EXPLORE = Command(

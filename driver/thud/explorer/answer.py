@@ -111,7 +111,10 @@ def answer_recording(path: str, name: str, settings: Mapping[str, Any]) -> Answe
     found["seconds"] = time.perf_counter() - start
     found["drops"] = len(recording.drops)
     copy = Path(path).name
-    found["remarks"] += [remark.replace(copy, name) for remark in recording.remarks]
+    # The page says whose the remarks are.
+    found["remarks"] += [
+        remark.removeprefix(f"{copy}: ").replace(copy, name) for remark in recording.remarks
+    ]
     return found
 
 

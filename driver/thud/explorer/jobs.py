@@ -18,7 +18,7 @@ from thud.explorer.answer import answer_case, answer_recording, new_case
 from thud.explorer.downloads import DOWNLOADS
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable
+    from collections.abc import AsyncGenerator, Callable
     from multiprocessing.connection import Connection
 
 # Works by name; each takes plain data.
@@ -45,48 +45,43 @@ class Jobs:
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([__name__])
         forkserver.ensure_running()
-        self._limit = anyio.CapacityLimiter(width)
+        # What ends the reports need not be the task that asked for them.
+        self._places = anyio.Semaphore(width)
 
-    async def run(self, work: str, *arguments: object) -> AsyncIterator[dict[str, Any]]:
+    async def run(self, work: str, *arguments: object) -> AsyncGenerator[dict[str, Any], None]:
         """Yield reports ``{"done": part}``, at last ``{"answer": …}`` or ``{"error": sentence}``.
 
         The first report comes before the work begins. The process is ended, and its temporary files
         are removed, where the caller stops to ask.
         """
         yield {"done": 0.0}
-        async with self._limit:
+        async with self._places:
             with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
                 near, far = self._context.Pipe()
                 process = self._context.Process(
                     target=_work, args=(far, folder, work, arguments), daemon=True
                 )
-                process.start()
-                far.close()
                 try:
-                    with anyio.move_on_after(LONGEST) as limit:
-                        while True:
-                            report = await anyio.to_thread.run_sync(_next, near)
-                            yield report
-                            if "done" not in report:
-                                return
-                    if limit.cancelled_caught:
-                        yield {"error": f"the work takes longer than {LONGEST:g} s; allowed: less"}
+                    with far:
+                        process.start()
+                    end = anyio.current_time() + LONGEST
+                    report: dict[str, Any] = {"done": 0.0}
+                    while "done" in report:
+                        report = {
+                            "error": f"the work takes longer than {LONGEST:g} s; allowed: less"
+                        }
+                        # A thread that is left still waiting ends with the process.
+                        with anyio.CancelScope(deadline=end):
+                            report = await anyio.to_thread.run_sync(
+                                near.recv, abandon_on_cancel=True
+                            )
+                        yield report
+                except (EOFError, OSError):
+                    yield {"error": "the work ended without an answer, perhaps for want of memory"}
                 finally:
-                    near.close()
-                    process.kill()
-                    process.join()
-
-
-def _next(near: Connection) -> dict[str, Any]:
-    """Return the next report of a process."""
-    try:
-        # A process that was stopped says nothing, and its page may leave.
-        while not near.poll(INTERVAL):
-            anyio.from_thread.check_cancelled()
-        report: dict[str, Any] = near.recv()
-    except EOFError:
-        report = {"error": "the work ended without an answer, perhaps for want of memory"}
-    return report
+                    if process.pid is not None:
+                        process.kill()
+                        process.join()
 
 
 def _work(far: Connection, folder: str, work: str, arguments: tuple[Any, ...]) -> None:

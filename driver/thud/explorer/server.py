@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import secrets
-from contextlib import aclosing
+from contextlib import AsyncExitStack, aclosing
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -30,9 +30,10 @@ from thud.explorer.form import form
 from thud.explorer.jobs import REFUSALS, Jobs
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
+    from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping
 
     from starlette.requests import Request
+    from starlette.types import Receive, Scope, Send
 
     Endpoint = Callable[[Request], Awaitable[Response]]
 
@@ -73,7 +74,7 @@ def new_application(
     hosts
         Names under which the server may be asked.
     width
-        Slow works at a time.
+        Slow works, and copies of recordings, at a time.
     """
     application = Starlette(
         routes=[
@@ -100,6 +101,7 @@ def new_application(
     }
     application.state.token = token
     application.state.jobs = Jobs(width)
+    application.state.copies = anyio.Semaphore(width)
     return application
 
 
@@ -120,7 +122,7 @@ async def _solve(request: Request) -> Response:
     values = await _values(request)
     answer = await run_in_threadpool(_answer_at_once, values)
     if answer is None:
-        return _stream(request.app.state.jobs.run("case", values))
+        return _Reports(request.app.state.jobs.run("case", values), AsyncExitStack())
     return JSONResponse({"answer": answer}, headers=HEADERS)
 
 
@@ -140,18 +142,14 @@ async def _measure(request: Request) -> Response:
         settings["channel"] = channel_of(asked["channel"])
     name = asked.get("name", "recording.wav")
     ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
-    folder = TemporaryDirectory()
-    try:
-        path = Path(folder.name, f"recording.{ending}")
+    async with AsyncExitStack() as needs:
+        await needs.enter_async_context(request.app.state.copies)
+        path = Path(needs.enter_context(TemporaryDirectory()), f"recording.{ending}")
         async with await anyio.open_file(path, "wb") as copy:
             async for part in _body(request, MAX_RECORDING):
                 await copy.write(part)
-    except BaseException:
-        folder.cleanup()
-        raise
-    return _stream(
-        _with(folder, request.app.state.jobs.run("recording", str(path), name, settings))
-    )
+        reports = request.app.state.jobs.run("recording", str(path), name, settings)
+        return _Reports(reports, needs.pop_all())
 
 
 async def _download(request: Request) -> Response:
@@ -191,12 +189,20 @@ async def _forget(request: Request, error: Exception) -> Response:  # noqa: ARG0
     return Response(status_code=400)
 
 
-def _stream(reports: AsyncIterator[dict[str, Any]]) -> Response:
-    async def lines() -> AsyncIterator[str]:
-        async for report in reports:
-            yield json.dumps(report, allow_nan=False) + "\n"
+class _Reports(StreamingResponse):
+    """Reports as lines; they and what they need end with the response, even one never begun."""
 
-    return StreamingResponse(lines(), media_type="application/x-ndjson", headers=HEADERS)
+    def __init__(
+        self, reports: AsyncGenerator[dict[str, Any], None], needs: AsyncExitStack
+    ) -> None:
+        needs.push_async_callback(reports.aclose)
+        self._needs = needs
+        lines = (json.dumps(report, allow_nan=False) + "\n" async for report in reports)
+        super().__init__(lines, media_type="application/x-ndjson", headers=HEADERS)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async with self._needs:
+            await super().__call__(scope, receive, send)
 
 
 def _number(key: str, text: str) -> float:
@@ -204,15 +210,6 @@ def _number(key: str, text: str) -> float:
         return float(text)
     except ValueError as error:
         refuse(f"{key} = {shown(text)} is not a number", "a number", error)
-
-
-async def _with(
-    folder: TemporaryDirectory[str], reports: AsyncIterator[dict[str, Any]]
-) -> AsyncIterator[dict[str, Any]]:
-    """Yield reports, and remove a folder where they end."""
-    with folder:
-        async for report in reports:
-            yield report
 
 
 async def _body(request: Request, largest: int) -> AsyncIterator[bytes]:

@@ -42,15 +42,17 @@ function fail(error) {
 
 // ---- Works that the server reports on.
 
-/** Follow a work; it is shown with a button that ends it as soon as it reports. */
-async function work(name, path, body, stop, reported = () => {}) {
+/** Follow a work; it is shown with a button that ends it, by default as soon as it reports. */
+async function work(name, path, body, stop, { atOnce = false, reported = () => {} } = {}) {
   const bar = element("progress", { max: 1, "aria-label": name });
   const button = element("button", { type: "button" }, "Cancel");
   button.addEventListener("click", () => stop.abort());
   const line = element("div", { class: "work" }, element("span", {}, name), bar, button);
+  const appear = () => { if (!line.isConnected) byId("works").append(line); };
+  if (atOnce) appear();
   try {
     return await follow(path, body, stop.signal, (part) => {
-      if (!line.isConnected) byId("works").append(line);
+      appear();
       if (part > 0) bar.value = part;
       reported();
     });
@@ -67,7 +69,7 @@ async function solve() {
   const own = { stop: new AbortController(), slow: false, again: false, start: performance.now() };
   job = own;
   try {
-    const answer = await work("Computing", "solve", JSON.stringify(caseValues()), own.stop, () => { own.slow = true; });
+    const answer = await work("Computing", "solve", JSON.stringify(caseValues()), own.stop, { reported: () => { own.slow = true; } });
     hush();
     current = { name: titleOf("model", state.model), short: titleOf("model", state.model), words: changedWords(), answer, slow: own.slow };
     refresh();
@@ -100,7 +102,7 @@ async function measure(file) {
     if (given) query.set(key, given);
   }
   try {
-    const answer = await work(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController());
+    const answer = await work(`Measuring ${file.name}`, `measure?${query}`, file, new AbortController(), { atOnce: true });
     hush();
     const name = `${file.name}, ${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
     pinned.push({ name, short: name, words: answer.verdict, answer, pinned: true });

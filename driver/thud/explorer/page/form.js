@@ -32,9 +32,11 @@ export function caseValues() {
   return structuredClone(found);
 }
 
-/** Return what differs from the defaults, in words. */
+/** Return floor, room and what differs from the defaults, in words. */
 export function changedWords() {
   const words = [];
+  if (state.floor) words.push(`Floor: ${titleOf("floor", state.floor)}`);
+  if (state.room) words.push("Room below");
   for (const { fields } of used()) {
     for (const field of fields) {
       const value = state.values[field.group]?.[field.name];
