@@ -118,7 +118,11 @@ def shown(value: object) -> str:
         return "a very large number"
     text = repr(value)
     fits = len(text) <= LONGEST_SHOWN and "\n" not in text
-    return text if fits else f"an object of {type(value).__name__}"
+    if fits:
+        return text
+    if isinstance(value, str):
+        return f"a text of {len(value)} characters"
+    return f"an object of {type(value).__name__}"
 
 
 def require_words(
@@ -135,6 +139,5 @@ def require_words(
             listed = ", ".join(allowed)
             if new in allowed:
                 refuse(f"{place}: {word!r} is now {new!r}", listed)
-            long = isinstance(word, str) and len(word) > LONGEST_SHOWN
-            name = f"a word of {len(word)} characters" if long else repr(word)
-            refuse(f"{place}: {name} is not known{suggestion(word, [*allowed, *also])}", listed)
+            hint = suggestion(word, [*allowed, *also])
+            refuse(f"{place}: {shown(word)} is not known{hint}", listed)

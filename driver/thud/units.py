@@ -48,7 +48,7 @@ def power_of(unit: object, key_unit: str, place: str) -> int:
     multiples = MULTIPLES.get(key_unit, {key_unit: 0})
     if not isinstance(unit, str) or unit not in multiples:
         hint = suggestion(unit, multiples)
-        refuse(f"{place}: unit {unit!r} does not fit{hint}", ", ".join(multiples))
+        refuse(f"{place}: unit {shown(unit)} does not fit{hint}", ", ".join(multiples))
     return multiples[unit]
 
 
@@ -77,7 +77,11 @@ def quantity(text: str) -> float:
         refuse(f"quantity = {shown(text)} is not a number and its unit", "such as '32 mm'")
     unit = text[match.end() :].strip()
     if unit not in units:
-        what = f"unit {unit!r} is not known{suggestion(unit, units)}" if unit else "unit is missing"
+        what = (
+            f"unit {shown(unit)} is not known{suggestion(unit, units)}"
+            if unit
+            else "unit is missing"
+        )
         refuse(f"quantity = {shown(text)}: {what}", ", ".join(units))
     value = scaled(float(match[1]), units[unit])
     if not math.isfinite(value):

@@ -384,7 +384,7 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("", r"\[parameters\] is empty; allowed: one"),
         ("[parameters]\n[parameters]", "allowed: TOML"),
         ("sets = 3", "'sets' is not known; allowed: name, case"),
-        (f"{'12' * 50} = 3", "the study: a word of 100 characters is not known; allowed: name"),
+        (f"{'12' * 50} = 3", "the study: a text of 100 characters is not known; allowed: name"),
         (
             "parameters.temperature.values = [19]\ntemperature.c1 = 8\ntemperature.c2 = 120",
             r"\[temperature\] has no reference; allowed: reference with coefficient, or",
