@@ -71,7 +71,7 @@ contains
 
       allocate (bundle)
       call bundle%add_text('version', version)
-      call bundle%add_text('compiler', get_compiler())
+      call bundle%add_text('compiler', trim(get_compiler()))
       call leave(bundle, error, status, handle, n_byte, n_value)
    end subroutine describe_library
 

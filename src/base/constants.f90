@@ -25,10 +25,10 @@ module thud_constants
 
 contains
 
-   !> Compiler of the library in use and its options: a constant would be that of who calls.
+   !> Compiler of the library in use and its options: a constant, or a length of its own, would be that of who calls.
    pure function get_compiler() result(text)
-      !> Name, version and options.
-      character(len=:), allocatable :: text
+      !> Name, version and options, then blanks.
+      character(len=4000) :: text
 
       text = compiler_version()//', options '//compiler_options()
    end function get_compiler
