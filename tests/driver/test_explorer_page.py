@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 sync_api = pytest.importorskip("playwright.sync_api")
 axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+# Machines that test may be busy.
+sync_api.expect.set_options(timeout=30_000)
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
 RECORDING = REPOSITORY / "inputs/recordings/drop_1.wav"
@@ -104,8 +106,10 @@ def test_link_carries_the_case(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     fill(page, "drop.height", "0.4")
     page.locator("#link").click()
+    page.wait_for_function("location.hash.startsWith('#case=')")
     address = page.evaluate("location.href")
     assert "token" not in address
+    assert "0.4" in address
     page.goto("about:blank")
     page.goto(address)
     sync_api.expect(page.locator("[id='drop.height']")).to_have_value("0.4")
