@@ -14,6 +14,7 @@ import xarray as xr
 from thud.checks import refuse
 from thud.files import replace_file, uninterrupted
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
+from thud.studies.directory import remove
 
 if TYPE_CHECKING:
     import os
@@ -48,7 +49,7 @@ class Blocks:
                 before = json.loads((self._partial / MARK).read_bytes())
                 if before != self._identity:
                     # Blocks of another size have gaps or overlap.
-                    shutil.rmtree(self._partial)
+                    remove(self._partial)
                     self._partial.mkdir()
             replace_file(self._partial / MARK, json.dumps(self._identity).encode())
 
