@@ -2,9 +2,11 @@
 module thud_mobility_fit
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
+   use thud_field, only: check_fields
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
    use thud_measured_mobility_floor, only: measured_mobility_floor_type
+   use thud_new_field, only: in_group
    use thud_passivity, only: make_passive
    use thud_text, only: to_text
    use thud_vector_fit, only: fit_rational
@@ -29,7 +31,7 @@ contains
       complex(wp), intent(in) :: mobility(:)
       !> Number of poles, both of a pair counted.
       integer, intent(in) :: order
-      type(measured_mobility_floor_type), intent(out) :: floor
+      type(measured_mobility_floor_type), intent(out), target :: floor
       !> Relative error before the fit was made passive, root of the mean square.
       real(wp), intent(out) :: free_error
       !> There are too few lines or too many poles, or a line is not allowed.
@@ -63,7 +65,8 @@ contains
          end associate
          floor%lowest_frequency = frequency(1)
          floor%highest_frequency = frequency(size(frequency))
-         call floor%check(error)
+         call check_fields(in_group('measured_mobility', floor%get_fields()), error)
+         if (.not. allocated(error)) call floor%check(error)
       end if
    end subroutine fit_mobility
 

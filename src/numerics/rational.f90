@@ -4,6 +4,7 @@
 module thud_rational
    use thud_kinds, only: wp
    use thud_lapack, only: dgeev
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    implicit none (type, external)
    private
 
@@ -131,12 +132,15 @@ contains
       real(wp), intent(in) :: matrix(:, :)
       !> The eigenvalues: [n].
       complex(wp), intent(out) :: eigenvalue(:)
-      !> LAPACK did not find them.
+      !> The matrix is not finite, or LAPACK did not find them.
       logical, intent(out) :: failed
       real(wp) :: copy(size(matrix, 1), size(matrix, 1)), wr(size(matrix, 1)), wi(size(matrix, 1))
       real(wp) :: unused(1, 1), work(16*size(matrix, 1))
       integer :: info
 
+      eigenvalue = 0.0_wp
+      failed = .not. all(ieee_is_finite(matrix))
+      if (failed) return
       copy = matrix
       call dgeev('N', 'N', size(wr), copy, size(wr), wr, wi, unused, 1, unused, 1, work, size(work), info)
       eigenvalue = cmplx(wr, wi, wp)

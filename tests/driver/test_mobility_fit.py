@@ -9,6 +9,7 @@ import pytest
 
 import thud
 from thud.cli import main
+from thud.floors import mobility_fit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -125,6 +126,7 @@ def test_other_universal_files_are_refused(
         (FREQUENCY[:1], MOBILITY[:1], "1 lines above 0 Hz"),
         (FREQUENCY, MOBILITY[:5], "one value for each"),
         (-FREQUENCY[::-1], MOBILITY, "line 1"),
+        (1e5 * FREQUENCY, MOBILITY, "frequency = .* <= 1.0e7 Hz"),
     ],
 )
 def test_tables_of_no_floor_are_refused(
@@ -132,6 +134,30 @@ def test_tables_of_no_floor_are_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=sentence):
         thud.fit_mobility((frequency, values), order=4)
+
+
+def test_values_that_overflow_end_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
+    values = np.where(np.arange(FREQUENCY.size) == 40, 1e308, MOBILITY)
+    with pytest.raises(thud.ThudError, match="no passive function of 8 poles"):
+        thud.fit_mobility((FREQUENCY, values), order=8)
+    # The linear algebra says nothing of its own.
+    assert capfd.readouterr() == ("", "")
+
+
+def test_orders_that_fail_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = mobility_fit._fit  # noqa: SLF001 - what a measurement makes it do is not known
+
+    def fails(name: str, f: np.ndarray, values: np.ndarray, order: int) -> thud.MobilityFit:
+        if order != 2 * len(MODES):
+            message = "no passive function"
+            raise thud.NumericalError(message)
+        return usual(name, f, values, order)
+
+    monkeypatch.setattr(mobility_fit, "_fit", fails)
+    assert thud.fit_mobility((FREQUENCY, MOBILITY)).error < 1e-6
+    monkeypatch.setattr(mobility_fit, "_ORDERS", (2, 4))
+    with pytest.raises(thud.NumericalError, match="measurement: no passive function"):
+        thud.fit_mobility((FREQUENCY, MOBILITY))
 
 
 @pytest.mark.parametrize("order", [0, 65, 300])

@@ -107,12 +107,18 @@ def _memory() -> int:
 def _work(part: str) -> None:
     """Make the attempts whose seeds the standard input gives; print word and detail of each."""
     warnings.simplefilter("ignore")
+    answers = os.fdopen(os.dup(1), "w")
+    # Whatever else is printed goes to the same file as errors, which must not grow.
+    os.dup2(2, 1)
     attempt = import_module(part).attempt
     if not SANITIZED:
         resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
     handles = usual = None
     for seed in json.loads(sys.stdin.read()):
+        silent = os.fstat(2).st_size
         word, detail = _made(attempt, seed)
+        if os.fstat(2).st_size > silent:
+            word, detail = "raw", f"prints {os.pread(2, 500, silent)!r}; {word}: {detail}"
         left = [path.name for path in Path().iterdir()]
         if left:
             word, detail = "left behind", f"{left}"
@@ -123,8 +129,8 @@ def _work(part: str) -> None:
         if usual is not None and memory > usual + GROWTH and not SANITIZED:
             word, detail = "grown", f"{(memory - usual) / 2**20:.0f} MiB; {word}: {detail}"
         handles, usual = open_now, max(memory, usual or memory)
-        sys.stdout.write(json.dumps([word, detail]) + "\n")
-        sys.stdout.flush()
+        answers.write(json.dumps([word, detail]) + "\n")
+        answers.flush()
 
 
 def _made(attempt: Callable[[random.Random], tuple[str, str]], seed: int) -> tuple[str, str]:

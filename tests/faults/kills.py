@@ -87,7 +87,10 @@ def _check(name: str, chance: random.Random, place: Path) -> Finding:
         sent.append((sent[0][0] + chance.uniform(0, 0.1), -signal.SIGKILL))
     first = forks().run(Order(scenario.given(NEW), str(place), sent))
     word = judge_end(first) or judge_files(name, place, old=old, done=first.code == 0)
-    finished = _work(place) if list((place / OUT).glob("*.part*")) else set()
+    parts = list((place / OUT).glob("*.part*"))
+    # Of whole results no part is needed any more.
+    whole = undisturbed(name, NEW)[0].items() <= files_of(place / OUT).items()
+    finished = _work(place) if parts and not whole else set()
     (place / WORK).unlink(missing_ok=True)
     again = forks().run(Order(scenario.given(NEW), str(place)))
     word = word or judge_again(name, place, again, old=old)

@@ -37,8 +37,8 @@ INSERTIONS = [
     "\x1b", "\x7f", "\u2028", "\u00a0",
 ]  # fmt: skip
 # Parts of the accepted cases that are computed.
-COMPUTED = {"modal_ball": 0.05, "finite_element": 0.1, "": 0.05}
-USUALLY_COMPUTED = 0.12
+COMPUTED = {"modal_ball": 0.02, "finite_element": 0.04, "": 0.02}
+USUALLY_COMPUTED = 0.06
 # Floors over which a room may be.
 RADIATORS = ("plate", "floating_floor", "joist_floor")
 # Samples, and elements of a mesh, up to which a case is computed.

@@ -24,7 +24,7 @@ from thud.checks import (
 )
 from thud.columns import read_titled
 from thud.display import MAKERS, Displayed
-from thud.errors import ThudError
+from thud.errors import InputError, ThudError
 from thud.floors.mobility import mobility
 from thud.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
@@ -256,21 +256,26 @@ def _chosen(
 ) -> MobilityFit:
     """Return the fit with the least information criterion for relative errors of equal size."""
     best, least, worse = None, np.inf, 0
+    failure: ThudError = InputError(f"{name}: no fit; allowed: {_ALLOWED}")
     for order in _ORDERS:
         # Three values for each coefficient, or noise is fitted.
         if best is not None and (worse == _PATIENCE or 3 * (2 * order + 1) > 2 * len(frequency)):
             break
-        found = _fit(name, frequency, values, min(order, max(1, len(frequency) - 1)))
+        worse += 1
+        try:
+            found = _fit(name, frequency, values, min(order, max(1, len(frequency) - 1)))
+        except ThudError as error:
+            failure = error
+            continue
         error = max(found.error, _EXACT)
         count = 2 * len(frequency)
         criterion = count * np.log(error**2) + (2 * order + 1) * np.log(count)
-        worse += 1
         if criterion < least:
             best, least, worse = found, criterion, 0
         if error <= _EXACT:
             break
     if best is None:
-        refuse(f"{name}: no fit", _ALLOWED)
+        raise failure
     return best
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from thud._api import version
 from thud.errors import InputError
-from thud.files import replace_file
+from thud.files import replace_file, uninterrupted
 from thud.recordings.estimates import Drop
 
 if TYPE_CHECKING:
@@ -70,8 +70,9 @@ class KeptDrops:
             return
         # Those of other signals belong to another measurement.
         files = [p for one in self._digests for p in self._files(one)]
-        for path in files:
-            path.unlink(missing_ok=True)
+        with uninterrupted():
+            for path in files:
+                path.unlink(missing_ok=True)
         if files:
             with suppress(OSError):  # it holds something else
                 self.folder.rmdir()
