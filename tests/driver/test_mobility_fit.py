@@ -144,6 +144,16 @@ def test_values_that_overflow_end_in_one_sentence(capfd: pytest.CaptureFixture[s
     assert capfd.readouterr() == ("", "")
 
 
+def test_octave_whose_real_part_is_negative_has_no_level_of_it() -> None:
+    octave = (FREQUENCY > 88) & (FREQUENCY < 177)
+    values = MOBILITY - 10 * MOBILITY.real * octave
+    values[abs(FREQUENCY - 47) < 2] *= 100
+    found = thud.fit_mobility((FREQUENCY, values), order=8)
+    levels = {row[0]: row[2] for row in found.rows()}
+    assert levels["125"] == ""
+    assert all(float(levels[band]) < 99 for band in ("31.5", "63", "250", "500"))
+
+
 def test_orders_that_fail_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> None:
     usual = mobility_fit._fit  # noqa: SLF001 - what a measurement makes it do is not known
 

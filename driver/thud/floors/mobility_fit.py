@@ -103,7 +103,8 @@ class MobilityFit(Displayed):
         """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
 
         By mid frequency, Hz: the relative error, root of the mean square, and the level of the real
-        part, hence of the energy that a flat force injects, against the measured one, dB.
+        part, hence of the energy that a flat force injects, against the measured one, dB; NaN where
+        one of them is not positive.
         """
         found = {}
         errors = self._errors()
@@ -141,7 +142,7 @@ class MobilityFit(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of a table of errors."""
         body = [
-            (f"{band:g}", f"{100 * error:.2g}", f"{level:+.2f}")
+            (f"{band:g}", f"{100 * error:.2g}", "" if np.isnan(level) else f"{level:+.2f}")
             for band, (error, level) in self.band_errors().items()
         ]
         return [("octave, Hz", "error, %", "real part, dB"), *body]
