@@ -10,6 +10,7 @@ import os
 import signal
 import sys
 import time
+import warnings
 from contextlib import suppress
 from threading import Thread, main_thread
 from typing import TYPE_CHECKING, Any, TextIO, cast
@@ -91,6 +92,8 @@ class _Interrupt:
         if not frame:
             self.heard = True
             signal.signal(number, self)
+            # Coroutines that end with it would say that nobody has awaited them.
+            warnings.filterwarnings("ignore", "coroutine ")
             raise KeyboardInterrupt(number)
         if time.monotonic() > self.first + _PATIENCE:
             _end(number, frame)

@@ -209,32 +209,20 @@ sys.exit(thud_driver.main())
         assert ended(process, signal.SIGINT) == KEPT
 
 
-def test_interrupt_that_a_compiled_module_makes_an_error_of_is_one_sentence() -> None:
-    code = """
-import signal, sys, thud_driver
-from thud import cli
-
-def draw(*_):
+@pytest.mark.parametrize(
+    "work",
+    [
+        """
+def draw():
     try:
         signal.raise_signal(signal.SIGINT)
     except KeyboardInterrupt:
         raise TypeError("incompatible function arguments")
-
-cli.main = lambda: draw()
-sys.exit(thud_driver.main())
-"""
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.stderr == KEPT
-    assert done.returncode == 130
-
-
-def test_interrupt_that_a_compiled_module_shows_and_forgets_is_one_sentence() -> None:
-    code = """
-import ast, signal, sys, time, thud_driver
+""",
+        """
+import ast
 from scipy.stats import qmc
-from thud import cli
-
-def draw(*_):
+def draw():
     usual = ast.literal_eval
     def interrupted(text):
         ast.literal_eval = usual
@@ -242,7 +230,22 @@ def draw(*_):
     ast.literal_eval = interrupted
     qmc.Sobol(2).random(2)
     time.sleep(20)
-
+""",
+        """
+async def write():
+    pass
+def draw():
+    never_awaited = write()
+    signal.raise_signal(signal.SIGINT)
+""",
+    ],
+    ids=["made an error", "shown and forgotten", "with a coroutine"],
+)
+def test_interrupt_of_a_library_is_one_sentence(work: str) -> None:
+    code = f"""
+import signal, sys, time, thud_driver
+from thud import cli
+{work}
 cli.main = lambda: draw()
 sys.exit(thud_driver.main())
 """
