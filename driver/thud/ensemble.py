@@ -19,6 +19,7 @@ from thud.checks import (
     require_kind,
     require_real,
     require_whole,
+    shown,
 )
 from thud.impact import FORCES
 from thud.key import check_keywords
@@ -288,7 +289,7 @@ def _columns(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return one array per key, all of one length, and their numbers for the library."""
     if not isinstance(parameters, Mapping):
-        refuse(f"parameters = {parameters!r} is not allowed", "arrays by their keys")
+        refuse(f"parameters = {shown(parameters)} is not allowed", "arrays by their keys")
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, users(case))[0] for name in parameters]
     for key in keys:

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from thud._schema import GROUPS, KEYS
-from thud.checks import refuse, suggestion
+from thud.checks import refuse, shown, suggestion
 from thud.errors import InputError
 from thud.key import Key
 
@@ -84,7 +84,7 @@ def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
         hint = suggestion(str(name).partition("(")[0], known)
         groups = ", ".join(dict.fromkeys(f"&{one.group}" for one in known.values()))
         refuse(
-            f"{name!r} is not a key of {' and '.join(owners)}{hint}",
+            f"{shown(name)} is not a key of {' and '.join(owners)}{hint}",
             f"keys of {groups}, density and temperature (`thud --keys` lists them)",
         )
     return key, int(match[2]) if match[2] else None

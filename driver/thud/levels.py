@@ -10,7 +10,7 @@ import numpy as np
 
 from thud._api import call_direct, level_api, trimmed
 from thud._schema import LevelsMethod
-from thud.checks import require_array, require_choice, require_real
+from thud.checks import require_array, require_choice, require_real, shown
 from thud.criteria import Conformity, Criterion
 from thud.display import Displayed
 from thud.errors import InputError
@@ -210,7 +210,9 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
         )
         raise InputError(message)
     if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
-        message = f"peaks = {peaks!r} is not allowed; allowed: 0 <= peaks < {_MAX_PEAKS}, whole"
+        message = (
+            f"peaks = {shown(peaks)} is not allowed; allowed: 0 <= peaks < {_MAX_PEAKS}, whole"
+        )
         raise InputError(message)
     numbers = {
         "contact_time": contact_time,

@@ -16,7 +16,7 @@ import numpy as np
 
 from thud._schema import SCALARS
 from thud.case import Case
-from thud.checks import refuse
+from thud.checks import refuse, shown
 from thud.errors import PlausibilityWarning, ThudError
 from thud.files import MANIFEST, locked, read_manifest
 from thud.floor_impact import FloorImpact
@@ -91,7 +91,10 @@ class _Files:
     def read(self, name: str) -> str:
         """Return the text of a file; raise InputError where the run has not written it."""
         if Path(name).name != name:
-            refuse(f"{self.folder}: {name!r} is named as a file of it", "names without directories")
+            refuse(
+                f"{self.folder}: {shown(name)} is named as a file of it",
+                "names without directories",
+            )
         content = (self.folder / name).read_bytes()
         if self.checksums and f"{zlib.crc32(content):08X}" != self.checksums.get(name):
             refuse(

@@ -119,7 +119,7 @@ class _Interrupt:
         """Take up what a callback, such as one of a weak reference, could not raise."""
         if isinstance(lost.exc_value, KeyboardInterrupt):
             self.again(*lost.exc_value.args or SIGNALS[:1])
-        else:
+        elif not self.number:  # or what was interrupted while it was made is removed
             sys.__unraisablehook__(lost)
 
     def show(

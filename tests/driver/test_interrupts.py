@@ -238,8 +238,17 @@ def draw():
     never_awaited = write()
     signal.raise_signal(signal.SIGINT)
 """,
+        """
+class Half:
+    def __init__(self):
+        signal.raise_signal(signal.SIGINT)
+        self.whole = True
+    def __del__(self):
+        assert self.whole
+draw = Half
+""",
     ],
-    ids=["made an error", "shown and forgotten", "with a coroutine"],
+    ids=["made an error", "shown and forgotten", "with a coroutine", "with a half-made object"],
 )
 def test_interrupt_of_a_library_is_one_sentence(work: str) -> None:
     code = f"""

@@ -195,11 +195,12 @@ def _be_humble() -> None:
 
 
 def _log_work() -> None:
-    """Make blocks small, keep each drop, freeze the date, and write down what is kept."""
+    """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
     from thud.recordings import kept  # noqa: PLC0415 - of this process only
-    from thud.studies import blocks, dataset, sets  # noqa: PLC0415
+    from thud.studies import backends, blocks, dataset, sets  # noqa: PLC0415
 
     sets._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
+    backends.SILENCE, backends.LOOK = 4.0, 0.5
     kept.INTERVAL = 0.0
 
     class Frozen(dataset.datetime):  # type: ignore[name-defined, misc]

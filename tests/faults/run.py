@@ -14,6 +14,7 @@ from pathlib import Path
 
 from attempts import attempts
 from campaign import Part, Report
+from clusters import check_clusters
 from crowds import check_crowds, check_starts, check_threads
 from directories import check_calls, check_damage, check_races
 from directories import plan as plan_calls
@@ -41,6 +42,7 @@ def parts() -> dict[str, Part]:
         "threads": Part(3000, 100, check_threads, share=100),
         "starts": Part(100, 1, check_starts),
         "explorer": Part(2000, 8, check_explorer),
+        "clusters": Part(400, 2, check_clusters),
         "soak": Part(100_000, 100, check_soak, share=100),
         "memory": Part(1000, 12, check_memory),
         "namelists": Part(1_000_000, 400, attempts("namelists"), share=5000),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import warnings
+from copy import deepcopy
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -122,7 +123,7 @@ def _study(chance: random.Random) -> tuple[str, str]:
         if chance.random() < 0.15:
             study |= {
                 chance.choice(["confidence", "starts", "seed", "max_steps"]): chance.choice(
-                    [0.9, 1, 0, 3, *ODD]
+                    [0.9, 1, 0, 3, _odd(chance)]
                 )
             }
     elif chance.random() < 0.9:
@@ -141,10 +142,15 @@ def _study(chance: random.Random) -> tuple[str, str]:
     return kind, mutated_text(text, chance) if chance.random() < 0.05 else text
 
 
+def _odd(chance: random.Random) -> object:
+    """Return an odd value; a copy, which may be damaged further."""
+    return deepcopy(chance.choice(ODD))
+
+
 def _value(chance: random.Random) -> object:
     value = chance.choice([0.03, 1.0, 2.5, 1.6e6, 0.089, 0.1, 10])
     return chance.choice(
-        [value, value, {"value": value, "unit": chance.choice(UNITS)}, chance.choice(ODD)]
+        [value, value, {"value": value, "unit": chance.choice(UNITS)}, _odd(chance)]
     )
 
 
@@ -174,7 +180,7 @@ def _parameter(kind: str, name: str, chance: random.Random) -> dict[str, Any]:
     if chance.random() < 0.1:
         found["unit"] = chance.choice(UNITS)
     if chance.random() < 0.05:
-        found[chance.choice([*found, "mean", "std", "values", "what"])] = chance.choice(ODD)
+        found[chance.choice([*found, "mean", "std", "values", "what"])] = _odd(chance)
     return found
 
 
@@ -207,8 +213,8 @@ def _target(chance: random.Random) -> object:
         ]
     )
     if chance.random() < 0.2:
-        found[chance.choice([*found, "drop", "gain", "hum", "config", "weight", "fixed"])] = (
-            chance.choice(ODD)
+        found[chance.choice([*found, "drop", "gain", "hum", "config", "weight", "fixed"])] = _odd(
+            chance
         )
     return [found, dict(found)] if chance.random() < 0.1 else found
 
@@ -224,7 +230,7 @@ def _damage(table: dict[str, Any], chance: random.Random) -> None:
     if chance.random() < 0.3:
         table.pop(name, None)
     else:
-        table[name] = chance.choice(ODD)
+        table[name] = _odd(chance)
 
 
 def _toml(table: dict[str, Any]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -76,16 +77,23 @@ def run_study(options: argparse.Namespace) -> int:
         print(kind.describe(study), file=sys.stderr)
     with kind.take(study, folder, replace=options.replace) as directory:
         try:
-            result = kind.compute(study, directory, **how)
+            with warnings.catch_warnings():
+                warnings.showwarning = lambda warning, *_: _tell(options.study, warning)
+                result = kind.compute(study, directory, **how)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
         if not options.quiet:
             tqdm.write(kind.table(result, study))
         for remark in kind.remarks(result):
-            tqdm.write(f"thud-driver: {options.study}: {remark}", file=sys.stderr)
+            _tell(options.study, remark)
         figures = {} if options.no_figures else kind.figures(result, study)
         save(directory, kind.files(result, study), figures)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if kind.succeeded(result) else NumericalError.exit_code
+
+
+def _tell(study: str, remark: object) -> None:
+    """Print a remark; a progress bar stays below it."""
+    tqdm.write(f"thud-driver: {study}: {remark}", file=sys.stderr)

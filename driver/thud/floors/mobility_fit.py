@@ -265,8 +265,8 @@ def _chosen(
         worse += 1
         try:
             found = _fit(name, frequency, values, min(order, max(1, len(frequency) - 1)))
-        except ThudError as error:
-            failure = error
+        except ThudError as failed:
+            failure = failed
             continue
         error = max(found.error, _EXACT)
         count = 2 * len(frequency)

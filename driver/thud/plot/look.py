@@ -16,7 +16,7 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from thud._schema import BandSet, LevelsForce
-from thud.checks import require_kind
+from thud.checks import require_kind, shown
 from thud.errors import InputError
 from thud.files import replace_file
 from thud.impact import Impact
@@ -209,7 +209,7 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     """
     kind = Path(path).suffix[1:].lower()
     if kind not in FORMATS:
-        message = f"{path}: ending {kind!r} is not known; allowed: {', '.join(FORMATS)}"
+        message = f"{path}: ending {shown(kind)} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
     content = io.BytesIO()
     # Without a date and with constant names, the same figure gives the same bytes.

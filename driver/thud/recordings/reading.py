@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.checks import refuse, require_choice, require_kind, require_number
+from thud.checks import refuse, require_choice, require_kind, require_number, shown
 from thud.recordings.channel import MIB, Channel, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES, doubt, find_sign, scan
 from thud.recordings.formats import read_channels
@@ -107,7 +107,7 @@ def regular_file(path: str | os.PathLike[str]) -> Path:
         reason = os.strerror(error.errno or errno.EIO)
         refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
     except ValueError as error:  # a zero byte
-        refuse(f"{name!r}: cannot be read", "the path of a file", error)
+        refuse(f"{shown(name)}: cannot be read", "the path of a file", error)
     if not stat.S_ISREG(found.st_mode):
         kind = "a directory" if stat.S_ISDIR(found.st_mode) else "no regular file"
         refuse(f"{name}: is {kind}", "a file")
@@ -159,7 +159,7 @@ def choose_channels(channels: list[Channel], channel: int | str | None, name: st
             in {str(one.number), one.name.casefold(), one.name.rpartition("/")[2].casefold()}
         ]
     if len(found) != 1:
-        refuse(f"{name}: channel = {channel!r} fits {len(found)} channels", f"one of {listed}")
+        refuse(f"{name}: channel = {shown(channel)} fits {len(found)} channels", f"one of {listed}")
     return found
 
 

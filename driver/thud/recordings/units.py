@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.checks import refuse, shown
 
 # By unit: the unit it is a multiple of, and the multiple.
 UNITS: dict[str, tuple[str, float]] = {
@@ -90,7 +90,7 @@ def require_unit(text: object, place: str) -> str:
     """Return the unit that a text names; raise InputError where it names none."""
     unit = find_unit(text) if isinstance(text, str) else ""
     if not unit:
-        refuse(f"{place}: unit = {text!r} is not known", ALLOWED)
+        refuse(f"{place}: unit = {shown(text)} is not known", ALLOWED)
     return unit
 
 
@@ -101,7 +101,7 @@ def read_chain(text: object) -> list[Factor]:
     [Factor(value=0.01, top='V', bottom='pC')]
     """
     if not isinstance(text, str):
-        refuse(f"calibration = {text!r} is not allowed", EXAMPLES)
+        refuse(f"calibration = {shown(text)} is not allowed", EXAMPLES)
     parts = [part.strip() for part in re.split(r"[;,]", text[:1000]) if part.strip()]
     factors = []
     for part in parts:
@@ -146,7 +146,7 @@ def newtons_per_unit(
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
-            refuse(f"{place}: calibration = {calibration!r} is not allowed", EXAMPLES)
+            refuse(f"{place}: calibration = {shown(calibration)} is not allowed", EXAMPLES)
         return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
     known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
     factors = read_chain(known.chain)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import t as student
 
-from thud.checks import refuse
+from thud.checks import refuse, shown
 from thud.display import Displayed
 from thud.levels import SOURCES, judge
 from thud.recordings.levels import WITHIN_REPEATABILITY
@@ -319,7 +319,7 @@ def _quantity(value: Quantity | Estimate | float) -> Quantity:
     if isinstance(value, int | float | np.integer | np.floating):
         return Quantity(float(value))
     if not hasattr(value, "uncertainty"):
-        refuse(f"a criterion is {value!r}", "a number, an estimate or a quantity")
+        refuse(f"a criterion is {shown(value)}", "a number, an estimate or a quantity")
     return Quantity(float(value.value), (Contribution("estimate", float(value.uncertainty)),))
 
 

@@ -14,7 +14,8 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from threading import Thread
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from thud._api import api
 from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
+
+T = TypeVar("T")
 
 BACKENDS = ("threads", "processes", "dask")
 # Time limit for a scheduler to answer, s.
@@ -86,7 +89,7 @@ def checked_backend(
     require_choice("backend", backend, BACKENDS)
     if (backend == "dask") != (scheduler is not None):
         refuse_value(
-            f"backend = {backend!r} with scheduler",
+            f"backend = {shown(backend)} with scheduler",
             scheduler,
             "the address of a scheduler for dask, and only there",
         )
@@ -161,30 +164,42 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
     try:
         # A client of an unknown kind of address would fail again when deleted.
         get_backend(parse_address(address)[0])
-        client: Any = Client(  # type: ignore[no-untyped-call]
-            address,
-            timeout=PATIENCE,
-            # The default client would also manage locks of files, which stay in this process.
-            set_as_default=False,
+        # The default client would also manage locks of files, which stay in this process.
+        client: Any = _in_time(
+            lambda: Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
         )
     except (OSError, ValueError, TypeError) as error:
         refuse(
-            f"scheduler = {address!r} does not answer within {PATIENCE} s",
+            f"scheduler = {shown(address)} does not answer within {PATIENCE} s",
             "the address of a running one, such as tcp://host:8786",
             error,
         )
     with _silent("distributed"), client:
         try:
             client.wait_for_workers(1, timeout=PATIENCE)
+            width = sum(_in_time(client.nthreads).values())
         except TimeoutError as error:
-            refuse(f"scheduler = {address!r} has no workers", "one with workers", error)
-        width = sum(client.nthreads().values())
+            refuse(f"scheduler = {shown(address)} has no workers", "one with workers", error)
         with client.get_executor() as executor:
             try:
                 yield executor, width, lambda: _drop_silent_workers(client)
             except KeyboardInterrupt:
                 executor.shutdown(wait=False)
                 raise
+
+
+def _in_time(work: Callable[[], T]) -> T:
+    """Return what work returns; after a time without that raise TimeoutError, and let it be."""
+    future: Future[T] = Future()
+
+    def do() -> None:
+        try:
+            future.set_result(work())
+        except BaseException as error:  # noqa: BLE001 - for the one who waits
+            future.set_exception(error)
+
+    Thread(target=do, daemon=True).start()
+    return future.result(PATIENCE)
 
 
 def _drop_silent_workers(client: Any) -> None:  # noqa: ANN401 - of an optional package

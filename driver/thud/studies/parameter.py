@@ -183,7 +183,7 @@ def varied(name: str, given: object, owners: tuple[str, ...], centre: Value | No
     if form == "values":
         values = given["values"]
         if not isinstance(values, list | tuple) or not values:
-            refuse(f"{place}: values = {values!r} is empty or no list", "[one, or, more]")
+            refuse(f"{place}: values = {shown(values)} is empty or no list", "[one, or, more]")
         found = {"values": tuple(checked(f"{place}: values", key, v, power) for v in values)}
     elif form == "low":
         found = _between(place, key, given, read)

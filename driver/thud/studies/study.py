@@ -18,7 +18,7 @@ import numpy as np
 from thud._api import version
 from thud._schema import MODELS
 from thud.case import Case, check_case, new_model, read_case, tables_case
-from thud.checks import refuse, refuse_value, require_kind, require_words
+from thud.checks import refuse, refuse_value, require_kind, require_words, shown
 from thud.errors import InputError
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
 from thud.studies.parameter import Parameter, checked, quantity
@@ -200,7 +200,7 @@ def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
         if case.model is None or model != case.model.name:
             case = replace(case, model=new_model(model, {}))
     if case.model is None:
-        refuse(f"case = {path!r} has no source model", "a case with one")
+        refuse(f"case = {shown(path)} has no source model", "a case with one")
     return case
 
 

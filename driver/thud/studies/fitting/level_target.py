@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse, require_choice
+from thud.checks import refuse, require_choice, shown
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
@@ -69,7 +69,7 @@ class LevelTarget:
         if not set(asked) <= set(nominal) or len(set(asked)) < len(asked):
             listed = ", ".join(f"{frequency:g}" for frequency in nominal)
             refuse(
-                f"target: frequencies = {self.frequencies!r} are not allowed",
+                f"target: frequencies = {shown(self.frequencies)} are not allowed",
                 f"nominal mid frequencies of {self.bands} bands, {listed}",
             )
         levels = numbers("levels", self.levels, len(asked))
