@@ -38,7 +38,7 @@ contains
       real(wp), allocatable :: signature(:)
       logical :: same
 
-      signature = get_signature(fields, judged)
+      allocate (signature, source=get_signature(fields, judged))
       same = allocated(blocked%signature)
       if (same) same = size(signature) == size(blocked%signature)
       if (same) same = .not. any(abs(signature - blocked%signature) > 0.0_wp)

@@ -123,7 +123,6 @@ contains
       type(error_type), allocatable, intent(out) :: error
       character(len=name_length), allocatable :: found(:)
       character(len=name_length) :: marker
-      character(len=:), allocatable :: from(:), to(:)
       integer :: n, i
       logical :: done
 
@@ -135,25 +134,28 @@ contains
       call add_names(place, names, error)
       if (allocated(error)) return
       n = size(found)
-      allocate (character(len=len(workspace) + name_length + 8) :: from(n + size(names)), to(n + size(names)))
-      do i = 1, n
-         from(i) = place//'/'//found(i)
-         to(i) = workspace//'/'//aside//found(i)
-      end do
-      do i = 1, size(names)
-         from(n + i) = workspace//'/'//names(i)
-         to(n + i) = place//'/'//names(i)
-      end do
-      do i = 1, size(from)
-         call rename_file(trim(from(i)), trim(to(i)), done)
-         if (.not. done) exit
-      end do
-      if (done) call rename_file(workspace//'/'//manifest, place//'/'//manifest, done)
-      if (done) return
-      error = input_error('--output '//place//': files cannot be replaced; allowed: a directory that you may write to')
-      do i = i - 1, 1, -1
-         call rename_file(trim(to(i)), trim(from(i)), done)
-      end do
+      block
+         character(len=len(workspace) + name_length + 8), dimension(n + size(names)) :: from, to
+
+         do i = 1, n
+            from(i) = place//'/'//found(i)
+            to(i) = workspace//'/'//aside//found(i)
+         end do
+         do i = 1, size(names)
+            from(n + i) = workspace//'/'//names(i)
+            to(n + i) = place//'/'//names(i)
+         end do
+         do i = 1, size(from)
+            call rename_file(trim(from(i)), trim(to(i)), done)
+            if (.not. done) exit
+         end do
+         if (done) call rename_file(workspace//'/'//manifest, place//'/'//manifest, done)
+         if (done) return
+         error = input_error('--output '//place//': files cannot be replaced; allowed: a directory that you may write to')
+         do i = i - 1, 1, -1
+            call rename_file(trim(to(i)), trim(from(i)), done)
+         end do
+      end block
    end subroutine move_files
 
    !> Empties a workspace. Files that its manifest does not list are the user's, left by a writer that was killed.
