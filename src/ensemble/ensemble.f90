@@ -6,10 +6,11 @@
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
-      new_band_projection
+      is_projected, new_band_projection
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: reference_force, reference_time
    use thud_error, only: error_type, input_error, numerical_error
+   use thud_force_exposure, only: get_force_exposure_levels
    use thud_force_history, only: force_count
    use thud_interrupt, only: check_interrupt
    use thud_kinds, only: wp
@@ -198,6 +199,7 @@ contains
       real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
       integer :: class(size(sets))
       integer :: i, j, row, last_sample, window
+      logical :: projected
 
       force => get_force(workspace)
       call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
@@ -214,16 +216,25 @@ contains
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
-         call require_window(projections, window, workspace%error)
-         if (allocated(workspace%error)) return
-         call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, &
-            square_sum)
+         projected = is_projected(get_class_window(window), sampling%sample_rate, projections%bands)
+         if (projected) then
+            call require_window(projections, window, workspace%error)
+            if (allocated(workspace%error)) return
+            call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, &
+               square_sum)
+         end if
          do i = 1, size(sets)
             if (class(i) /= window) cycle
             do j = 1, force_count
                row = i + (j - 1)*block_size
-               levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
-                  /(reference_force**2*reference_time))
+               if (projected) then
+                  levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
+                     /(reference_force**2*reference_time))
+               else
+                  call get_force_exposure_levels(force(row, :get_class_window(window)), sampling%sample_rate, &
+                     projections%bands, 'exact', levels(:, j, i), workspace%error)
+                  if (allocated(workspace%error)) return
+               end if
                met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), &
                   row, sampling)
             end do

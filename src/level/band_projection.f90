@@ -20,7 +20,8 @@ module thud_band_projection
    implicit none (type, external)
    private
 
-   public :: band_projection_type, get_band_energies, get_class_window, get_window_class, new_band_projection
+   public :: band_projection_type, get_band_energies, get_class_window, get_window_class, is_projected, &
+      new_band_projection
 
    !> Energy of the sequences that are left out, all bands together, over that of white noise in them.
    real(wp), parameter :: dropped = 1.0e-22_wp
@@ -30,6 +31,9 @@ module thud_band_projection
 
    !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
    integer, parameter :: margin = 32
+
+   !> Numbers in the sequences up to which they are found in a second; later a record by itself is faster.
+   integer, parameter :: max_numbers = 1000000
 
    !> Window lengths per doubling: a window is at most 1/11 longer than needed.
    integer, parameter :: windows_per_octave = 8
@@ -79,6 +83,30 @@ contains
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
    end function get_class_window
 
+   !> Whether the projection is the fast way for records of a length.
+   pure function is_projected(n_sample, sample_rate, bands) result(projected)
+      !> Samples of the records.
+      integer, intent(in) :: n_sample
+      !> Samples per second, Hz.
+      real(wp), intent(in) :: sample_rate
+      !> The bands: [n_band].
+      type(band_type), intent(in) :: bands(:)
+      logical :: projected
+
+      projected = real(n_sample, wp)*get_rank(n_sample, maxval(bands%upper)/sample_rate) <= max_numbers
+   end function is_projected
+
+   !> Number of sequences that may matter.
+   pure function get_rank(n_sample, half_width) result(rank)
+      !> Samples of the records.
+      integer, intent(in) :: n_sample
+      !> W over the sampling rate.
+      real(wp), intent(in) :: half_width
+      integer :: rank
+
+      rank = min(n_sample, int(2*n_sample*half_width) + margin)
+   end function get_rank
+
    !> Matrices of a length, a rate and bands.
    subroutine new_band_projection(n_sample, sample_rate, bands, projection, failed)
       !> Samples of the records, even.
@@ -126,7 +154,7 @@ contains
       integer :: i, n, rank, found, status
 
       n = projection%n_sample
-      rank = min(n, int(2*n*half_width) + margin)
+      rank = get_rank(n, half_width)
       diagonal = [(((n - 1 - 2*i)/2.0_wp)**2*cos(2*pi*half_width), i=0, n - 1)]
       beside = [(real(i, wp)*(n - i)/2, i=1, n)]
       allocate (vectors(n, rank))

@@ -352,3 +352,21 @@ def test_levels_differ_from_single_drops_by_the_rounding_of_their_energy() -> No
             ratios.append(ratio.max())
     # Bands that hold less than 1e-8 are among them.
     assert max(ratios) > 1e8
+
+
+def test_levels_of_long_contacts_are_those_of_single_drops() -> None:
+    # Contacts of 0.2 s, whose levels are taken record by record, beside one of 0.02 s.
+    case = thud.Case(model=thud.HollowSphere("none"), sampling=thud.Sampling(duration=0.3))
+    columns = {"mass": [250.0, 2.5, 240.0], "height": [0.01, 1.0, 0.01]}
+    many = thud.solve_many(columns, case)
+    for i, (mass, height) in enumerate(zip(*columns.values(), strict=True)):
+        single = thud.solve_case(
+            dataclasses.replace(case, ball=thud.Ball(mass=mass), drop=thud.Drop(height=height))
+        )
+        assert many.contact_time[i] == pytest.approx(single.contact_time, rel=1e-12)
+        for force in ("elastic", "floor"):
+            levels = many.levels[force, "octave"][i]
+            np.testing.assert_allclose(levels, single.levels(force=force), rtol=0, atol=1e-6)
+            alone = thud.solve_many({name: [one[i]] for name, one in columns.items()}, case)
+            np.testing.assert_array_equal(alone.levels[force, "octave"][0], levels)
+    assert max(many.contact_time) > 0.15
