@@ -161,31 +161,32 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
         from distributed import Client  # noqa: PLC0415 - an optional package
         from distributed.comm.addressing import parse_address  # noqa: PLC0415
         from distributed.comm.registry import get_backend  # noqa: PLC0415
-    try:
-        # A client of an unknown kind of address would fail again when deleted.
-        get_backend(parse_address(address)[0])
-        # The default client would also manage locks of files, which stay in this process.
-        client: Any = _in_time(
-            lambda: Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
-        )
-    except (OSError, ValueError, TypeError) as error:
-        refuse(
-            f"scheduler = {shown(address)} does not answer within {PATIENCE} s",
-            "the address of a running one, such as tcp://host:8786",
-            error,
-        )
-    with _silent("distributed"), client:
+    with _silent("distributed", "tornado", "asyncio"):
         try:
-            client.wait_for_workers(1, timeout=PATIENCE)
-            width = sum(_in_time(client.nthreads).values())
-        except TimeoutError as error:
-            refuse(f"scheduler = {shown(address)} has no workers", "one with workers", error)
-        with client.get_executor() as executor:
+            # A client of an unknown kind of address would fail again when deleted.
+            get_backend(parse_address(address)[0])
+            # The default client would also manage locks of files, which stay in this process.
+            client: Any = _in_time(
+                lambda: Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
+            )
+        except (OSError, ValueError, TypeError) as error:
+            refuse(
+                f"scheduler = {shown(address)} does not answer within {PATIENCE} s",
+                "the address of a running one, such as tcp://host:8786",
+                error,
+            )
+        with client:
             try:
-                yield executor, width, lambda: _drop_silent_workers(client)
-            except KeyboardInterrupt:
-                executor.shutdown(wait=False)
-                raise
+                client.wait_for_workers(1, timeout=PATIENCE)
+                width = sum(_in_time(client.nthreads).values())
+            except TimeoutError as error:
+                refuse(f"scheduler = {shown(address)} has no workers", "one with workers", error)
+            with client.get_executor() as executor:
+                try:
+                    yield executor, width, lambda: _drop_silent_workers(client)
+                except KeyboardInterrupt:
+                    executor.shutdown(wait=False)
+                    raise
 
 
 def _in_time(work: Callable[[], T]) -> T:
@@ -240,11 +241,9 @@ def _drop_silent_workers(client: Any) -> None:  # noqa: ANN401 - of an optional 
 
 
 @contextmanager
-def _silent(name: str) -> Iterator[None]:
-    """Silence the loggers of a package: one sentence reports what fails."""
-    known = [
-        other for other in logging.root.manager.loggerDict if f"{other}.".startswith(f"{name}.")
-    ]
+def _silent(*names: str) -> Iterator[None]:
+    """Silence the loggers of packages: one sentence reports what fails."""
+    known = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in names]
     loggers = [logging.getLogger(other) for other in known]
     usual = [logger.disabled for logger in loggers]
     for logger in loggers:
