@@ -85,7 +85,7 @@ class Ball(Group):
     wall_thickness : float
         Wall thickness, less than the outer radius, m; 0 < wall_thickness < outer_radius.
     mass : float
-        Mass, kg; 0 < mass <= 1e+06.
+        Mass, kg; 1e-12 <= mass <= 1e+06.
     youngs_modulus : float
         Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e+13.
     poisson_ratio : float
@@ -127,9 +127,9 @@ class Drop(Group):
     Attributes
     ----------
     height : float
-        Height of the ball's lowest point over the floor, m; 0 < height <= 1e+06.
+        Height of the ball's lowest point over the floor, m; 1e-12 <= height <= 1e+06.
     gravity : float
-        Acceleration of free fall, m/s2; 0 < gravity <= 1000.
+        Acceleration of free fall, m/s2; 1e-12 <= gravity <= 1000.
     """
 
     height: float = 1.0
@@ -842,7 +842,7 @@ KEYS = (
     Key("", "case", "name", "text", "", "name of the case, also of its output directory"),
     Key("", "ball", "outer_radius", "real", "m", "outer radius", (), 0.0, 10.0),
     Key("", "ball", "wall_thickness", "real", "m", "wall thickness, less than the outer radius", (), 0.0, "outer_radius"),
-    Key("", "ball", "mass", "real", "kg", "mass", (), 0.0, 1000000.0),
+    Key("", "ball", "mass", "real", "kg", "mass", (), 1e-12, 1000000.0),
     Key("", "ball", "youngs_modulus", "real", "Pa", "modulus of elasticity", (), 0.0, 10000000000000.0),
     Key("", "ball", "poisson_ratio", "real", "", "Poisson's ratio", (), -1.0, 0.5),
     Key("", "ball", "gauge_pressure", "real", "Pa", "overpressure of the gas in the undeformed ball", (), 0.0, 100000000.0),
@@ -854,8 +854,8 @@ KEYS = (
     Key("compression", "compression", "max_deflection", "real", "m", "maximum approach of the plates", (), 1e-15, 10.0),
     Key("compression", "compression", "points", "whole", "", "points of the curve, the undeformed ball included", (), 2.0, 10000.0, True),
     Key("compression", "compression", "gas", "choice", "", "gas in the ball: leaves by the hole, or is sealed in", ('vented', 'isothermal', 'adiabatic')),
-    Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 0.0, 1000000.0),
-    Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 0.0, 1000.0),
+    Key("", "drop", "height", "real", "m", "height of the ball's lowest point over the floor", (), 1e-12, 1000000.0),
+    Key("", "drop", "gravity", "real", "m/s2", "acceleration of free fall", (), 1e-12, 1000.0),
     Key("", "model", "name", "choice", "", "source model", ('hollow_sphere', 'modal_ball', 'finite_element', 'measured_modes', 'hunt_crossley', 'two_mass')),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("modal_ball", "modal_ball", "harmonics", "whole", "", "highest harmonic whose modes oscillate", (), 2.0, 200.0, True),

@@ -43,7 +43,7 @@ contains
          real_field('wall_thickness', ball%wall_thickness, 'm', 'wall thickness, less than the outer radius', &
          '(0, outer_radius)'), &
          real_field('mass', ball%mass, 'kg', 'mass', &
-         '(0, 1000000]'), &
+         '[1e-12, 1000000]'), &
          real_field('youngs_modulus', ball%youngs_modulus, 'Pa', 'modulus of elasticity', &
          '(0, 1e13]'), &
          real_field('poisson_ratio', ball%poisson_ratio, '', "Poisson's ratio", &

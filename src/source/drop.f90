@@ -27,9 +27,9 @@ contains
 
       fields = [ &
          real_field('height', drop%height, 'm', "height of the ball's lowest point over the floor", &
-         '(0, 1000000]'), &
+         '[1e-12, 1000000]'), &
          real_field('gravity', drop%gravity, 'm/s2', 'acceleration of free fall', &
-         '(0, 1000]')]
+         '[1e-12, 1000]')]
    end function get_drop_fields
 
    !> Velocity at first touch, m/s (paper eq. 4).

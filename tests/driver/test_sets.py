@@ -85,7 +85,9 @@ def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
     rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
     assert [row["status"] for row in rows] == ["0", "2", "1"]
     assert "500.0 m closes the shell" in rows[1]["reason"]
-    assert rows[2]["reason"].startswith("&ball: mass = -2.5 is not allowed; allowed: 0 < mass")
+    assert rows[2]["reason"].startswith(
+        "&ball: mass = -2.5 is not allowed; allowed: 1.0e-12 <= mass"
+    )
     assert float(rows[0]["restitution"]) == pytest.approx(0.889, abs=1e-3)
     assert rows[1]["contact_time_s"] == rows[2]["floor_conforms"] == ""
     assert "nan" not in (tmp_path / "outputs/ball_sets/sets.csv").read_text().lower()
