@@ -20,7 +20,14 @@ from thud.compression import CompressionCurve, compress
 from thud.criteria import Conformity, Criterion
 from thud.display import MAKERS
 from thud.ensemble import solve_many
-from thud.errors import FitWarning, InputError, NumericalError, PlausibilityWarning, ThudError
+from thud.errors import (
+    FitWarning,
+    InputError,
+    NumericalError,
+    PlausibilityWarning,
+    ThudError,
+    WorkerWarning,
+)
 from thud.extras import require_extra
 from thud.floor_impact import FloorEnergy, FloorImpact, new_floor_impact
 from thud.floors.mobility import mobility
@@ -137,6 +144,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "NumericalError",
     "PlausibilityWarning",
     "ThudError",
+    "WorkerWarning",
     "compress",
     "force_exposure_levels",
     "free_modes",

@@ -25,6 +25,10 @@ class ReportWarning(UserWarning):
     """A report lacks a file or some letters, or replaces that of another recording."""
 
 
+class WorkerWarning(RuntimeWarning):
+    """A worker of a study is not heard of; others do its work."""
+
+
 class InputError(ThudError, ValueError):
     """The input is invalid; the message names group, key, value and allowed range."""
 

@@ -32,6 +32,8 @@ def main() -> int:
     _open_screen()
     from thud.cli import main as run  # noqa: PLC0415 - takes its time
 
+    # Coroutines that an interrupt ends would say that nobody has awaited them.
+    warnings.filterwarnings("ignore", "coroutine ")
     interrupt = _Interrupt()
     sys.unraisablehook = interrupt.retry
     sys.excepthook = interrupt.show
@@ -92,8 +94,6 @@ class _Interrupt:
         if not frame:
             self.heard = True
             signal.signal(number, self)
-            # Coroutines that end with it would say that nobody has awaited them.
-            warnings.filterwarnings("ignore", "coroutine ")
             raise KeyboardInterrupt(number)
         if time.monotonic() > self.first + _PATIENCE:
             _end(number, frame)
@@ -119,7 +119,7 @@ class _Interrupt:
         """Take up what a callback, such as one of a weak reference, could not raise."""
         if isinstance(lost.exc_value, KeyboardInterrupt):
             self.again(*lost.exc_value.args or SIGNALS[:1])
-        elif not self.number:  # or what was interrupted while it was made is removed
+        elif not self.number:  # objects that an interrupt has left half made fail as they go
             sys.__unraisablehook__(lost)
 
     def show(

@@ -1,8 +1,9 @@
 !> An ensemble from sets to levels and verdicts: blocks of drops, each with its levels while its forces
 !> are in cache, blocks shared out among threads.
 !>
-!> Every number of a set comes from its own lane of matrices and vectors of fixed shape: it does not
-!> depend on the number of threads, on the other sets or on the place among them.
+!> Every number of a set comes from its own lane of matrices and vectors of fixed shape, or, of levels of a
+!> long contact, from its own record: it does not depend on the number of threads, on the other sets or on
+!> the place among them.
 module thud_ensemble
    use thud_band, only: band_type, get_octaves, octave_count
    use thud_band_projection, only: band_projection_type, get_band_energies, get_class_window, get_window_class, &
@@ -196,10 +197,8 @@ contains
       !> The source conforms: [force_count, n_set].
       logical, intent(out) :: met(:, :)
       real(wp), pointer, contiguous :: force(:, :)
-      real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
       integer :: class(size(sets))
-      integer :: i, j, row, last_sample, window
-      logical :: projected
+      integer :: i, j, last_sample, window
 
       force => get_force(workspace)
       call solve_block(sets, sampling, force(:, :get_sample_count(sampling)), last_sample, outcomes)
@@ -216,31 +215,69 @@ contains
       ! The window is the set's own, so that its levels do not depend on its neighbours.
       do window = minval(class, mask=class > 0), maxval(class)
          if (.not. any(class == window)) cycle
-         projected = is_projected(get_class_window(window), sampling%sample_rate, projections%bands)
-         if (projected) then
-            call require_window(projections, window, workspace%error)
-            if (allocated(workspace%error)) return
-            call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, &
-               square_sum)
+         if (is_projected(get_class_window(window), projections%sample_rate, projections%bands)) then
+            call project(workspace, force, window, class == window, projections, levels)
+         else
+            call take_single_levels(workspace, force, window, class == window, projections, levels)
          end if
+         if (allocated(workspace%error)) return
          do i = 1, size(sets)
             if (class(i) /= window) cycle
             do j = 1, force_count
-               row = i + (j - 1)*block_size
-               if (projected) then
-                  levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/sampling%sample_rate) &
-                     /(reference_force**2*reference_time))
-               else
-                  call get_force_exposure_levels(force(row, :get_class_window(window)), sampling%sample_rate, &
-                     projections%bands, 'exact', levels(:, j, i), workspace%error)
-                  if (allocated(workspace%error)) return
-               end if
                met(j, i) = is_conforming(workspace%criteria, sets(i), outcomes(i), levels(:, j, i), force(:, :last_sample), &
-                  row, sampling)
+                  i + (j - 1)*block_size, sampling)
             end do
          end do
       end do
    end subroutine solve_workspace
+
+   !> Levels of the sets of one window, all at once.
+   subroutine project(workspace, force, window, chosen, projections, levels)
+      type(workspace_type), intent(inout) :: workspace
+      !> Forces, N: [force_count block_size, n_row].
+      real(wp), intent(in), contiguous :: force(:, :)
+      integer, intent(in) :: window
+      !> Whether a set has this window: [n_set].
+      logical, intent(in) :: chosen(:)
+      type(projections_type), intent(inout) :: projections
+      !> Levels, dB; those of the chosen sets are set: [n_band, force_count, n_set].
+      real(wp), intent(inout) :: levels(:, :, :)
+      real(wp) :: energy(force_count*block_size, size(projections%bands)), square_sum(force_count*block_size)
+      integer :: i, j, row
+
+      call require_window(projections, window, workspace%error)
+      if (allocated(workspace%error)) return
+      call get_band_energies(projections%window(window), force_count*block_size, force, workspace%folded, energy, square_sum)
+      do i = 1, size(chosen)
+         if (.not. chosen(i)) cycle
+         do j = 1, force_count
+            row = i + (j - 1)*block_size
+            levels(:, j, i) = 10*log10(max(energy(row, :), epsilon(1.0_wp)*square_sum(row)/projections%sample_rate) &
+               /(reference_force**2*reference_time))
+         end do
+      end do
+   end subroutine project
+
+   !> The same record by record, as of single drops. Records of sets with outcomes have levels: what fails is an interrupt.
+   subroutine take_single_levels(workspace, force, window, chosen, projections, levels)
+      type(workspace_type), intent(inout) :: workspace
+      !> As in `project`.
+      real(wp), intent(in) :: force(:, :)
+      integer, intent(in) :: window
+      logical, intent(in) :: chosen(:)
+      type(projections_type), intent(in) :: projections
+      real(wp), intent(inout) :: levels(:, :, :)
+      integer :: i, j
+
+      do i = 1, size(chosen)
+         if (.not. chosen(i)) cycle
+         do j = 1, force_count
+            call get_force_exposure_levels(force(i + (j - 1)*block_size, :get_class_window(window)), &
+               projections%sample_rate, projections%bands, 'exact', levels(:, j, i), workspace%error)
+            if (allocated(workspace%error)) return
+         end do
+      end do
+   end subroutine take_single_levels
 
    !> The forces of the block in a workspace: [force_count block_size, n_row].
    function get_force(workspace) result(force)

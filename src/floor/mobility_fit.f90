@@ -34,7 +34,7 @@ contains
       type(measured_mobility_floor_type), intent(out), target :: floor
       !> Relative error before the fit was made passive, root of the mean square.
       real(wp), intent(out) :: free_error
-      !> There are too few lines or too many poles, or a line is not allowed.
+      !> There are too few lines or too many poles, a line is not allowed, or no passive floor was found.
       type(error_type), allocatable, intent(out) :: error
       complex(wp), allocatable :: pole(:), residue(:)
       real(wp) :: weight(size(mobility))

@@ -203,7 +203,7 @@ contains
       integer :: i
 
       mean = get_critical_frequency(plate, air)
-      if (.not. any(abs([plate%stiffness_ratio, plate%torsion_ratio] - 1) > 0.0_wp)) then
+      if (all(abs([plate%stiffness_ratio, plate%torsion_ratio] - 1) <= 0.0_wp)) then
          sigma = get_radiation_factor(frequency, mean, plate%length, plate%width, air%sound_speed)
          return
       end if

@@ -32,8 +32,9 @@ module thud_band_projection
    !> More sequences than ever matter beyond 2 W T: 1e-22 is reached after 12 to 20.
    integer, parameter :: margin = 32
 
-   !> Numbers in the sequences up to which they are found in a second; later a record by itself is faster.
-   integer, parameter :: max_numbers = 1000000
+   !> Samples times the square of the sequences up to which these are found within some two seconds. Beyond, they
+   !> would pay only for thousands of records.
+   real(wp), parameter :: max_work = 5.0e8_wp
 
    !> Window lengths per doubling: a window is at most 1/11 longer than needed.
    integer, parameter :: windows_per_octave = 8
@@ -83,7 +84,7 @@ contains
       n_sample = 2*nint(shortest_window/2*2.0_wp**(real(window - 1, wp)/windows_per_octave))
    end function get_class_window
 
-   !> Whether the projection is the fast way for records of a length.
+   !> Whether the matrices for records of a length are soon made.
    pure function is_projected(n_sample, sample_rate, bands) result(projected)
       !> Samples of the records.
       integer, intent(in) :: n_sample
@@ -93,7 +94,7 @@ contains
       type(band_type), intent(in) :: bands(:)
       logical :: projected
 
-      projected = real(n_sample, wp)*get_rank(n_sample, maxval(bands%upper)/sample_rate) <= max_numbers
+      projected = n_sample*real(get_rank(n_sample, maxval(bands%upper)/sample_rate), wp)**2 <= max_work
    end function is_projected
 
    !> Number of sequences that may matter.

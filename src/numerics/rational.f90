@@ -2,9 +2,9 @@
 !>
 !> Of a pair of conjugate poles the one with positive imaginary part is kept, with twice its residue.
 module thud_rational
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use thud_kinds, only: wp
    use thud_lapack, only: dgeev
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    implicit none (type, external)
    private
 

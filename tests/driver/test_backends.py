@@ -5,9 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
+import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -121,7 +123,7 @@ def test_stopped_worker_of_dask_does_not_hold_the_study(
         kept[block.start] = found
 
     try:
-        with pytest.warns(RuntimeWarning, match=r"was not heard of for 3 s; others compute"):
+        with pytest.warns(thud.WorkerWarning, match=r"was not heard of for 3 s; others compute"):
             run_blocks(blocks, keep, scheduler=cluster.scheduler_address)
     finally:
         os.kill(pids[0], signal.SIGKILL)
@@ -210,19 +212,37 @@ def test_unreachable_scheduler_is_reported_soon(
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
     path = tmp_path / "study.toml"
     path.write_text("parameters.height.values = [1]")
-    for address in ("tcp://127.0.0.1:9", "nonsense://"):
-        arguments = ["sweep", "-q", str(path), "-o", str(tmp_path), "--scheduler", address]
-        assert cli.main(arguments) == 1
-        errors = capsys.readouterr().err
-        assert f"scheduler = '{address}' does not answer within 1 s" in errors
-        assert errors.count("\n") == 1
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        port = silent.getsockname()[1]
+        for address in ("tcp://127.0.0.1:9", "nonsense://", f"tcp://127.0.0.1:{port}"):
+            arguments = ["sweep", "-q", str(path), "-o", str(tmp_path), "--scheduler", address]
+            assert cli.main(arguments) == 1
+            errors = capsys.readouterr().err
+            assert f"scheduler = '{address}' does not answer within 1 s" in errors
+            assert errors.count("\n") == 1
+
+
+@pytest.mark.filterwarnings("default:the worker")
+def test_lost_worker_is_one_sentence_on_the_screen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def run_and_warn(*blocks: Any, **how: Any) -> None:  # noqa: ANN401 - passed on
+        warnings.warn("the worker tcp://x was not heard of", thud.WorkerWarning, stacklevel=1)
+        run_blocks(*blocks, **how)
+
+    monkeypatch.setattr("thud.studies.computing.run_blocks", run_and_warn)
+    path = tmp_path / "study.toml"
+    path.write_text("parameters.height.values = [1]")
+    assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 0
+    said = f"thud-driver: {path}: the worker tcp://x was not heard of\n"
+    assert capsys.readouterr().err == said
 
 
 def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
-        pytest.raises(thud.InputError, match="has no workers; allowed: one with"),
+        pytest.raises(thud.InputError, match="shows no worker within 1 s; allowed: one with"),
     ):
         thud.sweep(STUDY, scheduler=empty.scheduler_address)
 

@@ -235,8 +235,9 @@ def draw():
 async def write():
     pass
 def draw():
-    never_awaited = write()
-    signal.raise_signal(signal.SIGINT)
+    with warnings.catch_warnings():
+        never_awaited = write()
+        signal.raise_signal(signal.SIGINT)
 """,
         """
 class Half:
@@ -252,7 +253,7 @@ draw = Half
 )
 def test_interrupt_of_a_library_is_one_sentence(work: str) -> None:
     code = f"""
-import signal, sys, time, thud_driver
+import signal, sys, time, warnings, thud_driver
 from thud import cli
 {work}
 cli.main = lambda: draw()

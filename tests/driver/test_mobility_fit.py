@@ -178,7 +178,9 @@ def test_orders_that_cannot_be_are_refused(order: int) -> None:
 
 def test_titles_are_needed(tmp_path: Path) -> None:
     table = write_table(tmp_path / "t.csv", "frequency,real", FREQUENCY, MOBILITY.real)
-    with pytest.raises(thud.InputError, match="the columns are frequency, real; allowed: a table"):
+    with pytest.raises(
+        thud.InputError, match="the columns are 'frequency, real'; allowed: a table"
+    ):
         thud.fit_mobility(table)
 
 

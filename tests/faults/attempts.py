@@ -111,7 +111,10 @@ def _work(part: str) -> None:
     # Whatever else is printed goes to the same file as errors, which must not grow.
     os.dup2(2, 1)
     attempt = import_module(part).attempt
-    if not SANITIZED:
+    if SANITIZED:
+        core = Path(import_module("thud._core").__file__ or "")
+        assert b"__asan_init" in core.read_bytes(), f"{core} has no sanitizer"
+    else:
         resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
     handles = usual = None
     for seed in json.loads(sys.stdin.read()):

@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from functools import cache
 from threading import Event, Thread, Timer
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 # Time in which a study without trouble ends, s.
 USUAL = 1.0
+WORKERS = 2
 
 
 class Connection:
@@ -39,15 +41,19 @@ class Connection:
         self._flows.set()
         self._door = socket.create_server((HOST, 0))
         self.port = self._door.getsockname()[1]
-        Thread(target=self._accept, daemon=True).start()
+        self._threads = [Thread(target=self._accept, daemon=True)]
+        self._threads[0].start()
 
     def _accept(self) -> None:
         with suppress(OSError):
             while True:
-                ends = (self._door.accept()[0], socket.create_connection((HOST, self._port)))
-                self._sockets += ends
-                for source, target in (ends, ends[::-1]):
-                    Thread(target=self._forward, args=(source, target), daemon=True).start()
+                near = self._door.accept()[0]
+                self._sockets.append(near)
+                far = socket.create_connection((HOST, self._port))
+                self._sockets.append(far)
+                for ends in ((near, far), (far, near)):
+                    self._threads.append(Thread(target=self._forward, args=ends, daemon=True))
+                    self._threads[-1].start()
 
     def _forward(self, source: socket.socket, target: socket.socket) -> None:
         with suppress(OSError):
@@ -62,11 +68,18 @@ class Connection:
 
     def cut(self) -> None:
         """End all connections, and take no more."""
-        self._door.close()
+        # Closing alone does not wake up a thread that waits for the next one.
+        with suppress(OSError):
+            self._door.shutdown(socket.SHUT_RDWR)
+        self._threads[0].join()
+        self._flows.set()
         for one in self._sockets:
             with suppress(OSError):
                 one.shutdown(socket.SHUT_RDWR)
-        self._flows.set()
+        for thread in self._threads:
+            thread.join()
+        for one in (self._door, *self._sockets):
+            one.close()
 
 
 class Cluster(NamedTuple):
@@ -77,8 +90,12 @@ class Cluster(NamedTuple):
 
     def workers(self) -> list[psutil.Process]:
         """Return the processes that compute."""
-        children = self.process.children()
-        return [one for one in children if "spawn_main" in " ".join(one.cmdline())]
+        found = []
+        for one in self.process.children():
+            with suppress(psutil.NoSuchProcess):
+                if "spawn_main" in " ".join(one.cmdline()):
+                    found.append(one)
+        return found
 
     def end(self) -> None:
         """End all processes."""
@@ -102,22 +119,34 @@ def cluster() -> Cluster:
     return found
 
 
-def _send(processes: Iterable[psutil.Process], number: int) -> None:
+def _send(processes: Iterable[psutil.Process], number: int) -> int:
+    """Send a signal; return how many were there."""
+    hit = 0
     for one in processes:
         with suppress(psutil.NoSuchProcess):
             one.send_signal(number)
+            hit += 1
+    return hit
 
 
-# What happens to whom; of the last the cluster itself stays whole.
-TROUBLES: dict[str, Callable[[Cluster, Connection], None]] = {
-    "worker killed": lambda one, _: _send(one.workers()[:1], signal.SIGKILL),
-    "worker stopped": lambda one, _: _send(one.workers()[:1], signal.SIGSTOP),
-    "workers killed": lambda one, _: _send(one.workers(), signal.SIGKILL),
-    "workers stopped": lambda one, _: _send(one.workers(), signal.SIGSTOP),
-    "scheduler killed": lambda one, _: one.process.kill(),
-    "scheduler stopped": lambda one, _: _send([one.process], signal.SIGSTOP),
-    "connection held": lambda _, way: way.hold(),
-    "connection cut": lambda _, way: way.cut(),
+class Trouble(NamedTuple):
+    """What happens, to how many, and whether the cluster can be used afterwards."""
+
+    strike: Callable[[Cluster, Connection], object]
+    harmless: bool = False
+
+
+TROUBLES = {
+    "worker killed": Trouble(
+        lambda one, _: _send(one.workers()[:1], signal.SIGKILL), harmless=True
+    ),
+    "worker stopped": Trouble(lambda one, _: _send(one.workers()[:1], signal.SIGSTOP)),
+    "workers killed": Trouble(lambda one, _: _send(one.workers(), signal.SIGKILL)),
+    "workers stopped": Trouble(lambda one, _: _send(one.workers(), signal.SIGSTOP)),
+    "scheduler killed": Trouble(lambda one, _: _send([one.process], signal.SIGKILL)),
+    "scheduler stopped": Trouble(lambda one, _: _send([one.process], signal.SIGSTOP)),
+    "connection held": Trouble(lambda _, way: way.hold() or 1, harmless=True),
+    "connection cut": Trouble(lambda _, way: way.cut() or 1, harmless=True),
 }
 
 
@@ -125,21 +154,21 @@ def check_clusters(tries: list[tuple[int, random.Random]], folder: Path) -> Iter
     """Let a study on a scheduler meet trouble, then go on with it in threads."""
     place = folder / "cluster"
     for number, chance in tries:
-        trouble = list(TROUBLES)[number % len(TROUBLES)]
+        name, trouble = list(TROUBLES.items())[number % len(TROUBLES)]
         old, delay = chance.random() < 0.5, chance.uniform(0, USUAL)
         prepare(place, "sweep", old=old)
+        while len(cluster().workers()) < WORKERS:
+            time.sleep(0.1)
         way = Connection(cluster().port)
-        command = SCENARIOS["dask"].command
-        words = [{"SCHEDULER": f"tcp://{HOST}:{way.port}"}.get(word, word) for word in command]
-        timer = Timer(delay, TROUBLES[trouble], (cluster(), way))
+        hit: list[object] = []
+        timer = Timer(delay, lambda: hit.append(trouble.strike(cluster(), way)))  # noqa: B023 - joined below
         timer.start()
-        done = forks().run(
-            Order([*(word.replace("IN", NEW) for word in words), "--replace"], str(place))
-        )
+        command = SCENARIOS["dask"].given(NEW, f"tcp://{HOST}:{way.port}")
+        done = forks().run(Order(command, str(place)))
         timer.cancel()
         timer.join()
         way.cut()
-        if not trouble.startswith("connection") and not trouble.endswith("worker killed"):
+        if not trouble.harmless:
             cluster().end()
             cluster.cache_clear()
         word = judge_end(done)
@@ -149,5 +178,6 @@ def check_clusters(tries: list[tuple[int, random.Random]], folder: Path) -> Iter
         word = word or judge_files("sweep", place, old=old, done=done.code == 0)
         again = forks().run(Order(SCENARIOS["sweep"].given(NEW), str(place)))
         word, _, what = (word or judge_again("sweep", place, again, old=old)).partition(": ")
-        detail = f"{trouble} after {delay:.2f} s, old {old}: {done}, {again}, {what}"
-        yield Finding(word or f"{trouble}, {'refused' if done.code else 'done'}", detail)
+        detail = f"{name} after {delay:.2f} s, old {old}: {done}, {again}, {what}"
+        how = "refused" if done.code else "done" if hit and hit[0] else "over before"
+        yield Finding(word or f"{name}, {how}", detail)

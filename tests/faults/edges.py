@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from campaign import Finding
 from edge_cases import LUMPED, WEIGHTS, draw_case
-from edge_comparisons import COMPARISONS
+from edge_comparisons import COMPARISONS, is_of_step
 from edge_laws import BALANCE, get_fault
 
 import thud
@@ -64,7 +64,12 @@ def _many(cases: list[thud.Case]) -> Iterable[Finding]:
             and many.contact_time[i] <= case.sampling.duration + 1 / case.sampling.sample_rate
             and np.isfinite(levels).all()
         )
-        yield Finding("computed") if right else Finding("wrong", f"{many.restitution[i]} {case!r}")
+        if right:
+            yield Finding("computed")
+        elif is_of_step(thud.solve_case(case)):
+            yield Finding("remarked")
+        else:
+            yield Finding("wrong", f"{many.restitution[i]}; {case_text(case).decode().split()}")
 
 
 def check_modal(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
@@ -99,7 +104,7 @@ def _try(model: str, chance: random.Random) -> Finding:
         try:
             case = draw_case(model, chance)
             impact = thud.solve_case(case)
-            wrong = get_fault(impact)
+            wrong = "" if is_of_step(impact) else get_fault(impact)
             if not wrong and chance.random() < (0.1 if model in LUMPED else 0.05):
                 wrong = chance.choice(COMPARISONS)(impact, chance)
         except thud.ThudError as error:

@@ -69,5 +69,6 @@ def _word(done: subprocess.CompletedProcess[str], limit: int) -> str:
         return "computed"
     if done.returncode == 2 and "bytes" in done.stderr and done.stderr.count("\n") == 1:
         return "refused"
-    foreign = "OpenBLAS" in done.stderr or "shared libraries" in done.stderr
+    # The loader of libraries ends with 127.
+    foreign = "OpenBLAS" in done.stderr or done.returncode == 127
     return "not loaded" if foreign and limit < LOADED else "crashed"

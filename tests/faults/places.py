@@ -56,8 +56,8 @@ def _free(place: Path) -> None:
 
 
 def _few_descriptors(order: Order, chance: random.Random) -> tuple[Order, str]:
-    # With fewer an interpreter does not begin.
-    most = chance.randint(3 if order.command[0] == "thud" else 8, 24)
+    # With fewer neither an interpreter begins nor the loader of libraries.
+    most = chance.randint(4 if order.command[0] == "thud" else 8, 24)
     return order._replace(limits={"RLIMIT_NOFILE": most}), str(most)
 
 

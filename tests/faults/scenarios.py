@@ -67,11 +67,11 @@ class Scenario(NamedTuple):
     weight: int = 0
     study: bool = False
 
-    def given(self, which: str) -> list[str]:
-        """Return the command with the older or the newer input."""
+    def given(self, which: str, scheduler: str = "") -> list[str]:
+        """Return the command with the older or the newer input, and a scheduler."""
         found = [word.replace("IN", which) for word in self.command]
         if "SCHEDULER" in found:
-            found[found.index("SCHEDULER")] = cluster()[0]
+            found[found.index("SCHEDULER")] = scheduler or cluster()[0]
         return [*found, "--replace"] if self.study else found
 
 

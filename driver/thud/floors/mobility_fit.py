@@ -21,10 +21,11 @@ from thud.checks import (
     require_choice,
     require_real,
     require_whole,
+    shown,
 )
 from thud.columns import read_titled
 from thud.display import MAKERS, Displayed
-from thud.errors import InputError, ThudError
+from thud.errors import NumericalError, ThudError
 from thud.floors.mobility import mobility
 from thud.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
@@ -257,26 +258,27 @@ def _chosen(
 ) -> MobilityFit:
     """Return the fit with the least information criterion for relative errors of equal size."""
     best, least, worse = None, np.inf, 0
-    failure: ThudError = InputError(f"{name}: no fit; allowed: {_ALLOWED}")
-    for order in _ORDERS:
+    failure: ThudError | None = None
+    orders = [order for order in _ORDERS if order < len(frequency)]
+    for order in orders or [1]:
         # Three values for each coefficient, or noise is fitted.
         if best is not None and (worse == _PATIENCE or 3 * (2 * order + 1) > 2 * len(frequency)):
             break
         worse += 1
         try:
-            found = _fit(name, frequency, values, min(order, max(1, len(frequency) - 1)))
-        except ThudError as failed:
-            failure = failed
+            found = _fit(name, frequency, values, order)
+        except ThudError as error:
+            failure = failure or error
             continue
-        error = max(found.error, _EXACT)
+        miss = max(found.error, _EXACT)
         count = 2 * len(frequency)
-        criterion = count * np.log(error**2) + (2 * order + 1) * np.log(count)
+        criterion = count * np.log(miss**2) + (2 * order + 1) * np.log(count)
         if criterion < least:
             best, least, worse = found, criterion, 0
-        if error <= _EXACT:
+        if miss <= _EXACT:
             break
     if best is None:
-        raise failure
+        raise failure or NumericalError("the mobility: no fit")
     return best
 
 
@@ -302,7 +304,7 @@ def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quan
     words = [re.findall("[a-z]+", title.lower()) for title in titles]
     for title, (_, *others) in zip(titles, (one or [""] for one in words), strict=True):
         if _OTHERS & {*others}:
-            refuse(f"{path}: {title.strip()!r} is not in SI units and degrees", _ALLOWED)
+            refuse(f"{path}: {shown(title.strip())} is not in SI units and degrees", _ALLOWED)
     kinds = [_TITLES.get(one[0], "") if one else "" for one in words]
     if double := {kind for kind in kinds if kind and kinds.count(kind) > 1}:
         refuse(f"{path}: more than one column of {min(double)}", _ALLOWED)
@@ -315,7 +317,10 @@ def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.complex128], Quan
     elif {"frequency", "magnitude", "phase"} <= columns.keys():
         values = columns["magnitude"] * np.exp(1j * np.radians(columns["phase"]))
     else:
-        refuse(f"{path}: the columns are {', '.join(titles) or 'without titles'}", _ALLOWED)
+        refuse(
+            f"{path}: the columns are {shown(', '.join(titles)) if titles else 'without titles'}",
+            _ALLOWED,
+        )
     known = min(named) if len(named) == 1 else None
     return columns["frequency"], values, known
 

@@ -14,13 +14,13 @@ from concurrent.futures import (
     wait,
 )
 from contextlib import contextmanager, suppress
-from threading import Thread
-from typing import TYPE_CHECKING, Any, TypeVar
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Any
 
 from thud._api import api
 from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
 from thud.ensemble import MAX_THREADS
-from thud.errors import NumericalError, ThudError
+from thud.errors import NumericalError, ThudError, WorkerWarning
 from thud.extras import require_extra
 from thud.processes import no_interrupt_in_processes, process_pool
 from thud.studies.evaluation import Block, evaluate
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Keep = Callable[[Block, dict[str, NDArray[Any]]], None]
-
-T = TypeVar("T")
 
 BACKENDS = ("threads", "processes", "dask")
 # Time limit for a scheduler to answer, s.
@@ -89,7 +87,7 @@ def checked_backend(
     require_choice("backend", backend, BACKENDS)
     if (backend == "dask") != (scheduler is not None):
         refuse_value(
-            f"backend = {shown(backend)} with scheduler",
+            f"backend = {backend!r} with scheduler",
             scheduler,
             "the address of a scheduler for dask, and only there",
         )
@@ -116,10 +114,7 @@ def _collect(
         except Exception as error:
             del running[future]
             said = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
-            message = (
-                f"the backend lost a block of sets ({said}); what was "
-                f"finished is kept; allowed: run the study again"
-            )
+            message = _sentence(f"the backend lost a block of sets ({said})")
             raise NumericalError(message) from error
         keep(running[future], found)
         del running[future]
@@ -165,10 +160,7 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
         try:
             # A client of an unknown kind of address would fail again when deleted.
             get_backend(parse_address(address)[0])
-            # The default client would also manage locks of files, which stay in this process.
-            client: Any = _in_time(
-                lambda: Client(address, timeout=PATIENCE, set_as_default=False)  # type: ignore[no-untyped-call]
-            )
+            client = _connected(Client, address)
         except (OSError, ValueError, TypeError) as error:
             refuse(
                 f"scheduler = {shown(address)} does not answer within {PATIENCE} s",
@@ -176,68 +168,103 @@ def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
                 error,
             )
         with client:
-            try:
-                client.wait_for_workers(1, timeout=PATIENCE)
-                width = sum(_in_time(client.nthreads).values())
-            except TimeoutError as error:
-                refuse(f"scheduler = {shown(address)} has no workers", "one with workers", error)
+            width = _width(client)
+            if not width:
+                refuse(
+                    f"scheduler = {shown(address)} shows no worker within {PATIENCE} s",
+                    "one with workers",
+                )
             with client.get_executor() as executor:
                 try:
-                    yield executor, width, lambda: _drop_silent_workers(client)
+                    yield executor, width, _Watch(client)
                 except KeyboardInterrupt:
                     executor.shutdown(wait=False)
                     raise
 
 
-def _in_time(work: Callable[[], T]) -> T:
-    """Return what work returns; after a time without that raise TimeoutError, and let it be."""
-    future: Future[T] = Future()
+def _connected(kind: type, address: str) -> Any:  # noqa: ANN401 - of an optional package
+    """Return a client of a scheduler; raise OSError where it does not answer in time.
 
-    def do() -> None:
-        try:
-            future.set_result(work())
-        except BaseException as error:  # noqa: BLE001 - for the one who waits
-            future.set_exception(error)
-
-    Thread(target=do, daemon=True).start()
-    return future.result(PATIENCE)
-
-
-def _drop_silent_workers(client: Any) -> None:  # noqa: ANN401 - of an optional package
-    """Take the blocks of workers that are not heard of away from them, for others to compute.
-
-    Raise NumericalError where none is left, or the scheduler does not answer.
+    The client's own limit does not count the time after the connection, so that another thread
+    waits for it, which closes a client that comes too late.
     """
-    limit = SILENCE
+    found: Future[Any] = Future()
+    late = Event()
 
-    # Sent as it stands: the scheduler may have no thud.
-    async def drop(dask_scheduler: Any) -> tuple[list[str], int]:  # noqa: ANN401
-        workers = dask_scheduler.workers
-        heard = {address: worker.last_seen for address, worker in workers.items()}
-        silent = [address for address in heard if time.time() - heard[address] > limit]
-        for address in silent:
-            await dask_scheduler.remove_worker(address, stimulus_id="silent")
-        return silent, len(workers)
+    def connect() -> None:
+        try:
+            # The default client would also manage locks of files, which stay in this process.
+            client = kind(address, timeout=PATIENCE, set_as_default=False)
+        except Exception as error:  # noqa: BLE001 - for the one who waits
+            found.set_exception(error)
+            return
+        if late.is_set():
+            client.close()
+        found.set_result(client)
 
+    Thread(target=connect, daemon=True).start()
     try:
-        silent, left = client.sync(client._run_on_scheduler, drop, callback_timeout=limit)  # noqa: SLF001 - the public one waits for ever
-    except (TimeoutError, OSError) as error:
-        message = (
-            f"the scheduler does not answer within {limit:g} s; what was finished is kept; "
-            "allowed: run the study again"
-        )
-        raise NumericalError(message) from error
-    for address in silent:
-        message = (
-            f"the worker {address} was not heard of for {limit:g} s; others compute its blocks"
-        )
-        warnings.warn(message, RuntimeWarning, stacklevel=2)
-    if silent and not left:
-        message = (
-            "no worker of the scheduler is heard of; what was finished is kept; "
-            "allowed: run the study again"
-        )
-        raise NumericalError(message)
+        return found.result(PATIENCE + 1)
+    except TimeoutError:
+        late.set()
+        raise
+
+
+def _width(client: Any) -> int:  # noqa: ANN401 - of an optional package
+    """Return how many blocks run at once, 0 where no worker is there in time."""
+    until = time.monotonic() + PATIENCE
+    width = 0
+    with suppress(TimeoutError, OSError):
+        while not width and time.monotonic() < until:
+            width = sum(client.sync(client.scheduler.ncores, callback_timeout=PATIENCE).values())
+            time.sleep(0.0 if width else 0.1)
+    return width
+
+
+class _Watch:
+    """Looks after the workers of a scheduler: takes blocks away from those that are not heard of.
+
+    Raises NumericalError where none is left, or the scheduler does not answer.
+    """
+
+    def __init__(self, client: Any) -> None:  # noqa: ANN401 - of an optional package
+        self._client = client
+        self._seen = time.monotonic()
+
+    def __call__(self) -> None:
+        """Look once."""
+        limit = SILENCE
+
+        # Sent as it stands: the scheduler may have no thud.
+        async def drop(dask_scheduler: Any) -> tuple[list[str], int]:  # noqa: ANN401
+            workers = dask_scheduler.workers
+            heard = {address: worker.last_seen for address, worker in workers.items()}
+            silent = [address for address in heard if time.time() - heard[address] > limit]
+            for address in silent:
+                await dask_scheduler.remove_worker(address, stimulus_id="silent")
+            return silent, len(workers)
+
+        client = self._client
+        try:
+            # The public one waits for ever.
+            silent, left = client.sync(client._run_on_scheduler, drop, callback_timeout=limit)  # noqa: SLF001
+        except (TimeoutError, OSError) as error:
+            message = _sentence(f"the scheduler does not answer within {limit:g} s")
+            raise NumericalError(message) from error
+        for address in silent:
+            message = (
+                f"the worker {address} was not heard of for {limit:g} s; others compute its blocks"
+            )
+            warnings.warn(message, WorkerWarning, stacklevel=2)
+        if left:
+            self._seen = time.monotonic()
+        elif silent or time.monotonic() - self._seen > limit:
+            message = _sentence("no worker of the scheduler is heard of")
+            raise NumericalError(message)
+
+
+def _sentence(what: str) -> str:
+    return f"{what}; what was finished is kept; allowed: run the study again"
 
 
 @contextmanager
