@@ -14,12 +14,12 @@ from thud._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case import Case, case_text, new_model
 from thud.checks import (
     refuse,
+    refuse_value,
     require_array,
     require_choice,
     require_kind,
     require_real,
     require_whole,
-    shown,
 )
 from thud.impact import FORCES
 from thud.key import check_keywords
@@ -289,7 +289,7 @@ def _columns(
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return one array per key, all of one length, and their numbers for the library."""
     if not isinstance(parameters, Mapping):
-        refuse(f"parameters = {shown(parameters)} is not allowed", "arrays by their keys")
+        refuse_value("parameters", parameters, "arrays by their keys")
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, users(case))[0] for name in parameters]
     for key in keys:

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud._api import call_direct, level_api, trimmed
 from thud._schema import LevelsMethod
-from thud.checks import require_array, require_choice, require_real, shown
+from thud.checks import refuse_value, require_array, require_choice, require_real
 from thud.criteria import Conformity, Criterion
 from thud.display import Displayed
 from thud.errors import InputError
@@ -210,10 +210,7 @@ def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
         )
         raise InputError(message)
     if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
-        message = (
-            f"peaks = {shown(peaks)} is not allowed; allowed: 0 <= peaks < {_MAX_PEAKS}, whole"
-        )
-        raise InputError(message)
+        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
     numbers = {
         "contact_time": contact_time,
         "restitution": restitution,

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thud.checks import refuse, shown
+from thud.checks import refuse, refuse_value, shown
 
 # By unit: the unit it is a multiple of, and the multiple.
 UNITS: dict[str, tuple[str, float]] = {
@@ -101,7 +101,7 @@ def read_chain(text: object) -> list[Factor]:
     [Factor(value=0.01, top='V', bottom='pC')]
     """
     if not isinstance(text, str):
-        refuse(f"calibration = {shown(text)} is not allowed", EXAMPLES)
+        refuse_value("calibration", text, EXAMPLES)
     parts = [part.strip() for part in re.split(r"[;,]", text[:1000]) if part.strip()]
     factors = []
     for part in parts:
@@ -146,7 +146,7 @@ def newtons_per_unit(
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:
-            refuse(f"{place}: calibration = {shown(calibration)} is not allowed", EXAMPLES)
+            refuse_value(f"{place}: calibration", calibration, EXAMPLES)
         return float(calibration), f"{calibration:.6g} N per {unit or 'recorded value'}", None
     known = calibration if isinstance(calibration, Calibration) else Calibration(str(calibration))
     factors = read_chain(known.chain)

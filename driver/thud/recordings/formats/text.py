@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from thud.checks import refuse, shown
+from thud.checks import refuse
 from thud.recordings.channel import WHOLE, Channel, require_small, shown_path, shown_text
 from thud.recordings.grid import even_grid
 from thud.recordings.signal import ArraySamples
@@ -228,7 +228,7 @@ def _convert_each(
         row = [_number(cells[i]) if i < len(cells) else 0.0 for i in used]
         if None in row:
             wrong = shown_text(cells[used[row.index(None)]])[:40]
-            refuse(f"{table.name}: line {number}: {shown(wrong)} is not a number", ALLOWED)
+            refuse(f"{table.name}: line {number}: {wrong!r} is not a number", ALLOWED)
         if len(cells) != table.width:
             what = f"{len(cells)} columns, {table.width} above it"
             refuse(f"{table.name}: line {number}: {what}", ALLOWED)
