@@ -113,17 +113,44 @@ static void note(int number, siginfo_t *information, void *context)
    nested = 0;
 }
 
+// A fork is waiting for the running calls, and the time that it waits, ms.
+static volatile sig_atomic_t forking = 0;
+enum { fork_patience = 1000 };
+
+static void pause_calls(void)
+{
+   pthread_mutex_unlock(&calls);
+   usleep(1000);
+   pthread_mutex_lock(&calls);
+}
+
+// A call in another thread may be within OpenBLAS, whose lock a forked process would find locked for ever. Calls that
+// take longer than the patience are hardly ever.
+static void wait_for_calls(void)
+{
+   pthread_mutex_lock(&calls);
+   forking = 1;
+   for (int i = 0; running && i < fork_patience; i++) pause_calls();
+}
+
+static void go_on(void)
+{
+   forking = 0;
+   pthread_mutex_unlock(&calls);
+}
+
 // A forked process has none of the threads that were at work.
 static void forget(void)
 {
    pthread_mutex_init(&calls, NULL);
+   forking = 0;
    running = 0;
    thud_latest_signal = 0;
 }
 
-static void forget_in_children(void)
+static void heed_forks(void)
 {
-   pthread_atfork(NULL, NULL, forget);
+   pthread_atfork(wait_for_calls, go_on, forget);
 }
 
 // From now on a signal that the process handles ends the running calls, too.
@@ -132,8 +159,9 @@ void thud_begin_call(void)
    static pthread_once_t once = PTHREAD_ONCE_INIT;
    struct sigaction action;
 
-   pthread_once(&once, forget_in_children);
+   pthread_once(&once, heed_forks);
    pthread_mutex_lock(&calls);
+   while (forking) pause_calls();
    running++;
    for (int i = 0; i < 2; i++) {
       if (sigaction(ending_signals[i], NULL, &action) != 0 || action.sa_sigaction == note

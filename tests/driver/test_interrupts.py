@@ -170,6 +170,34 @@ except KeyboardInterrupt:
     assert done.returncode == 7
 
 
+def test_processes_forked_beside_short_calls_have_no_locked_libraries() -> None:
+    code = """
+import os, signal, threading, thud
+case = thud.Case(model=thud.ModalBall(rings=20))
+force = thud.solve_case(case).peak_force
+
+def compute():
+    while True:
+        thud.solve_case(case)
+
+for _ in range(2):
+    threading.Thread(target=compute, daemon=True).start()
+for _ in range(60):
+    child = os.fork()
+    if not child:
+        signal.alarm(20)
+        os._exit(thud.solve_case(case).peak_force != force)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if code:
+        os._exit(abs(code))
+os._exit(0)
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code], check=False, timeout=6 * LIMIT
+    )
+    assert done.returncode == 0
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("copies", [1, 2], ids=["once", "twice"])
 def test_executable_ends_sets_and_leaves_nothing(
