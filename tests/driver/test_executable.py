@@ -326,7 +326,10 @@ def test_memory_that_is_short_is_told_in_one_sentence(
 
 
 def test_sentence_of_a_diverged_motion_has_no_nan(run: Run, case_file: CaseFile) -> None:
-    case_file("&ball mass = 1e-300 / &drop / &model /")
+    case_file(
+        "&ball / &drop height = 1e6 gravity = 1000 / &model name = 'hunt_crossley' / "
+        "&hunt_crossley stiffness = 1e15 exponent = 5 restitution = 0.5 /"
+    )
     result = run("case.nml")
     assert result.returncode == 2
     assert "substeps is too low for this source: the motion leaves the range" in result.stderr

@@ -26,7 +26,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             r"\[parameters\] hardness is not a parameter .* allowed: outer_radius, wall",
         ),
         (RECORD, [], {}, r"parameters: none is given; allowed: outer_radius"),
-        (RECORD, {"mass": -1.0}, {}, r"mass: start = -1 is not allowed; allowed: 0 <= start"),
+        (RECORD, {"mass": -1.0}, {}, r"mass: start = -1 is not allowed; allowed: 1e-12 <= start"),
         (RECORD, {"mass": thud.Parameter(2.0, 3.0, 1.0)}, {}, r"mass: low = 3 and high = 1"),
         (RECORD, {"mass": thud.Parameter(2.0, 3.0)}, {}, r"mass: start = 2 is not allowed"),
         (RECORD, {"mass": "heavy"}, {}, r"mass: start = 'heavy' is not .* finite"),
