@@ -123,7 +123,7 @@ def _study(chance: random.Random) -> tuple[str, str]:
         if chance.random() < 0.15:
             study |= {
                 chance.choice(["confidence", "starts", "seed", "max_steps"]): chance.choice(
-                    [0.9, 1, 0, 3, _odd(chance)]
+                    [0.9, 1, 0, 3, *deepcopy(ODD)]
                 )
             }
     elif chance.random() < 0.9:
