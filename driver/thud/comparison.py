@@ -47,7 +47,7 @@ _ROWS = (
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Displayed):
     """Impacts of the same drop, side by side.
 

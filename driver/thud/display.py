@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any
 
+from thud.immutable import Immutable
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
@@ -13,7 +15,7 @@ if TYPE_CHECKING:
 MAKERS: dict[str, Callable[..., Any]] = {}
 
 
-class Displayed(ABC):
+class Displayed(Immutable, ABC):
     """Base of results: their HTML is their text above a table."""
 
     @abstractmethod
