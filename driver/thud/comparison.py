@@ -127,7 +127,7 @@ class Comparison(Displayed):
         OSError
             Where they cannot be written.
         """
-        return save_page("comparison", self.figure(), self.html(), directory)
+        return save_page("comparison", self.figure, self.html(), directory)
 
 
 def _digits(force: float) -> str:

@@ -84,7 +84,7 @@ class FloorComparison(Displayed):
         OSError
             Where they cannot be written.
         """
-        paths: list[Path] = MAKERS["save_page"]("floors", self.figure(), self.html(), directory)
+        paths: list[Path] = MAKERS["save_page"]("floors", self.figure, self.html(), directory)
         return paths
 
     def __repr__(self) -> str:

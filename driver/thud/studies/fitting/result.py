@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -356,7 +357,7 @@ class Fit(Displayed):
         """
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
-        return save(folder, self.files(), self.figures(units) if figures else {})
+        return save(folder, self.files(), partial(self.figures, units) if figures else None)
 
 
 def file_ends(count: int) -> list[str]:
