@@ -151,7 +151,8 @@ def python_class(title: str, keys: list[Entry], group: str, kind: str = "") -> s
         attributes.append(f"    {key['name']} : {plain_type}")
         attributes += textwrap.wrap(text, 99, subsequent_indent=INDENT)
         members.append(f"    {key['name']}: {type_name} = {default}")
-    head = f'\n\n@dataclass(frozen=True)\nclass {class_name(group)}(Group):\n    """{title}'
+    head = f"\n\n@dataclass(frozen=True, eq=False)\nclass {class_name(group)}(Group):\n"
+    head += f'    """{title}'
     if not keys:
         return "\n".join([f'{head}"""', "", *members, ""])
     attributes = ["\n    Attributes", "    ----------", *attributes, '    """\n']

@@ -74,7 +74,7 @@ RoomWallJunction = Literal["cross", "t", "index"]
 BandSet = Literal["octave", "third"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ball(Group):
     """Group ``&ball``.
 
@@ -120,7 +120,7 @@ class Ball(Group):
         return cls(youngs_modulus=2.08e6)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drop(Group):
     """Group ``&drop``.
 
@@ -136,7 +136,7 @@ class Drop(Group):
     gravity: float = 9.81
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sampling(Group):
     """Group ``&sampling``.
 
@@ -155,7 +155,7 @@ class Sampling(Group):
     substeps: int = 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Levels(Group):
     """Group ``&levels``.
 
@@ -174,7 +174,7 @@ class Levels(Group):
     force: LevelsForce = "floor"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Limits(Group):
     """Group ``&limits``.
 
@@ -187,7 +187,7 @@ class Limits(Group):
     source: LimitsSource = "rubber_ball"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Modes(Group):
     """Free modes that are asked for.
 
@@ -206,7 +206,7 @@ class Modes(Group):
     polar_elements: int = field(default=64, metadata={"group": "mesh"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Compression(Group):
     """Slow compression that is asked for.
 
@@ -225,7 +225,7 @@ class Compression(Group):
     gas: CompressionGas = "vented"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Room(Group):
     """Room below the floor.
 
@@ -286,7 +286,7 @@ class Room(Group):
     ceiling_loss_factor: float = 0.3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HollowSphere(Group):
     """Options of the source model ``hollow_sphere``.
 
@@ -301,7 +301,7 @@ class HollowSphere(Group):
     momentum_flux: HollowSphereMomentumFlux = "momentum_balance"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ModalBall(Group):
     """Options of the source model ``modal_ball``.
 
@@ -350,7 +350,7 @@ class ModalBall(Group):
     static_families: Sequence[int] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FiniteElement(Group):
     """Options of the source model ``finite_element``.
 
@@ -423,7 +423,7 @@ class FiniteElement(Group):
     snapshot_interval: float = field(default=0.001, metadata={"group": "output"})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeasuredModes(Group):
     """Options of the source model ``measured_modes``.
 
@@ -446,7 +446,7 @@ class MeasuredModes(Group):
     allow_mass_mismatch: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HuntCrossley(Group):
     """Options of the source model ``hunt_crossley``.
 
@@ -472,7 +472,7 @@ class HuntCrossley(Group):
     restitution: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TwoMass(Group):
     """Options of the source model ``two_mass``.
 
@@ -509,14 +509,14 @@ class TwoMass(Group):
     belt_damping: float = 0.2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rigid(Group):
     """Floor ``rigid``."""
 
     name: ClassVar[FloorName] = "rigid"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class InfinitePlate(Group):
     """Floor ``infinite_plate``.
 
@@ -530,7 +530,7 @@ class InfinitePlate(Group):
     resistance: float = 1600.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Oscillator(Group):
     """Floor ``oscillator``.
 
@@ -550,7 +550,7 @@ class Oscillator(Group):
     damping: float = 785.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plate(Group):
     """Floor ``plate``.
 
@@ -606,7 +606,7 @@ class Plate(Group):
     point_y: Sequence[float] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FloatingFloor(Group):
     """Floor ``floating_floor``.
 
@@ -681,7 +681,7 @@ class FloatingFloor(Group):
     point_y: Sequence[float] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JoistFloor(Group):
     """Floor ``joist_floor``.
 
@@ -744,7 +744,7 @@ class JoistFloor(Group):
     point_y: Sequence[float] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeasuredMobility(Group):
     """Floor ``measured_mobility``.
 

@@ -67,7 +67,7 @@ def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> Model
     return MODELS[model](**options)  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Case(Group, Displayed):
     """Everything that one run needs.
 

@@ -116,7 +116,8 @@ def shown(value: object) -> str:
     """Return a value as a message shows it: by its kind where it is long or has several lines."""
     if isinstance(value, int) and abs(value) > LARGEST:
         return "a very large number"
-    text = repr(value)
+    # Files write lists, which objects keep as tuples.
+    text = repr(list(value) if type(value) is tuple else value)
     fits = len(text) <= LONGEST_SHOWN and "\n" not in text
     if fits:
         return text

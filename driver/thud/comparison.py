@@ -47,7 +47,7 @@ _ROWS = (
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Displayed):
     """Impacts of the same drop, side by side.
 
@@ -127,7 +127,7 @@ class Comparison(Displayed):
         OSError
             Where they cannot be written.
         """
-        return save_page("comparison", self.figure(), self.html(), directory)
+        return save_page("comparison", self.figure, self.html(), directory)
 
 
 def _digits(force: float) -> str:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 CELLS = ("criterion", "value", "limits", "verdict")
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Criterion(Displayed):
     """One quantity and the range that the standards require.
 
@@ -56,7 +56,7 @@ class Criterion(Displayed):
         return name, value, limits, found
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Conformity(Displayed):
     """Verdict on a source.
 

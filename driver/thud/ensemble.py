@@ -21,6 +21,7 @@ from thud.checks import (
     require_real,
     require_whole,
 )
+from thud.immutable import freeze
 from thud.impact import FORCES
 from thud.key import check_keywords
 from thud.keys import find_key, users
@@ -170,7 +171,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     except MemoryError as error:
         size = f"{len(numbers)} sets" + (f" of {sizes['sample']:.0f} samples" if forces else "")
         refuse(f"forces = {forces} for {size} does not fit in memory", "fewer sets", error)
-    force = results["force"]
+    # They may fill the memory: once is enough.
+    force = freeze(results["force"])
     return Ensemble(
         base,
         columns,

@@ -22,7 +22,7 @@ class PlausibilityWarning(UserWarning):
 
 
 class ReportWarning(UserWarning):
-    """A report lacks a file or some letters, or replaces that of another recording."""
+    """A figure, a file or some letters of a report are left out, or it replaces another one."""
 
 
 class WorkerWarning(RuntimeWarning):

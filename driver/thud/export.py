@@ -38,7 +38,9 @@ _HISTORY = re.compile(r"(.*?)_((?:m|s|N|Pa|J|Hz|kg)(?:_per_\w+)?)")
 
 def dataset(result: Impact | Ensemble) -> xr.Dataset:
     """Return the dataset of a result, see its `to_xarray`."""
-    return _of_impact(result) if isinstance(result, Impact) else _of_ensemble(result)
+    found = _of_impact(result) if isinstance(result, Impact) else _of_ensemble(result)
+    # The arrays of the result are read-only.
+    return found.copy(deep=True)
 
 
 def _of_impact(impact: Impact) -> xr.Dataset:

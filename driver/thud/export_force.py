@@ -17,6 +17,7 @@ from thud._api import version
 from thud.case import case_text
 from thud.checks import refuse, refuse_value, require_kind, require_number, require_whole
 from thud.files import replace_file
+from thud.immutable import Immutable
 from thud.impact import Impact
 from thud.levels import RECORDED_BAND
 from thud.recordings.channel import library
@@ -46,7 +47,7 @@ UFF_NAME = 10
 
 
 @dataclass(frozen=True, eq=False)
-class BlockedForce:
+class BlockedForce(Immutable):
     """The force of a source on a rigid floor.
 
     Attributes

@@ -12,6 +12,7 @@ from thud.case import Case, case_text
 from thud.checks import require_pair
 from thud.display import MAKERS
 from thud.floors.mobility import mobility
+from thud.immutable import Immutable
 from thud.impact import Impact, history
 from thud.levels import force_exposure_levels
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from thud._schema import BandSet, FloorOptions, LevelsMethod
 
 
-@dataclass(frozen=True)
-class FloorEnergy:
+@dataclass(frozen=True, eq=False)
+class FloorEnergy(Immutable):
     """Energy that a force gives to a floor, in bands.
 
     Attributes

@@ -9,6 +9,7 @@ from functools import wraps
 from typing import TYPE_CHECKING, Literal, ParamSpec, Self, TypeVar
 
 from thud.checks import refuse, require_words
+from thud.immutable import Plain
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -57,7 +58,7 @@ class Key:
     whole: bool = False
 
 
-class Group:
+class Group(Plain):
     """Base of the dataclasses whose fields are keys, or groups of them."""
 
     def __new__(cls, *_: object, **words: object) -> Self:

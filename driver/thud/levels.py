@@ -37,7 +37,7 @@ _MAX_PEAKS = 2**31
 RECORDED_BAND = 1250.0
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Bands(Displayed):
     """Frequency bands of base 10 (IEC 61260-1), ascending; the arrays are read-only.
 
@@ -89,10 +89,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
 def _bands(name: str) -> Bands:
     """Return the bands of a name."""
     (n_band,) = call_direct(level_api.count_bands, name)
-    columns = level_api.get_bands(name, n_band)
-    for column in columns:
-        column.setflags(write=False)
-    return Bands(*columns)
+    return Bands(*level_api.get_bands(name, n_band))
 
 
 def force_exposure_levels(

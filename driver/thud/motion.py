@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.immutable import Immutable
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Immutable):
     """Snapshots of the half section of the ball, the floor at rest at height 0.
 
     Nodes run from the lowest point to the highest and from the inner surface to the outer one;

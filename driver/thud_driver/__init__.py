@@ -45,6 +45,9 @@ def main() -> int:
         if not interrupt.number:
             raise
         code = _say(interrupt.number)
+    if interrupt.number and code != 128 + interrupt.number:
+        # It became an error of a figure, which is left out.
+        code = _say(interrupt.number)
     _handle(signal.SIG_IGN)
     return code
 

@@ -2,29 +2,49 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
+import os
+import pkgutil
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from conftest import INPUTS, MINIMAL, REPOSITORY
+from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver, QuiverKey
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from PIL import Image
 
 import thud
-from thud import plot
+from thud import cli, plot
 from thud.plot.look import COLOURS, line_style, marker_style
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from matplotlib.figure import Figure
+    from collections.abc import Callable
 
 LONG = "rubber_ball_with_a_name_that_is_much_longer_than_the_column_of_a_page_is_wide"
+# What a user may have configured, for slides and papers.
+OTHER_STYLE = {
+    "text.usetex": True,
+    "savefig.dpi": 10000,
+    "figure.dpi": 10000,
+    "font.family": "nowhere",
+    "axes.unicode_minus": False,
+    "savefig.bbox": "tight",
+    "savefig.format": "ps",
+    "lines.linewidth": 20,
+    "svg.fonttype": "path",
+}
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -198,3 +218,111 @@ def test_text_of_vector_graphics_is_text(shell: thud.Impact, tmp_path: Path) -> 
     shown = {"".join(text.itertext()).strip() for text in found}
     assert {"shell & <ball>", "Octave band, Hz", "31.5", "Tolerance, rubber ball"} <= shown
     assert all("sans-serif" in text.attrib["style"] for text in found)
+
+
+def test_users_style_changes_no_figure(shell: thud.Impact, tmp_path: Path) -> None:
+    for folder, style in (("plain", {}), ("other", OTHER_STYLE)):
+        (tmp_path / folder).mkdir()
+        with mpl.rc_context(style):
+            figures = {**plot.case_figures(shell), "overview": shell.plot()}
+            plot.save_all(figures, tmp_path / folder)
+    names = sorted(path.name for path in (tmp_path / "plain").iterdir())
+    assert "overview.svg" in names
+    for name in names:
+        plain, other = ((tmp_path / folder / name).read_bytes() for folder in ("plain", "other"))
+        assert plain == other, name
+
+
+def test_run_beside_a_matplotlibrc_draws_the_same_figures(tmp_path: Path) -> None:
+    drawn = []
+    for folder, style in (("plain", {}), ("other", OTHER_STYLE | {"backend": "nowhere"})):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "case.nml").write_text(MINIMAL)
+        lines = "".join(f"{key}: {value}\n" for key, value in style.items())
+        (tmp_path / folder / "matplotlibrc").write_text(lines)
+        command = [sys.executable, "-P", "-m", "thud", "run", "-q", "case.nml", "-o", "out"]
+        done = subprocess.run(
+            command, cwd=tmp_path / folder, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert "Traceback" not in done.stderr
+        drawn.append((tmp_path / folder / "out/force.png").read_bytes())
+    assert drawn[0] == drawn[1]
+
+
+def test_run_without_a_matplotlib_that_works_keeps_the_results(tmp_path: Path) -> None:
+    (tmp_path / "case.nml").write_text(MINIMAL)
+    command = [sys.executable, "-P", "-m", "thud", "run", "-q", "case.nml", "-o", "out"]
+    environment = os.environ | {"MPLBACKEND": "nowhere"}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    (line,) = done.stderr.splitlines()
+    assert "not drawn" in line
+    assert "MPLBACKEND" in line or "backend" in line
+    assert (tmp_path / "out/force.csv").exists()
+
+
+def test_every_figure_is_drawn_in_its_own_style() -> None:
+    found = 0
+    for module in pkgutil.iter_modules(plot.__path__, f"{plot.__name__}."):
+        if module.name == "thud.plot.look":
+            continue
+        for name, draw in vars(importlib.import_module(module.name)).items():
+            if not inspect.isfunction(draw) or name.startswith("_"):
+                continue
+            if draw.__module__ == module.name and "Figure" in str(inspect.signature(draw)):
+                draws = "Figure" in str(inspect.signature(draw).return_annotation)
+                found += draws
+                assert hasattr(draw, "__wrapped__") or not draws, (module.name, name)
+    assert found > 25
+
+
+STEPS = [str(REPOSITORY / "inputs/comparison" / f"{name}.nml") for name in ("1_shell", "3_modes")]
+FLOORS = [str(REPOSITORY / "inputs/floors" / name) for name in ("joists.nml", "concrete_140.nml")]
+SWEEP = '[parameters]\nheight = {values = [0.5, 1.0], unit = "m"}\n'
+FIT = "[target]\nlevels = [39, 31, 23, 17, 12]\n[parameters]\nyoungs_modulus = {}\n"
+RESPONSE = "frequency,real,imaginary\n10,1e-5,1e-5\n20,2e-5,0\n40,1e-5,-1e-5\n80,5e-6,-5e-6\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "results"),
+    [
+        (["run", str(INPUTS[0])], ["force.csv", "summary.nml"]),
+        (["compare", *STEPS], ["comparison.html"]),
+        (["measure", str(REPOSITORY / "inputs/recordings/drop_1.wav"), "--calibration",
+          "5000 N/FS", "--workers", "1"], ["levels.csv", "report.json", "report.html"]),
+        (["floor", *FLOORS], ["floors.html"]),
+        (["rate", str(REPOSITORY / "inputs/floors/field_levels.csv")], []),
+        (["mobility", "response.csv"], []),
+        (["sweep", "sweep.toml"], ["sweep.nc"]),
+        (["fit", "fit.toml"], ["fit.json"]),
+        (["figures"], []),
+    ],
+    ids=lambda value: value[0] if value else "none",
+)  # fmt: skip
+def test_figure_that_fails_is_a_warning(
+    arguments: list[str],
+    results: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    def fail(*_: object, **__: object) -> None:
+        message = "the font is damaged\nsecond line"
+        raise RuntimeError(message)
+
+    few: dict[str, Callable[[], Figure]] = {"one": Figure}
+    monkeypatch.setattr(plot, "documentation_figures", lambda: few)
+    monkeypatch.setattr(Figure, "savefig", fail)
+    monkeypatch.chdir(tmp_path)
+    for name, text in (("sweep.toml", SWEEP), ("fit.toml", FIT), ("response.csv", RESPONSE)):
+        Path(name).write_text(text)
+    assert cli.main([*arguments, "-q", "-o", "out"]) == 0
+    told = [line for line in capsys.readouterr().err.splitlines() if "not drawn" in line]
+    assert told
+    assert all("the font is damaged" in line for line in told)
+    assert not list(Path("out").glob("*.png"))
+    assert all((Path("out") / name).exists() for name in results), list(Path("out").iterdir())
+    assert list(Path("out").iterdir()) or arguments[0] == "figures"

@@ -55,7 +55,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             thud.ForceTarget(RECORD, window=(2, 3)),
             ["mass"],
             {},
-            r"window = \(2, 3\) is not allowed",
+            r"window = .2, 3. is not allowed",
         ),
         (thud.ForceTarget(RECORD, force="gas"), ["mass"], {}, r"force = 'gas' is not known"),
         (thud.LevelTarget([39.0] * 4), ["mass"], {}, r"levels = .* allowed: 5 real numbers"),

@@ -12,6 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
+from aliasing import check_aliasing
 from attempts import attempts
 from campaign import Part, Report
 from clusters import check_clusters
@@ -40,6 +41,7 @@ def parts() -> dict[str, Part]:
         "places": Part(3000, 12, check_places),
         "crowds": Part(1000, 4, check_crowds),
         "threads": Part(3000, 100, check_threads, share=100),
+        "aliasing": Part(2000, 40, check_aliasing, share=100),
         "starts": Part(100, 1, check_starts),
         "explorer": Part(2000, 8, check_explorer),
         "clusters": Part(400, 2, check_clusters),

@@ -9,10 +9,21 @@ import signal
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
+from tqdm import tqdm
+
 from thud._api import version
 from thud.checks import suggestion
 from thud.cli.calibrate import CALIBRATE
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.command import (
+    NO_FIGURES,
+    QUIET,
+    Command,
+    argument,
+    exit_code,
+    output,
+    sentence,
+    shown_at_once,
+)
 from thud.cli.examples import EXAMPLES
 from thud.cli.explore import EXPLORE
 from thud.cli.export import EXPORT
@@ -24,7 +35,7 @@ from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
-from thud.errors import InputError, ThudError
+from thud.errors import InputError, ReportWarning, ThudError
 from thud.impact import FORCES
 from thud.levels import SOURCES
 
@@ -126,7 +137,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
-            code = command.function(options)
+            with shown_at_once(ReportWarning, _tell):
+                code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
         print(f"thud-driver: interrupted; {kept}", file=sys.stderr)
@@ -138,6 +150,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"thud-driver: {sentence(error)}", file=sys.stderr)
         return exit_code(error)
     return code
+
+
+def _tell(remark: object) -> None:
+    """Print a remark; a progress bar stays below it."""
+    tqdm.write(f"thud-driver: {remark}", file=sys.stderr)
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:

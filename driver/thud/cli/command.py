@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.display import draw_all
 from thud.errors import InputError, ThudError
 from thud.files import replace_file
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from thud.floors.mobility_fit import MobilityFit
     from thud.floors.survey import RoomLevels
@@ -60,6 +63,23 @@ def channel_of(text: str | None) -> int | str | None:
     return int(text) if text is not None and text.isdecimal() else text
 
 
+@contextmanager
+def shown_at_once(kind: type[Warning], show: Callable[[object], None]) -> Iterator[None]:
+    """Show warnings of a kind as remarks."""
+    usual = warnings.showwarning
+
+    def show_warning(warning: Any, category: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
+        if issubclass(category, kind):
+            show(warning)
+        else:
+            usual(warning, category, *place)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", kind)
+        warnings.showwarning = show_warning  # type: ignore[assignment]
+        yield
+
+
 def tell(remarks: Iterable[object]) -> None:
     """Print remarks."""
     for remark in remarks:
@@ -75,7 +95,7 @@ def conclude(
 ) -> int:
     """Save a file and the figure of a result, print its text and remarks; return the exit code."""
     folder = Path(options.output or Path("outputs", found.name))
-    figures = {} if options.no_figures else {figure: found.plot()}
+    figures = {} if options.no_figures else draw_all({figure: found.plot})
     folder.mkdir(parents=True, exist_ok=True)
     name, content = file
     replace_file(folder / name, content)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.cli.command import tell
+from thud.display import draw_all
 from thud.errors import PlausibilityWarning
 from thud.tables import format_rows
 
@@ -48,7 +49,7 @@ def draw_figures(options: argparse.Namespace) -> int:
     for name, draw in tqdm(
         figures.items(), unit="figure", disable=options.quiet or None, leave=False
     ):
-        plot.save_all({name: draw()}, folder)
+        plot.save_all(draw_all({name: draw}), folder)
     if not options.quiet:
         print(f"Figures: {folder}")
     return 0

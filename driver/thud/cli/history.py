@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.display import draw_all
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
@@ -21,11 +23,11 @@ def run_history(options: argparse.Namespace) -> int:
     history = read_history(options.reports, different_balls=options.different_balls)
     folder = Path(options.output)
     folder.mkdir(parents=True, exist_ok=True)
-    paths = save_all({"history": draw_history(history)}, folder)
+    paths = save_all(draw_all({"history": partial(draw_history, history)}), folder)
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))
         for remark in history.remarks():
             print(remark)
-        print(f"Chart: {paths[0]}")
+        print(*(f"Chart: {path}" for path in paths[:1]))
     return 0

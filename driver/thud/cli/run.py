@@ -14,6 +14,7 @@ from thud._api import api, call, text
 from thud.case import Case, read_case
 from thud.cli.command import exit_code, sentence
 from thud.compression import new_curve
+from thud.display import left_out
 from thud.errors import InputError, ThudError
 from thud.files import add_files
 from thud.free_modes import new_modes
@@ -77,18 +78,20 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
     """Return the files of the figures of a run, drawn from its results in memory."""
     if not (figures or animation):
         return {}
-    from thud import plot  # noqa: PLC0415 - matplotlib takes its time
-
     case = Case.from_text(text(found["case"]))
     impact = new_impact(case, found) if "samples" in found else None
     modes = new_modes(case.ball, found) if "modes" in found else None
     curve = new_curve(case, found) if "compression" in found else None
-    with TemporaryDirectory() as name:
+    shown = {} if impact is None else {"motion": impact, "floor_motion": impact.on_floor}
+    with TemporaryDirectory() as name, left_out("a figure"):
+        from thud import plot  # noqa: PLC0415 - matplotlib takes its time
+
         folder = Path(name)
         if figures:
             plot.save_all(plot.case_figures(impact, modes, curve), folder)
-        shown = {} if impact is None else {"motion": impact, "floor_motion": impact.on_floor}
         for file, moving in shown.items():
             if animation and moving is not None and moving.motion:
-                plot.animate(moving, folder / f"{file}.gif")
+                with left_out(f"{file}.gif"):
+                    plot.animate(moving, folder / f"{file}.gif")
         return {path.name: path.read_bytes() for path in folder.iterdir()}
+    return {}

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FloorComparison(Displayed):
     """Predictions for several floors and rooms, side by side.
 
@@ -84,7 +84,7 @@ class FloorComparison(Displayed):
         OSError
             Where they cannot be written.
         """
-        paths: list[Path] = MAKERS["save_page"]("floors", self.figure(), self.html(), directory)
+        paths: list[Path] = MAKERS["save_page"]("floors", self.figure, self.html(), directory)
         return paths
 
     def __repr__(self) -> str:

@@ -33,7 +33,7 @@ _DENSITY = 64
 _SLOW = 0.25
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BallImpedance(Displayed):
     """Impedance of a source during its impact, and the floors on which it matters.
 

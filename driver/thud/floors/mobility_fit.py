@@ -67,7 +67,7 @@ _POOR = 0.1
 _CHANGED = 1.5
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MobilityFit(Displayed):
     """A measured mobility and the passive sum of poles that stands for it.
 

@@ -56,7 +56,7 @@ REFERENCE_PRESSURE = 2e-5
 MAX_POSITIONS, MAX_MODES, MAX_VALUES = 1000, 20000, 2 * 10**7
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ModalRoom(Displayed):
     """Levels in a modal room under a modal plate, for positions of ball and microphone.
 

@@ -30,7 +30,7 @@ THIRDS = BANDWIDTHS[1]
 NOTICED = 0.1
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RoomPrediction(Displayed):
     """Level that an impact causes in the room below: energy means over positions, in thirds.
 

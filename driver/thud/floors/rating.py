@@ -24,7 +24,7 @@ CLASSES = ("none", "1", "2", "3", "4")
 CLASS_LIMITS: tuple[float, ...] = tuple(level_api.get_class_limits(len(CLASSES) - 1))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Rating(Displayed):
     """Single numbers of the levels that a heavy/soft impact source causes in the room below.
 

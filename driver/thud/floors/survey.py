@@ -62,7 +62,7 @@ DIFFERENT = 15.0
 LEVELS, TIMES = (-50.0, 200.0), (0.01, 100.0)
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RoomLevels(Displayed):
     """Levels of a heavy/soft impact source in the room below, in bands.
 

@@ -32,7 +32,7 @@ AT_500, MAX_EXCESS = 60, 32.0
 CONCRETE, WITHIN = 3500 / 2300, 1.26
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TappingLevel(Displayed):
     """Normalised level of the tapping machine below a homogeneous floor, in thirds.
 

@@ -8,11 +8,22 @@ to the results of a case, ``thud-driver figures`` draws ``DOCUMENTATION_FIGURES`
 import importlib
 import pkgutil
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
-from matplotlib.figure import Figure
+from thud.checks import refuse
+
+try:
+    from matplotlib.figure import Figure
+except ValueError as error:
+    refuse(
+        f"matplotlib cannot be imported ({error})",
+        "a matplotlibrc in UTF-8, and MPLBACKEND the name of a backend or not set",
+        error,
+    )
 
 from thud.compression import CompressionCurve
+from thud.display import draw_all
 from thud.free_modes import FreeModes
 from thud.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
@@ -63,16 +74,18 @@ def case_figures(
 ) -> dict[str, Figure]:
     """Draw the figures of a case: of its impact, its free modes, its slow compression.
 
-    Return the figures by the names of their files, without those that have nothing to show.
+    Return the figures by the names of their files, without those that have nothing to show or, with
+    a warning, cannot be drawn.
     """
     given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes, "COMPRESSION_FIGURES": curve}
-    drawn = {
-        name: draw(results)
-        for kind, results in given.items()
-        if results
-        for name, draw in _declared(kind).items()
-    }
-    return {name: figure for name, figure in drawn.items() if figure}
+    return draw_all(
+        {
+            name: partial(draw, results)
+            for kind, results in given.items()
+            if results
+            for name, draw in _declared(kind).items()
+        }
+    )
 
 
 def documentation_figures() -> dict[str, Callable[[], Figure]]:

@@ -10,7 +10,16 @@ from thud._schema import LevelsForce, LimitsSource
 from thud.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
-from thud.plot.look import SIZE, WIDTH, dress, legend_above, level_label, literal, new_figure
+from thud.plot.look import (
+    SIZE,
+    WIDTH,
+    dress,
+    legend_above,
+    level_label,
+    literal,
+    new_figure,
+    own_style,
+)
 from thud.recordings.recording import Recording
 
 # Size of a letter and of a line of the table, inch; letters of a name on one line.
@@ -18,6 +27,7 @@ _LETTER, _LINE = 0.062, 0.17
 _LETTERS = 20
 
 
+@own_style()
 def comparison_page(
     impacts: Mapping[str, Impact | Recording],
     force: LevelsForce | None,

@@ -8,9 +8,10 @@ from thud._schema import Ball, FiniteElement
 from thud.checks import require_kind
 from thud.compression import CompressionCurve, compress
 from thud.errors import InputError
-from thud.plot.look import SIZE, add_curves, empty_axes, legend_above
+from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style
 
 
+@own_style()
 def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
     """Draw forces against the approach of the plates.
 

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from thud.keys import plain_words
-from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure
+from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure, own_style
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,6 +25,7 @@ MAX_PARAMETERS = 5
 LINE = 44
 
 
+@own_style()
 def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
     """Draw joint confidence regions of two or more parameters, or their correlations.
 

@@ -9,7 +9,7 @@ from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
 from thud.outcomes import RATING
-from thud.plot.look import FORCE_WORDS, SIZE, empty_axes, legend_above
+from thud.plot.look import FORCE_WORDS, SIZE, empty_axes, legend_above, own_style
 from thud.plot.parameter_axis import show_parameter
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _TINY = 0.05
 
 
+@own_style()
 def draw_design_map(result: DesignMap) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the sets that conform.
 

@@ -18,6 +18,7 @@ from thud.plot.look import (
     dress,
     legend_above,
     new_figure,
+    own_style,
 )
 from thud.studies.fitting.misfit import SHIFT
 
@@ -41,6 +42,7 @@ VISIBLE = 0.003
 BEFORE, AFTER = 0.15, 0.4
 
 
+@own_style()
 def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figure]:
     """Draw a fit: ``"fit"``, or ``"fit_1"`` and so on, and of several parameters ``"confidence"``.
 
@@ -54,6 +56,7 @@ def draw_fit(fit: Fit, units: Mapping[str, tuple[str, float]]) -> dict[str, Figu
     return figures
 
 
+@own_style()
 def target_and_fit(fit: Fit, number: int = 1) -> Figure:
     """Draw a target and the model, in kN against ms or in dB, and below it their difference."""
     target = fit.targets[number - 1]

@@ -10,7 +10,16 @@ from matplotlib.ticker import NullLocator
 from thud.levels import BANDWIDTHS, get_bands, record_force
 from thud.plot.examples import solve_chipboard
 from thud.plot.force_history import TIME_LABEL
-from thud.plot.look import COLOURS, SIZE, band_axis, dress, legend_above, line_style, new_figure
+from thud.plot.look import (
+    COLOURS,
+    SIZE,
+    band_axis,
+    dress,
+    legend_above,
+    line_style,
+    new_figure,
+    own_style,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +35,7 @@ _SHOWN = 1.5
 _DENSITY = 400
 
 
+@own_style()
 def draw_floor(impact: FloorImpact) -> Figure:
     """Draw force and floor velocity, the change of the levels, the energy, and the mobility."""
     figure = new_figure(6.4)

@@ -10,7 +10,7 @@ import numpy as np
 from thud._schema import FloatingFloor, FloorOptions, JoistFloor, Plate
 from thud.checks import refuse_value, require_kind
 from thud.floors.mobility import mobility
-from thud.plot.look import SIZE, add_curves, empty_axes, legend_above
+from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 _FROM, _TO = 11.0, 1400.0
 
 
+@own_style()
 def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
     """Draw the magnitudes of the mobilities of floors, by name, against frequency."""
     if not floors:

@@ -22,6 +22,7 @@ from thud.plot.look import (
     literal,
     marker_style,
     new_figure,
+    own_style,
 )
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ _STEPS = {
 }
 
 
+@own_style()
 def draw_floors(found: FloorComparison) -> Figure:
     """Draw the chain of each floor as spectra, its levels beside the classes, and the table."""
     table = found.rows()

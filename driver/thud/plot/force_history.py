@@ -21,6 +21,7 @@ from thud.plot.look import (
     line_style,
     literal,
     named,
+    own_style,
 )
 
 # Fraction of the maximum force that a contact exceeds.
@@ -30,6 +31,7 @@ MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
 
 
+@own_style()
 def force_history(impacts: Mapping[str, Impact], force: LevelsForce | None = None) -> Figure:
     """Draw forces against time, below 1.25 kHz as force plates record them (paper, figure 2).
 

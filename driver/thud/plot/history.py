@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure
+from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure, own_style
 from thud.report.rows import NOT_KNOWN, limits_of, style_of
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ MARKS = {
 ROOM, MIN_ROOM = 0.06, timedelta(days=15)
 
 
+@own_style()
 def draw_history(history: History) -> Figure:
     """Draw each criterion of a ball against the date of its reports.
 

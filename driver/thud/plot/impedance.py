@@ -12,7 +12,16 @@ from thud.floors.impedance import ball_impedance
 from thud.floors.mobility import mobility
 from thud.impact import solve
 from thud.plot.examples import solve_published
-from thud.plot.look import COLOURS, LINES, SIZE, empty_axes, legend_above, marker_style, styled
+from thud.plot.look import (
+    COLOURS,
+    LINES,
+    SIZE,
+    empty_axes,
+    legend_above,
+    marker_style,
+    own_style,
+    styled,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,6 +35,7 @@ if TYPE_CHECKING:
 _FREQUENCIES = np.geomspace(22.0, 720.0, 1000)
 
 
+@own_style()
 def ball_impedances(
     sources: Mapping[str, BallImpedance], floors: Mapping[str, FloorOptions]
 ) -> Figure:

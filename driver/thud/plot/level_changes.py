@@ -17,9 +17,11 @@ from thud.plot.look import (
     literal,
     marker_style,
     octave_axis,
+    own_style,
 )
 
 
+@own_style()
 def level_changes(
     reference: Impact, impacts: Mapping[str, Impact], force: LevelsForce | None = None
 ) -> Figure:

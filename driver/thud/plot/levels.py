@@ -26,9 +26,11 @@ from thud.plot.look import (
     new_figure,
     octave_axis,
     octave_boxes,
+    own_style,
 )
 
 
+@own_style()
 def levels(
     impacts: Mapping[str, Impact],
     force: LevelsForce | None = None,

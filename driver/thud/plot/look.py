@@ -2,7 +2,8 @@
 
 import io
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from textwrap import fill
 from typing import Any, TypeVar
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from thud._schema import BandSet, LevelsForce
 from thud.checks import require_kind, shown
+from thud.display import draw_all, left_out
 from thud.errors import InputError
 from thud.files import replace_file
 from thud.impact import Impact
@@ -42,6 +44,21 @@ BAND_WORDS = {"octave": "Octave band", "third": "One-third-octave band"}
 LEVEL = "Force exposure level, dB re 1 N"
 # Maximum number of letters of a line of a legend.
 _LINE = 44
+# Beside matplotlib's defaults: text in vector graphics stays text, and the same figure gives the
+# same bytes everywhere.
+_STYLE: dict[Any, Any] = {"svg.fonttype": "none", "svg.hashsalt": "thud", "timezone": "UTC"}
+
+
+@contextmanager
+def own_style() -> Iterator[None]:
+    """Draw and save in the style of all figures, whatever a user's matplotlibrc says.
+
+    It decorates the functions that draw.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
@@ -211,14 +228,19 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     if kind not in FORMATS:
         message = f"{path}: ending {shown(kind)} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
+    replace_file(path, _content(figure, Path(path)))
+
+
+@own_style()
+def _content(figure: Figure, path: Path) -> bytes:
+    """Return the content of the file of a figure."""
     content = io.BytesIO()
-    # Without a date and with constant names, the same figure gives the same bytes.
+    kind = path.suffix[1:].lower()
+    # Without a date, the same figure gives the same bytes.
     date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
-    title = Path(path).stem.replace("_", " ").capitalize()
-    # Text in vector graphics stays text.
-    with mpl.rc_context({"svg.hashsalt": "thud", "svg.fonttype": "none"}):
-        figure.savefig(content, format=kind, metadata={"Title": title, **date})
-    replace_file(path, content.getvalue())
+    title = path.stem.replace("_", " ").capitalize()
+    figure.savefig(content, format=kind, metadata={"Title": title, **date})
+    return content.getvalue()
 
 
 def save_all(figures: Mapping[str, Figure], directory: str | os.PathLike[str]) -> list[Path]:
@@ -228,17 +250,24 @@ def save_all(figures: Mapping[str, Figure], directory: str | os.PathLike[str]) -
     ------
     OSError
         Where a file cannot be written.
+
+    Warns
+    -----
+    ReportWarning
+        Where a figure cannot be drawn.
     """
-    paths = []
+    contents = {}
     for name, figure in figures.items():
-        for ending in ("png", "svg"):
-            paths.append(Path(directory, f"{name}.{ending}"))
-            save(figure, paths[-1])
-    return paths
+        for path in (Path(directory, f"{name}.{ending}") for ending in ("png", "svg")):
+            with left_out(path.name):
+                contents[path] = _content(figure, path)
+    for path, content in contents.items():
+        replace_file(path, content)
+    return list(contents)
 
 
 def save_page(
-    name: str, figure: Figure, html: str, directory: str | os.PathLike[str]
+    name: str, draw: Callable[[], Figure], html: str, directory: str | os.PathLike[str]
 ) -> list[Path]:
     """Save a figure as PNG and SVG beside the page of the same name; return the paths.
 
@@ -251,6 +280,6 @@ def save_page(
     """
     page = Path(directory, f"{name}.html")
     page.parent.mkdir(parents=True, exist_ok=True)
-    pictures = save_all({name: figure}, directory)
+    pictures = save_all(draw_all({name: draw}), directory)
     replace_file(page, html.encode())
     return [*pictures, page]

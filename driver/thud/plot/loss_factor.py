@@ -10,9 +10,10 @@ from thud._schema import FiniteElement
 from thud.errors import InputError
 from thud.free_modes import loss_factors
 from thud.impact import Impact
-from thud.plot.look import SIZE, add_curves, empty_axes, legend_above
+from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style
 
 
+@own_style()
 def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
     """Draw the loss factor of materials against frequency.
 

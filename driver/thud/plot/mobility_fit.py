@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.plot.look import COLOURS, SIZE, dress, legend_above, new_figure
+from thud.plot.look import COLOURS, SIZE, dress, legend_above, new_figure, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from thud.floors.mobility_fit import MobilityFit
 
 
+@own_style()
 def mobility_fit(found: MobilityFit) -> Figure:
     """Draw magnitude and phase of measurement and fit against frequency."""
     figure = new_figure(3.6)

@@ -9,7 +9,7 @@ import numpy as np
 from thud._schema import Plate
 from thud.errors import InputError
 from thud.floors.modal_room import ModalRoom, modal_room
-from thud.plot.look import COLOURS, GREY, SIZE, band_axis, empty_axes, legend_above
+from thud.plot.look import COLOURS, GREY, SIZE, band_axis, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from thud.impact import Impact
 
 
+@own_style()
 def draw_modal_room(found: ModalRoom) -> Figure:
     """Draw the levels of all pairs of positions, their energy mean, and the statistical level."""
     figure, axes = empty_axes(2.6)

@@ -11,12 +11,13 @@ from thud._schema import Ball
 from thud.checks import require_kind
 from thud.free_modes import FreeModes, free_modes
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
-from thud.plot.look import SIZE, WIDTH, new_figure
+from thud.plot.look import SIZE, WIDTH, new_figure, own_style
 
 # Drawn maximum displacement of a mode, as fraction of the radius.
 AMPLITUDE = 0.3
 
 
+@own_style()
 def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
     """Draw mode shapes as half sections over the outline of the ball at rest (paper, figure 4).
 

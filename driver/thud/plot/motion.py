@@ -21,7 +21,7 @@ from thud.impact import Impact
 from thud.motion import Motion
 from thud.plot.examples import solve_chipboard, solve_published
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
-from thud.plot.look import SIZE, WIDTH, new_figure
+from thud.plot.look import SIZE, WIDTH, new_figure, own_style
 
 # Instants of the paper's figure 5.
 INSTANTS = 9
@@ -31,6 +31,7 @@ FRAMES_PER_SECOND = 12
 LABEL = "Displacement of the material, mm"
 
 
+@own_style()
 def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     """Draw instants of the impact: displacement by colour, velocity by arrows (paper, figure 5).
 
@@ -70,6 +71,7 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
     return figure
 
 
+@own_style()
 def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     """Save the motion of the ball as an animated GIF, one picture for each snapshot.
 

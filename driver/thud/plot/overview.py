@@ -6,10 +6,11 @@ from thud._schema import LimitsSource
 from thud.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
-from thud.plot.look import SIZE, dress, legend_above, level_label, new_figure
+from thud.plot.look import SIZE, dress, legend_above, level_label, new_figure, own_style
 from thud.recordings.recording import Recording
 
 
+@own_style()
 def overview(impact: Impact | Recording, source: LimitsSource = "rubber_ball") -> Figure:
     """Draw the force that counts and its octave levels.
 

@@ -9,7 +9,7 @@ import numpy as np
 from thud._schema import Plate
 from thud.checks import require_kind, require_whole
 from thud.floors.modal_room import plate_frequencies
-from thud.plot.look import SIZE, WIDTH, new_figure
+from thud.plot.look import SIZE, WIDTH, new_figure, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MAX_SHAPES, POINTS = 30, 60
 
 
+@own_style()
 def plate_modes(floor: Plate, count: int = 6, columns: int = 3) -> Figure:
     """Draw the lowest mode shapes of a simply supported plate.
 

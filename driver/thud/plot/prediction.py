@@ -18,6 +18,7 @@ from thud.plot.look import (
     legend_above,
     line_style,
     new_figure,
+    own_style,
 )
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 DECAY = 30
 
 
+@own_style()
 def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -> Figure:
     """Draw what a level in the room below is made of, in thirds, and measured levels beside it.
 
@@ -82,6 +84,7 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
     return figure
 
 
+@own_style()
 def draw_decay(found: RoomPrediction) -> Figure:
     """Draw what the Fast detector shows against time, in a third of each octave."""
     figure, axes = empty_axes(2.6)

@@ -10,7 +10,7 @@ from thud.checks import require_choice
 from thud.levels import BANDWIDTHS, record_force
 from thud.plot.force_history import MARGIN, TIME_LABEL
 from thud.plot.levels import draw_tolerance
-from thud.plot.look import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis
+from thud.plot.look import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis, own_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,6 +39,7 @@ BARS: dict[str, Any] = {
 }  # fmt: skip
 
 
+@own_style()
 def recording_forces(recording: Recording) -> Figure:
     """Draw the force of every drop, below 1.25 kHz, and their average, against time.
 
@@ -76,12 +77,14 @@ def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.interp(time, drop.time[first:stop], force)
 
 
+@own_style()
 def recording_figure(recording: Recording, what: str = "levels") -> Figure:
     """Draw the ``"levels"`` or the ``"force"`` of a recording."""
     require_choice("what", what, ("levels", "force"))
     return recording_levels(recording) if what == "levels" else recording_forces(recording)
 
 
+@own_style()
 def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     """Draw the levels of every drop, their average with its expanded uncertainty, the background.
 

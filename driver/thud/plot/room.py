@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.plot.look import COLOURS, SIZE, band_axis, empty_axes, legend_above
+from thud.plot.look import COLOURS, SIZE, band_axis, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from thud.floors.survey import RoomLevels
 
 
+@own_style()
 def room_levels(found: RoomLevels) -> Figure:
     """Draw levels in a room against their bands."""
     figure, axes = empty_axes(2.6)

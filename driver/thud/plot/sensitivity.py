@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.keys import plain_words
-from thud.plot.look import COLOURS, FORCE_WORDS, HATCHES, SIZE, empty_axes, legend_above
+from thud.plot.look import COLOURS, FORCE_WORDS, HATCHES, SIZE, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from thud.studies.sensitivity import Sensitivity
 
 
+@own_style()
 def draw_sensitivity(result: Sensitivity) -> Figure:
     """Draw total Sobol indices as bars, first orders as marks on them, both with intervals.
 

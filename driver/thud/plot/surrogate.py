@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.plot.look import COLOURS, SIZE, empty_axes, legend_above
+from thud.plot.look import COLOURS, SIZE, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from thud.studies.emulation.surrogate import Surrogate
 
 
+@own_style()
 def draw_surrogate(result: Surrogate) -> Figure:
     """Draw the error of each judged quantity in held-out drops, dB, and the bound.
 

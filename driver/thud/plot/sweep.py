@@ -18,6 +18,7 @@ from thud.plot.look import (
     line_style,
     marker_style,
     new_figure,
+    own_style,
 )
 from thud.plot.parameter_axis import show_parameter, words
 
@@ -46,6 +47,7 @@ class _Judged(NamedTuple):
     tolerance: tuple[float, float]
 
 
+@own_style()
 def draw_sweep(dataset: xr.Dataset) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 

@@ -15,6 +15,7 @@ from thud.plot.look import (
     legend_above,
     octave_axis,
     octave_boxes,
+    own_style,
 )
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from thud.studies.uncertainty import Uncertainty
 
 
+@own_style()
 def draw_uncertainty(result: Uncertainty) -> Figure:
     """Draw the distribution of octave levels over the tolerances of the standards.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
+from thud.immutable import Immutable
 from thud.levels import RECORDED_BAND
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
@@ -50,8 +51,8 @@ PLATE_LEFT = 0.03
 FLOOR = 2e-4
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, eq=False)
+class Estimate(Immutable):
     """A value and its standard uncertainty, in the same unit; NaN where not known."""
 
     value: float
@@ -68,7 +69,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(Immutable):
     """Contact of one pulse: its times, in s from the first sample of the window.
 
     Attributes

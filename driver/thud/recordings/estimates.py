@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.checks import refuse
+from thud.immutable import Immutable
 from thud.levels import RECORDED_BAND, record_force
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
@@ -46,7 +47,7 @@ NOTABLE = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class Drop:
+class Drop(Immutable):
     """One drop, corrected, and what it tells.
 
     Attributes
@@ -116,7 +117,7 @@ class Drop:
         The arguments are those of `thud.recordings.levels.measure_levels`, which has their
         uncertainties too.
         """
-        return measure_levels([self], bands, method, low_pass=low_pass)[0].level
+        return measure_levels([self], bands, method, low_pass=low_pass)[0].level.copy()
 
 
 def measure_drop(  # noqa: PLR0913 - what a laboratory knows

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.checks import refuse, require_choice
+from thud.immutable import Immutable
 from thud.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.bank import filter_levels
@@ -37,7 +38,7 @@ WITHIN_REPEATABILITY = ("noise",)
 
 
 @dataclass(frozen=True, eq=False)
-class LevelEstimate:
+class LevelEstimate(Immutable):
     """Levels of one drop.
 
     Attributes
@@ -73,7 +74,7 @@ class LevelEstimate:
 
 
 @dataclass(frozen=True, eq=False)
-class AverageLevels:
+class AverageLevels(Immutable):
     """Energy average of the levels of drops.
 
     Attributes

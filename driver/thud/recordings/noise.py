@@ -11,6 +11,8 @@ from scipy.linalg import cho_solve, lapack, solve_triangular
 from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
+from thud.immutable import Immutable
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -119,7 +121,7 @@ def _waves(cells: Cells) -> NDArray[np.float64]:
 
 
 @dataclass(frozen=True, eq=False)
-class Background:
+class Background(Immutable):
     """What lies under the force, from the means of quiet cells: the best linear prediction.
 
     Attributes

@@ -274,7 +274,7 @@ class Recording(Displayed):
         force: LevelsForce | None = None,  # noqa: ARG002 - there is one
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, energy average of the drops, dB, shape (n_band,)."""
-        return self.average(bands, method or self.level_method).level
+        return self.average(bands, method or self.level_method).level.copy()
 
     def agreement(self, bands: BandSet = "octave") -> dict[str, NDArray[np.float64]]:
         """Return the largest deviation of each method from ``"exact"`` in any drop, dB."""
@@ -363,4 +363,4 @@ class Recording(Displayed):
             refuse(f"drop = {drop} does not exist", f"1 to {len(self.drops)}")
         one = self.drops[drop - 1]
         gate = slice(*one.gate)
-        return one.time[gate], one.force[gate]
+        return one.time[gate], one.force[gate].copy()

@@ -6,9 +6,11 @@ import csv
 import io
 import math
 import warnings
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from thud._api import version
+from thud.display import draw_all
 from thud.errors import InputError, ReportWarning
 from thud.extras import require_extra
 from thud.levels import get_bands
@@ -180,9 +182,8 @@ def save(recording: Recording, folder: Path, *, figures: bool = True) -> None:
         return
     # Matplotlib takes its time.
     from thud.plot.look import save_all  # noqa: PLC0415
-    from thud.plot.recording import recording_forces, recording_levels  # noqa: PLC0415
 
-    drawn = {"force": recording_forces(recording), "levels": recording_levels(recording)}
+    drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
     contents |= page_contents(data, list(drawn.values()), folder)
     write_files(folder, data, contents, (DATASET,))
     save_all(drawn, folder)

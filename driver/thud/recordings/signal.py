@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.checks import refuse, require_array, require_number, require_real
+from thud.immutable import Immutable
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -22,7 +23,7 @@ HASHED = 2**20
 
 
 @dataclass(frozen=True, eq=False)
-class Signal:
+class Signal(Immutable):
     """One channel of one file, in newtons; only what is asked for is read.
 
     Attributes
@@ -121,7 +122,7 @@ class Signal:
 
 
 @dataclass(frozen=True, eq=False)
-class ArraySamples:
+class ArraySamples(Immutable):
     """Samples that are in memory, shape (n_sample,)."""
 
     values: NDArray[np.float64]

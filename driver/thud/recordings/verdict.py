@@ -11,6 +11,7 @@ from scipy.stats import t as student
 
 from thud.checks import refuse, shown
 from thud.display import Displayed
+from thud.immutable import Immutable
 from thud.levels import SOURCES, judge
 from thud.recordings.levels import WITHIN_REPEATABILITY
 
@@ -29,8 +30,8 @@ VERDICTS = ("conforms", "does not conform", "cannot be decided")
 AMPLITUDE_DECIBEL = 20 / math.log(10)
 
 
-@dataclass(frozen=True)
-class Contribution:
+@dataclass(frozen=True, eq=False)
+class Contribution(Immutable):
     """One line of an uncertainty budget.
 
     Attributes
@@ -51,8 +52,8 @@ class Contribution:
     counted: bool = True
 
 
-@dataclass(frozen=True)
-class Quantity:
+@dataclass(frozen=True, eq=False)
+class Quantity(Immutable):
     """A measured value and its uncertainty budget.
 
     Attributes
@@ -94,8 +95,8 @@ class Quantity:
         return self.coverage_factor * self.uncertainty
 
 
-@dataclass(frozen=True)
-class Decision:
+@dataclass(frozen=True, eq=False)
+class Decision(Immutable):
     """Verdict on one criterion.
 
     Attributes
@@ -144,7 +145,7 @@ class Decision:
         return float(student.cdf(high, freedom) - student.cdf(low, freedom))
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Verdict(Displayed):
     """Verdict on a measured source.
 

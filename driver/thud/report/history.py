@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from thud.checks import refuse
+from thud.immutable import Immutable
 from thud.recordings.verdict import VERDICTS
 from thud.report.data import FORMAT, read_date
 from thud.report.rows import Style, criterion_row, limits_of, number, style_of
@@ -44,8 +45,8 @@ CRITERION_KEYS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Trend:
+@dataclass(frozen=True, eq=False)
+class Trend(Immutable):
     """Straight line through the values of a criterion.
 
     Attributes

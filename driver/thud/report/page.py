@@ -8,8 +8,8 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
-import matplotlib as mpl
-
+from thud.display import left_out
+from thud.plot.look import own_style
 from thud.recordings.levels import BACKGROUND, MARGIN
 from thud.recordings.verdict import VERDICTS
 from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
@@ -48,7 +48,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
     data
         What `thud.report.data.report_data` returns.
     figures
-        Two figures of column width.
+        Two figures of column width, or those of them that can be drawn.
     checksum
         SHA-256 of ``report.json``.
     """
@@ -62,7 +62,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         head="".join(f"<th>{_text(name)}</th>" for name in _columns(HEAD, "")),
         rows="\n".join(map(_row, data["criteria"])),
         rule=_text(_rule(data)),
-        figures="\n".join(f"<td>{_svg(one, f'f{i}')}</td>" for i, one in enumerate(figures)),
+        figures="\n".join(_cells(figures)),
         results=_notes("Drops and methods", _results(data), RESULT_LINES),
         done=_notes("Done to the signals", _told(data, "steps") or ["nothing"], STEP_LINES),
         remarks=_notes("Remarks", _told(data, "remarks") or ["none"], REMARK_LINES),
@@ -289,11 +289,20 @@ def _count(number_of: int, what: str) -> str:
     return f"{number_of} {what}{'s' * (number_of != 1)}"
 
 
+def _cells(figures: Sequence[Figure]) -> list[str]:
+    """Return the cells of the figures that can be drawn."""
+    cells = []
+    for i, figure in enumerate(figures):
+        with left_out("a figure of the report"):
+            cells.append(f"<td>{_svg(figure, f'f{i}')}</td>")
+    return cells
+
+
+@own_style()
 def _svg(figure: Figure, prefix: str) -> str:
     """Return a figure as a part of a page, its names with a prefix."""
     content = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": "thud", "svg.fonttype": "none"}):
-        figure.savefig(content, format="svg", metadata={"Date": None})
+    figure.savefig(content, format="svg", metadata={"Date": None})
     text = content.getvalue()
     text = re.sub(r"<metadata>.*?</metadata>", "", text[text.index("<svg") :], flags=re.DOTALL)
     text = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", text)

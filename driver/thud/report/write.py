@@ -5,9 +5,11 @@ from __future__ import annotations
 import hashlib
 import json
 import warnings
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from thud.display import draw_all
 from thud.errors import ReportWarning
 from thud.files import replace_file
 
@@ -45,13 +47,12 @@ def write_report(recording: Recording, directory: str | os.PathLike[str]) -> lis
         Where WeasyPrint is missing, so that there is no PDF, or a font for some letters; and
         where the report of another recording is replaced.
     """
-    # Matplotlib, SciPy and fontTools take their time.
-    from thud.plot.recording import recording_forces, recording_levels  # noqa: PLC0415
+    # SciPy takes its time.
     from thud.report.data import report_data  # noqa: PLC0415
 
     folder, data = Path(directory), report_data(recording)
-    figures = [recording_forces(recording), recording_levels(recording)]
-    contents = {JSON: json_bytes(data), **page_contents(data, figures, folder)}
+    figures = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+    contents = {JSON: json_bytes(data), **page_contents(data, list(figures.values()), folder)}
     write_files(folder, data, contents)
     return [folder / name for name in contents]
 

@@ -10,6 +10,7 @@ from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import refuse
+from thud.display import left_out
 from thud.errors import InputError
 from thud.files import lock, replace_file
 
@@ -88,11 +89,19 @@ def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], s
     return "" if before is None else differences(before, study.identity)
 
 
-def save(folder: Path, files: Mapping[str, bytes], figures: Mapping[str, Figure]) -> list[Path]:
-    """Write files, and figures as PNG and SVG, by name; return their paths."""
+def save(
+    folder: Path,
+    files: Mapping[str, bytes],
+    draw: Callable[[], Mapping[str, Figure]] | None = None,
+) -> list[Path]:
+    """Write files, and what is drawn as PNG and SVG, by name; return their paths."""
     paths = [folder / name for name in files]
     for path in paths:
         replace_file(path, files[path.name])
+    figures: Mapping[str, Figure] = {}
+    if draw is not None:
+        with left_out("the figure of the study"):
+            figures = draw()
     if figures:
         from thud.plot import save_all  # noqa: PLC0415 - matplotlib takes its time
 

@@ -88,7 +88,7 @@ class Kind(ABC, Generic[S, R]):
             return self.compute(study, None, **how)
         with self.take(study, output, replace=how.get("replace", False)) as folder:
             result = self.compute(study, folder, **how)
-            save(folder, self.files(result, study), {})
+            save(folder, self.files(result, study))
             return result
 
     def take(

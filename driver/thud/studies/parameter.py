@@ -20,6 +20,7 @@ from thud.checks import (
     require_words,
     shown,
 )
+from thud.immutable import Plain
 from thud.key import Key
 from thud.keys import Value, find_key
 from thud.units import power_of, scaled
@@ -39,8 +40,8 @@ NUMBERS = ("real", "whole", "list")
 _SCALES = ("linear", "log")
 
 
-@dataclass(frozen=True)
-class Parameter:
+@dataclass(frozen=True, eq=False)
+class Parameter(Plain):
     """A parameter of a study, as its table in ``[parameters]``.
 
     Attributes

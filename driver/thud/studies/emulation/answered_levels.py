@@ -9,6 +9,7 @@ import numpy as np
 
 from thud.checks import refuse
 from thud.errors import NumericalError
+from thud.immutable import freeze
 from thud.impact import Impact, compute
 from thud.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
@@ -54,9 +55,9 @@ class AnsweredLevels(LevelMisfit):
             if quantity == "contact_time":
                 # Many drops have it to the next sample.
                 own[i] = np.hypot(own[i], 1 / case.sampling.sample_rate)
-        self.model_error = np.concatenate([missed, *own])
+        self.model_error = freeze(np.concatenate([missed, *own]))
         if self.known_noise:
-            self.deviation = np.hypot(self.deviation, self.model_error)
+            self.deviation = freeze(np.hypot(self.deviation, self.model_error))
 
     def solve(self, case: Case) -> Impact:
         """Return the answer for a case, which only `values` reads."""

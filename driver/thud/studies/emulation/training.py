@@ -99,7 +99,7 @@ def train(study: SetStudy, folder: Path | None, how: How) -> Surrogate:
         tried.append(f"{error:.3g} dB with {stop}")
         if error <= plan.error:
             if folder:
-                save(folder, {name: found.to_bytes()}, {})
+                save(folder, {name: found.to_bytes()})
             return found
     message = (
         f"the surrogate's error of the {label} is {', '.join(tried[-3:])} drops; allowed: up to "

@@ -10,6 +10,7 @@ from scipy import stats
 from scipy.signal import ZoomFFT
 
 from thud.checks import refuse
+from thud.immutable import freeze
 from thud.impact import Impact
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
 from thud.studies.fitting.record_noise import (
@@ -54,9 +55,10 @@ class ForceMisfit(Misfit):
         self.exact = isinstance(given, Impact)
         self.kind = target.force or (given.judged() if isinstance(given, Impact) else "floor")
         self.period = len(self.time) / self.sample_rate
-        self.frequency = np.arange(int(self.below * self.period * (1 + SAME)) + 1) / self.period
+        count = int(self.below * self.period * (1 + SAME)) + 1
+        self.frequency = freeze(np.arange(count) / self.period)
         self.count = 2 * len(self.frequency) - 1
-        self.spectrum = np.fft.rfft(self.force, norm="ortho")[: len(self.frequency)]
+        self.spectrum = freeze(np.fft.rfft(self.force, norm="ortho")[:count])
         self.quiet = Quiet(self.force, self.sample_rate, pulse, self.below)
         shown = self.quiet.known and self.quiet.deviation() > NUMERICAL * self.force.max()
         self.offset = self.quiet.known if target.offset is None else target.offset

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.checks import refuse, refuse_value, require_choice, require_number, require_whole
+from thud.immutable import Immutable
 from thud.impact import FORCES, Impact
 from thud.levels import RECORDED_BAND
 from thud.record import MIN_ROWS, Record, read_record
@@ -31,7 +32,7 @@ MAX_COMPARED = 8000
 
 
 @dataclass(frozen=True, eq=False)
-class ForceTarget:
+class ForceTarget(Immutable):
     """A force history to be fitted.
 
     Model and record are compared in the frequencies up to `below`: their discrete Fourier

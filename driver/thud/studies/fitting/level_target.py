@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.checks import refuse, require_choice, shown
+from thud.immutable import Plain, freeze
 from thud.impact import FORCES
 from thud.levels import BANDWIDTHS, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class LevelTarget:
+class LevelTarget(Plain):
     """Levels to be fitted, and what else is known of the impact.
 
     Attributes
@@ -105,7 +106,8 @@ class LevelMisfit(Misfit):
         extra: list[str],
     ) -> None:
         self.bands, self.kind = target.bands, target.force
-        self.places, self.target, self.deviation, self.extra = places, values, deviation, extra
+        self.places, self.extra = places, extra
+        self.target, self.deviation = freeze(values), freeze(deviation)
         self.known_noise = target.uncertainty is not None
         self.size = len(values)
         self.own = {}

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from thud.immutable import freeze
 from thud.recordings.contact import QUIET, cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.noise import (
@@ -310,12 +311,13 @@ class Weights:
         nuisance: NDArray[np.float64],
         predicted: NDArray[np.float64],
     ) -> None:
-        self.covariance, self.nuisance, self.predicted = covariance, nuisance, predicted
+        self.covariance, self.nuisance = freeze(covariance), freeze(nuisance)
+        self.predicted = freeze(predicted)
         # In the order of time, the factor makes of each point what those before do not tell.
         factor = np.linalg.cholesky(covariance)
         self._whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
         self._basis, self._triangle = np.linalg.qr(self._whiten @ nuisance)
-        self.matrix = self._whiten - self._basis @ (self._basis.T @ self._whiten)
+        self.matrix = freeze(self._whiten - self._basis @ (self._basis.T @ self._whiten))
 
     def deviation(self) -> float:
         """Return the standard deviation of the noise about its mean over the grid, N."""

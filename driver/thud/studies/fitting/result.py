@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -12,6 +13,7 @@ import numpy as np
 from thud._api import version
 from thud.case import case_text
 from thud.display import Displayed
+from thud.immutable import Immutable
 from thud.key import check_keywords
 from thud.studies.directory import save
 from thud.studies.fitting.inference import coverage_factor
@@ -35,7 +37,7 @@ Units: TypeAlias = "Mapping[str, tuple[str, float]]"
 
 
 @dataclass(frozen=True, eq=False)
-class FittedTarget:
+class FittedTarget(Immutable):
     """One target of a fit and what was found for it.
 
     Attributes
@@ -52,7 +54,8 @@ class FittedTarget:
 
     case: Case
     impact: Impact
-    misfit: Misfit
+    # Impact and residuals tell targets apart.
+    misfit: Misfit = field(compare=False)
     own: NDArray[np.float64]
 
     def own_value(self, name: str, default: float) -> float:
@@ -354,7 +357,7 @@ class Fit(Displayed):
         """
         folder = Path(directory)
         folder.mkdir(parents=True, exist_ok=True)
-        return save(folder, self.files(), self.figures(units) if figures else {})
+        return save(folder, self.files(), partial(self.figures, units) if figures else None)
 
 
 def file_ends(count: int) -> list[str]:

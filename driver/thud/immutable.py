@@ -1,0 +1,128 @@
+"""Base of the public types: their arrays do not change, and they are compared by value."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import fields
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+
+Array = TypeVar("Array", bound="NDArray[Any]")
+
+
+class Immutable:
+    """Base of frozen dataclasses, which are declared with ``eq=False``.
+
+    Arrays, also those in tuples, dictionaries and datasets, are read-only copies; lists become
+    tuples. Objects are equal where they are of one class and their fields are equal, NaN to NaN.
+    Their hash is that of the fields: objects that hold an array or a dictionary have none.
+    """
+
+    def __post_init__(self) -> None:
+        """Copy the arrays."""
+        for name, value in vars(self).items():
+            object.__setattr__(self, name, _kept(value, self._keep_array))
+
+    @staticmethod
+    def _keep_array(array: NDArray[Any]) -> object:
+        """Return an array as it is kept."""
+        return array if _is_frozen(array) else freeze(array.copy())
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Take the fields of a copy or a pickle, whose arrays are writeable."""
+        vars(self).update(state)
+        Immutable.__post_init__(self)
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether the other is of the same class and has equal fields."""
+        if other.__class__ is not self.__class__:
+            return NotImplemented
+        return all(map(_equal, _fields(self), _fields(other)))
+
+    def __hash__(self) -> int:
+        """Return the hash of the fields; raise TypeError where one has none."""
+        return hash((type(self), *map(_hashed, _fields(self))))
+
+
+class Plain(Immutable):
+    """Base of inputs: arrays become tuples of numbers, as files hold them."""
+
+    @staticmethod
+    def _keep_array(array: NDArray[Any]) -> object:
+        return _kept(array.tolist(), freeze)
+
+
+def freeze(array: Array) -> Array:
+    """Return an array that was made read-only, with the arrays that it is a view of."""
+    part: object = array
+    while isinstance(part, np.ndarray):
+        part.setflags(write=False)
+        part = part.base
+    return array
+
+
+def _is_frozen(array: NDArray[Any]) -> bool:
+    """Return whether an array and those that it is a view of are read-only."""
+    part: object = array
+    while isinstance(part, np.ndarray):
+        if part.flags.writeable:
+            return False
+        part = part.base
+    # What has another owner, such as a file in memory, may change.
+    return part is None
+
+
+def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
+    """Return a value with its arrays as they are kept."""
+    if isinstance(value, np.ndarray):
+        return keep_array(value)
+    if type(value) is dict:
+        return {key: _kept(entry, keep_array) for key, entry in value.items()}
+    if isinstance(value, tuple) and hasattr(value, "_make"):
+        return value._make(_kept(entry, keep_array) for entry in value)
+    if type(value) in {list, tuple}:
+        return tuple(_kept(entry, keep_array) for entry in value)  # type: ignore[attr-defined]
+    # Who has a dataset has imported xarray.
+    xarray = sys.modules.get("xarray")
+    if xarray is not None and isinstance(value, xarray.Dataset):
+        dataset = value.copy(deep=True)
+        for name, variable in dataset.variables.items():
+            if name not in dataset.indexes:
+                freeze(variable.values)
+        return dataset
+    return value
+
+
+def _fields(of: object) -> list[object]:
+    """Return the values of the fields that are compared."""
+    return [getattr(of, field.name) for field in fields(of) if field.compare]  # type: ignore[arg-type]
+
+
+def _equal(one: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
+    """Return whether two values are equal, NaN to NaN."""
+    if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
+        has_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
+        return np.array_equal(one, other, equal_nan=has_nan)
+    if type(one) is not type(other):
+        return not isinstance(one, np.ndarray | tuple | dict) and bool(one == other)
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(_equal(one[key], other[key]) for key in one)
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(_equal, one, other))
+    if hasattr(one, "equals"):
+        return bool(one.equals(other))
+    return bool(one == other) or bool(one != one and other != other)  # noqa: PLR0124 - NaN
+
+
+def _hashed(value: object) -> object:
+    """Return what has the same hash for equal values: the hash of NaN is that of the object."""
+    if isinstance(value, tuple):
+        return tuple(map(_hashed, value))
+    return "nan" if isinstance(value, float) and value != value else value  # noqa: PLR0124

@@ -1,0 +1,219 @@
+"""Every public type: its arrays do not change, and it is compared by value."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import inspect
+import pickle
+import runpy
+import tempfile
+import warnings
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from conftest import recorded
+
+import thud
+from thud import immutable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+SCRIPT = Path(__file__).with_name("user_script.py")
+
+
+def public_types() -> list[type]:
+    """Return the dataclasses of all public names."""
+    found = [getattr(thud, name) for name in thud.__all__]
+    return [one for one in found if inspect.isclass(one) and dataclasses.is_dataclass(one)]
+
+
+def walk(value: object, path: str, seen: dict[int, object]) -> Iterator[tuple[str, object]]:
+    """Return the places and values of all that an object holds, but for what is private."""
+    if id(value) in seen:
+        return
+    seen[id(value)] = value
+    yield path, value
+    if isinstance(value, dict):
+        parts = {f"[{key!r}]": entry for key, entry in value.items()}
+    elif isinstance(value, list | tuple):
+        parts = {f"[{i}]": entry for i, entry in enumerate(value)}
+    elif isinstance(value, xr.Dataset):
+        names = [name for name in value.variables if name not in value.indexes]
+        parts = {f"[{name!r}]": value.variables[name].values for name in names}
+    elif type(value).__module__.startswith("thud") and not inspect.isclass(value):
+        held = getattr(value, "__dict__", {})
+        parts = {f".{name}": one for name, one in held.items() if not name.startswith("_")}
+    else:
+        return
+    for name, part in parts.items():
+        yield from walk(part, path + name, seen)
+
+
+@pytest.fixture(scope="module")
+def held(tmp_path_factory: pytest.TempPathFactory) -> dict[str, object]:
+    """Return all that the objects of the user's script hold, by place."""
+    before, tempfile.tempdir = tempfile.tempdir, str(tmp_path_factory.mktemp("script"))
+    try:
+        with warnings.catch_warnings(action="ignore"):
+            names = runpy.run_path(str(SCRIPT))
+    finally:
+        tempfile.tempdir = before
+    # Arrays and datasets that functions return are the caller's.
+    own = np.ndarray | xr.Dataset
+    objects = {name: one for name, one in names.items() if not isinstance(one, own)}
+    seen: dict[int, object] = {}
+    return dict(walk(objects | {"modes group": thud.Modes()}, "", seen))
+
+
+@pytest.fixture(scope="module")
+def examples(held: dict[str, object]) -> dict[type, Any]:
+    """Return an object of each public type."""
+    return {
+        kind: next(one for one in held.values() if isinstance(one, kind)) for kind in public_types()
+    }
+
+
+def has_array(value: object) -> bool:
+    """Return whether a value holds an array or a dictionary, or what has one."""
+    kinds = np.ndarray | dict | xr.Dataset
+    return any(isinstance(part, kinds) for _, part in walk(value, "", {}))
+
+
+def test_no_array_of_a_public_object_is_writeable(held: dict[str, object]) -> None:
+    arrays = {place: one for place, one in held.items() if isinstance(one, np.ndarray)}
+    assert len(arrays) > 100
+    assert [place for place, one in arrays.items() if one.flags.writeable] == []
+
+
+def test_what_is_handed_out_changes_nothing(held: dict[str, object]) -> None:
+    for place, one in held.items():
+        if not isinstance(one, immutable.Immutable):
+            continue
+        arrays = [part for _, part in walk(one, "", {}) if isinstance(part, np.ndarray)]
+        for name, member in inspect.getmembers(type(one)):
+            maker = getattr(member, "fget", None) or getattr(member, "func", member)
+            if name.startswith("_") or not inspect.isfunction(maker):
+                continue
+            wanted = list(inspect.signature(maker).parameters.values())[1:]
+            made = str(maker.__annotations__.get("return", ""))
+            if "NDArray" not in made or any(p.default is p.empty for p in wanted):
+                continue
+            try:
+                first, second = (getattr(one, name) for _ in range(2))
+                if callable(first):
+                    first, second = first(), second()
+            except (AttributeError, thud.InputError):  # this model has no such thing
+                continue
+            for array in [part for _, part in walk(first, "", {}) if isinstance(part, np.ndarray)]:
+                others = [part for _, part in walk(second, "", {}) if isinstance(part, np.ndarray)]
+                shared = any(np.shares_memory(array, other) for other in [*arrays, *others])
+                assert not (shared and array.flags.writeable), (place, name)
+
+
+def test_no_public_object_shares_memory_with_its_caller(examples: dict[type, Any]) -> None:
+    checked = 0
+    for kind, one in examples.items():
+        arrays = {
+            field.name: getattr(one, field.name).copy()
+            for field in dataclasses.fields(one)
+            if isinstance(getattr(one, field.name), np.ndarray)
+        }
+        other = dataclasses.replace(one, **arrays)
+        for name, array in arrays.items():
+            checked += 1
+            assert array.flags.writeable, (kind, name)
+            assert not np.shares_memory(array, getattr(other, name)), (kind, name)
+    assert checked > 50
+
+
+def test_public_objects_are_compared_by_value(examples: dict[type, Any]) -> None:
+    for kind, one in examples.items():
+        for other in (copy.deepcopy(one), copy.copy(one), pickle.loads(pickle.dumps(one))):  # noqa: S301
+            assert (one == other) is True, kind
+            assert (one != other) is False, kind
+            for place, part in walk(other, "", {}):
+                # What a fit compares with is no value, and is not compared.
+                if isinstance(part, np.ndarray) and ".misfit" not in place:
+                    assert not part.flags.writeable, (kind, place)
+        for field in dataclasses.fields(one):
+            value = getattr(one, field.name)
+            if isinstance(value, np.ndarray) and value.dtype.kind == "f" and value.size:
+                changed = dataclasses.replace(one, **{field.name: value + 1})
+                assert (one == changed) is bool(np.isnan(value).all()), (kind, field.name)
+    for one, other in combinations(examples.values(), 2):
+        assert (one == other) is False
+
+
+def test_objects_without_arrays_have_the_hash_of_their_values(examples: dict[type, Any]) -> None:
+    for kind, one in examples.items():
+        if has_array(one):
+            with pytest.raises(TypeError, match="unhashable"):
+                hash(one)
+        else:
+            assert hash(one) == hash(copy.deepcopy(one)), kind
+    assert {kind for kind, one in examples.items() if has_array(one)} >= {thud.Impact, thud.Bands}
+    assert hash(examples[thud.Case]) == hash(copy.deepcopy(examples[thud.Case]))
+
+
+def test_case_says_the_modes_that_were_computed() -> None:
+    others = {"damping_ratio": (0.05, 0.05), "effective_mass": (1.5, 1.0)}
+    frequency = np.array([60.0, 110.0])
+    model = thud.MeasuredModes(frequency=frequency, **others)
+    impact = thud.solve(model=model)
+    frequency *= 1.1
+    assert impact.case.model == thud.MeasuredModes(frequency=[60.0, 110.0], **others)
+    assert thud.solve_case(impact.case) == impact
+    assert hash(model) == hash(thud.MeasuredModes(frequency=(60, 110), **others))
+
+
+def test_changed_list_changes_no_case() -> None:
+    points = [1.0, 2.0]
+    case = thud.Case(floor=thud.Plate(point_x=points, point_y=points))
+    points[0] = 3.0
+    assert case == thud.Case(floor=thud.Plate(point_x=(1.0, 2.0), point_y=(1.0, 2.0)))
+
+
+def test_read_only_view_of_a_callers_array_is_copied() -> None:
+    time = np.arange(3.0)
+    view = time[:]
+    view.setflags(write=False)
+    bands = dataclasses.replace(thud.get_bands(), centre=view)
+    time += 1
+    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_nan_equals_nan() -> None:
+    criteria = [thud.judge([39, 31, 23, 17, 12], 0.02, float("nan"), 1, 2.5, 1.0) for _ in range(2)]
+    assert criteria[0] == criteria[1]
+    assert hash(criteria[0]) == hash(criteria[1])
+    with warnings.catch_warnings(action="ignore"):
+        many = [thud.solve_many({"mass": [2.5, -1.0]}) for _ in range(2)]
+    assert np.isnan(many[0].peak_force[1])
+    assert many[0] == many[1]
+
+
+def test_changed_levels_change_no_verdict() -> None:
+    recording = recorded(thud.solve(), height=1.0, mass=2.5)
+    before = recording.conformity()
+    levels = recording.levels()
+    levels -= 1
+    for array in (recording.average().level, recording.drops[0].force):
+        with pytest.raises(ValueError, match="read-only"):
+            np.subtract(array, 1, out=array)
+    assert recording.conformity() == before
+    _, force = recording.to_force_history()
+    force *= 2
+    assert recording.drops[0].force.max() < force.max()
+
+
+def test_changed_dataset_changes_no_impact() -> None:
+    impact = thud.solve()
+    before = impact.floor_force.copy()
+    impact.to_xarray()["floor_force"].values[:] = 0.0
+    assert (impact.floor_force == before).all()
