@@ -104,7 +104,9 @@ def read_titled(
     except (OSError, ValueError) as error:
         message = f"{path}: cannot be read ({error}); allowed: {allowed}"
         raise InputError(message) from error
-    filled = ((number, line) for number, line in enumerate(lines, start=1) if line)
+    filled: Iterator[tuple[int, str]] = (
+        (number, line) for number, line in enumerate(lines, start=1) if line
+    )
     titles: list[str] = []
     separator: str | None = None
     for number, line in filled:
