@@ -2,25 +2,76 @@
 
 from __future__ import annotations
 
+import csv
 import errno
+import itertools
+import re
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 import numpy as np
 
+from thud.checks import refuse
 from thud.errors import InputError
 
 if TYPE_CHECKING:
     import os
+    from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
 # The first of these that a line contains separates its columns; otherwise blanks do.
 SEPARATORS = ("\t", ";", ",")
+# Either of the two may be the decimal mark; the other one then groups digits, as these do.
+MARKS = {".": "point", ",": "comma"}
+GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
+QUOTED = re.compile(r'"[^"]*"')
+# Maximum length of a line, and characters that are read at once.
+LONGEST = 2**16
+PIECE = 2**20
 ALLOWED = (
     "columns of time, s, and force, N, separated by commas, semicolons, tabs or "
-    "blanks (decimal commas with semicolons and tabs)"
+    "blanks (decimal commas with semicolons, tabs and blanks, or in quotes)"
 )
+
+
+def _numbers(decimal: str) -> re.Pattern[str]:
+    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits."""
+    mark = re.escape(decimal)
+    grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
+    return re.compile(
+        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:e[-+]?\d+)?"
+        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*(?:{mark}\d*)?)",
+        re.ASCII | re.IGNORECASE,
+    )
+
+
+NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
+
+
+class Layout(NamedTuple):
+    """How a table separates its columns and writes its numbers.
+
+    Attributes
+    ----------
+    separator : str or None
+        Between the columns; None for blanks.
+    decimal : str
+        Decimal mark of all numbers.
+    line : int
+        Number of the line that shows the decimal mark; 0 where none has to.
+    """
+
+    separator: str | None
+    decimal: str = "."
+    line: int = 0
+
+    def wrong(self, cell: str) -> str:
+        """Return what is wrong with a cell that is not a number."""
+        reason = f"{cell[:40]!r} is not a number"
+        if is_number(cell) and self.line:
+            reason += f" with the decimal {MARKS[self.decimal]} of line {self.line}"
+        return reason
 
 
 def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
@@ -35,9 +86,9 @@ def read_titled(
 
     The titles are the cells of the line above the first number, none where there is no such line.
 
-    Commas, semicolons, tabs or blanks separate the columns; decimal commas are read with
-    semicolons and tabs. Empty lines, comments after ``#`` and lines above the first number are
-    skipped.
+    Commas, semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells
+    may stand in quotes. The decimal mark is that of the whole table, see `find_layout`. Empty
+    lines, comments after ``#`` and lines above the first number are skipped.
 
     Raises
     ------
@@ -48,49 +99,130 @@ def read_titled(
         if not Path(path).is_file():  # to open a pipe could block
             raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
         # A header may be in another encoding than UTF-8.
-        text = Path(path).read_text(encoding="utf-8-sig", errors="replace")
+        with Path(path).open(encoding="utf-8-sig", errors="replace") as text:
+            lines = [strip_comment(line) for line in read_lines(text, str(path), allowed)]
     except (OSError, ValueError) as error:
         message = f"{path}: cannot be read ({error}); allowed: {allowed}"
         raise InputError(message) from error
+    filled: Iterator[tuple[int, str]] = (
+        (number, line) for number, line in enumerate(lines, start=1) if line
+    )
     titles: list[str] = []
-    rows: list[list[float]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
-        cells = _cells(line)
-        found = [_number(cell) for cell in cells]
-        if not cells:
-            continue
-        if not rows and found.count(None) == len(found):
-            titles = cells
-            continue
-        if None in found:
-            cell = cells[found.index(None)]
-            message = f"{path}: line {number}: {cell[:40]!r} is not a number; allowed: {allowed}"
-            raise InputError(message)
-        if rows and len(found) != len(rows[0]):
-            message = (
-                f"{path}: line {number}: {len(found)} columns, {len(rows[0])} above it; "
-                f"allowed: {allowed}"
-            )
-            raise InputError(message)
-        rows.append([value for value in found if value is not None])
+    separator: str | None = None
+    for number, line in filled:
+        separator = find_separator(line)
+        cells = split_line(line, separator)
+        if any(map(is_number, cells)):
+            filled = itertools.chain([(number, line)], filled)
+            break
+        titles = cells
+    rows = [(number, split_line(line, separator)) for number, line in filled]
     if not rows:
-        message = f"{path}: cannot be read (no numbers); allowed: {allowed}"
-        raise InputError(message)
-    return titles, np.array(rows)
+        refuse(f"{path}: cannot be read (no numbers)", allowed)
+    layout = find_layout(rows, separator, str(path))
+    width = len(rows[0][1])
+    table = np.empty((len(rows), width))
+    for row, (number, cells) in zip(table, rows, strict=True):
+        values = [to_number(cell, layout.decimal) for cell in cells]
+        if None in values:
+            refuse(f"{path}: line {number}: {layout.wrong(cells[values.index(None)])}", allowed)
+        if len(cells) != width:
+            refuse(f"{path}: line {number}: {len(cells)} columns, {width} above it", allowed)
+        row[:] = values
+    return titles, table
 
 
-def _cells(line: str) -> list[str]:
-    """Return the cells of a line."""
-    rest = line.partition("#")[0].strip().rstrip(";")
-    separator = next((one for one in SEPARATORS if one in rest), None)
-    if separator == ",":
-        return [cell.strip() for cell in rest.split(separator)]
-    return [cell.strip().replace(",", ".") for cell in rest.split(separator)]
+def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
+    """Yield the lines of a text without their ends; raise InputError where one is too long."""
+    while piece := text.read(PIECE):
+        lines = (piece + text.readline(LONGEST + 1)).removesuffix("\n").split("\n")
+        if max(map(len, lines)) > LONGEST or "\0" in piece:
+            what = "holds zero bytes" if "\0" in piece else f"is longer than {LONGEST} characters"
+            refuse(f"{name}: a line {what}", allowed)
+        yield from lines
 
 
-def _number(cell: str) -> float | None:
-    """Return the number in a cell; None where it is not one."""
-    try:
-        return float(cell)
-    except ValueError:
+def strip_comment(line: str) -> str:
+    """Return a line without its comment and what ends it."""
+    return line.partition("#")[0].strip().rstrip(";").rstrip()
+
+
+def find_separator(line: str) -> str | None:
+    """Return what separates the columns of a line, None for blanks.
+
+    >>> find_separator("0,1 1,5")
+    >>> find_separator('"0,1","1,5"')
+    ','
+    """
+    bare = QUOTED.sub("0", line)
+    separator = next((one for one in SEPARATORS if one in bare), None)
+    words = re.split("[ \t]+", bare)
+    if separator == "," and len(words) > 1 and all(map(is_number, words)):
+        return "," if any(word.startswith(",") for word in words) else None
+    return separator
+
+
+def split_line(line: str, separator: str | None) -> list[str]:
+    """Return the cells of a line without the blanks and quotes around them.
+
+    >>> split_line('"0,1" ;1,5', ";")
+    ['0,1', '1,5']
+    """
+    if '"' in line:
+        words = csv.reader([line], delimiter=separator or " ", skipinitialspace=True)
+        return [cell.strip() for cell in next(words)]
+    if separator is None:  # other blanks group digits
+        return re.split("[ \t]+", line)
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def to_number(cell: str, decimal: str) -> float | None:
+    """Return the number in a cell; None where it is not one with this decimal mark.
+
+    >>> to_number("1.234,5", ","), to_number("1.234,5", ".")
+    (1234.5, None)
+    """
+    match = NUMBERS[decimal].fullmatch(cell)
+    if match is None:
         return None
+    if match["group"]:
+        cell = cell.replace(match["group"], "")
+    return float(cell.replace(decimal, "."))
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number with either decimal mark."""
+    return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
+
+
+def find_layout(rows: Iterable[tuple[int, list[str]]], separator: str | None, name: str) -> Layout:
+    """Return the layout of a table from the numbers and cells of its lines.
+
+    The first number that can be read with one of the decimal marks only decides for all: ``0,5``,
+    ``1.234,5`` and ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
+
+    Raises
+    ------
+    InputError
+        Names the line of a number that may be two, where no number of the table decides.
+    """
+    doubtful: tuple[int, str] | None = None
+    for line, cells in rows:
+        for cell in cells:
+            if "." not in cell and "," not in cell:
+                continue
+            marks = [mark for mark, pattern in NUMBERS.items() if pattern.fullmatch(cell)]
+            if len(marks) == 1:
+                return Layout(separator, marks[0], line)
+            # Where commas separate columns, numbers without quotes have decimal points.
+            if len(marks) > 1 and doubtful is None and not (separator == "," and "." in cell):
+                doubtful = line, cell
+    if doubtful is not None:
+        line, cell = doubtful
+        own = to_number(cell, "," if "," in cell else ".")
+        both = " or ".join(f"{to_number(cell, mark):.15g}" for mark in MARKS)
+        refuse(
+            f"{name}: line {line}: {cell!r} may be {both}, and no number of the table decides",
+            f"tables with a number that shows the decimal mark, such as {cell}0 for {own:.15g}",
+        )
+    return Layout(separator)

@@ -10,8 +10,10 @@ import pytest
 import thud
 from thud.columns import read_table
 from thud.record import read_record
+from thud.recordings.formats.text import read_channels
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
 RATE = 44100.0
@@ -66,6 +68,8 @@ def test_gap_is_told_however_the_times_are_rounded() -> None:
         "{}.5\t-{}e-3",
         "{},5\t-{}e-3",
         "  {}.5  -{}e-3",
+        "  {},5  -{}e-3",
+        '"{},5","-{}e-3"',
     ],
 )
 @pytest.mark.parametrize("head", ["", "# plate\n\ntime_s,force_N\n", "Zeit;Kraft\n[s];[µN]\n"])
@@ -77,6 +81,83 @@ def test_columns_are_read_whatever_is_between(line: str, head: str, tmp_path: Pa
     np.testing.assert_array_equal(read_table(path), expected)
 
 
+def read_channels_of(path: Path) -> np.ndarray:
+    """Return the columns of a recording whose header tells the rate."""
+    path.write_text("fs: 8000\n" + path.read_text())
+    return np.column_stack([one.samples(0, one.n_sample) for one in read_channels(path)])
+
+
+READERS = (read_table, read_channels_of)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("0.100020;1,575", (0.10002, 1575)),
+        ("0.100020\t1,575", (0.10002, 1575)),
+        ("0.100020 1,575", (0.10002, 1575)),
+        ('"0.100020","1,575"', (0.10002, 1575)),
+        ("0,100020;1,575", (0.10002, 1.575)),
+        ("0,100020\t1.575", (0.10002, 1575)),
+        ("0,100020 1.575", (0.10002, 1575)),
+        ('"0,100020","1.575"', (0.10002, 1575)),
+        ("0.100020,1.575", (0.10002, 1.575)),
+        ("12,345.5;-1,234,567.25", (12345.5, -1234567.25)),
+        ("12.345,5;-1.234.567,25", (12345.5, -1234567.25)),
+        ("12 345,5;-1 234 567,25", (12345.5, -1234567.25)),
+        ("12\u202f345,5;-1\u00a0234\u00a0567,25", (12345.5, -1234567.25)),
+        ("12'345.5\t-1\u2019234\u2019567.25", (12345.5, -1234567.25)),
+        ("1,575;2,5", (1.575, 2.5)),
+        ("1,575;2.5", (1575, 2.5)),
+        ("1,575;2,1234", (1.575, 2.1234)),
+        ("1,575;1234,125", (1.575, 1234.125)),
+        ("1,575;0,125", (1.575, 0.125)),
+        ("1,575;1,234,567", (1575, 1234567)),
+        ("1,575;2,125e3", (1.575, 2125)),
+    ],
+)
+def test_decimal_mark_is_that_of_the_whole_table(
+    read: Callable[[Path], np.ndarray], line: str, expected: tuple[float, ...], tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    # Lines that decide nothing stand above the one that does.
+    separator = next(mark for mark in "\t; ," if mark in line.replace("2 ", "").replace("4 ", ""))
+    integers = [(3 * i % 5, 7 * i % 4) for i in range(8)]
+    above = "".join(f"{i}{separator}{k}\n" for i, k in [("x", "y"), *integers])
+    path.write_text(above + line + "\n")
+    np.testing.assert_array_equal(read(path), [*integers, expected])
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize(
+    ("last", "words"),
+    [
+        ("0,5;0.5", "'0.5' is not a number with the decimal comma of line 9"),
+        ("0.5;1,57", "'1,57' is not a number with the decimal point of line 9"),
+        ("0.5;0,575", "'0,575' is not a number with the decimal point of line 9"),
+        ("0.5;1575,000", "'1575,000' is not a number"),
+        ("0.5;1,575,00", "'1,575,00' is not a number"),
+        ("0,5;1.575.00", "'1.575.00' is not a number"),
+        ("0,5;1.575'000", '"1.575\'000" is not a number'),
+        ("0.5;1 57", "'1 57' is not a number"),
+        ("0.5;1_575", "'1_575' is not a number"),
+        ("2;1,575", "'1,575' may be 1575 or 1.575"),
+        ("2;1.575", "'1.575' may be 1.575 or 1575"),
+        ("2.125;1,575", "'2.125' may be 2.125 or 2125"),
+    ],
+)
+def test_numbers_that_may_be_two_are_refused(
+    read: Callable[[Path], np.ndarray], last: str, words: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    path.write_text("".join(f"{i};{i % 3}\n" for i in range(8)) + last + "\n")
+    line = 9 if read is read_table else 10
+    words = words.replace("line 9", f"line {line}")
+    with pytest.raises(thud.InputError, match=rf"plate\.csv: line {line}: {words}"):
+        read(path)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -86,7 +167,6 @@ def test_columns_are_read_whatever_is_between(line: str, head: str, tmp_path: Pa
         ("time;force\n0;0\n1;2 N\n", "line 3: '2 N' is not a number"),
         ("0,001,5,2\n0,002,5\n", "line 2: 3 columns, 4 above it"),
         ("1,0\n2,\n", "line 2: '' is not a number"),
-        ("0,1 0,2\n", "line 1: '1 0' is not a number"),
         ("0,1\n1,2\n", "2 rows of 2 numbers"),
         ("".join(f"{i},1,2\n" for i in range(9)), "9 rows of 3 numbers"),
         ("".join(f"{i},nan\n" for i in range(9)), "not finite"),

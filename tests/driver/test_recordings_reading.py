@@ -390,6 +390,37 @@ def test_netcdf_is_scaled_by_its_attributes(tmp_path: Path) -> None:
     np.testing.assert_allclose(force, half_sine(8000.0), atol=0.125)
 
 
+@pytest.mark.parametrize("key", ["scale_factor", "add_offset"])
+@pytest.mark.parametrize(
+    "value", [math.nan, math.inf, "two", "0.5 N", [1.0, 2.0], h5py.Empty("f8"), 0.0]
+)
+def test_scaling_that_is_no_number_is_refused(key: str, value: object, tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plate.nc")
+    with h5py.File(path, "r+") as file:
+        file["force"].attrs[key] = value
+    if (key, value) == ("add_offset", 0.0):
+        assert read_all(path)[1].max() == pytest.approx(PEAK)
+        return
+    assert f"plate.nc: force: {key} = " in refusal(path)
+
+
+def test_empty_attributes_are_no_matter(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "plate.nc")
+    with h5py.File(path, "r+") as file:
+        file.attrs["comment"] = h5py.Empty("S1")
+    assert read_all(path)[1].max() == pytest.approx(PEAK)
+
+
+def test_flac_without_a_length_is_refused(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "pcm16.flac")
+    data = bytearray(path.read_bytes())
+    # The last 36 bits before the checksum of the first block, behind a mark and a head of 4 bytes.
+    data[21] &= 0xF0
+    data[22:26] = bytes(4)
+    path.write_bytes(data)
+    assert "no number of samples" in refusal(path)
+
+
 @pytest.mark.parametrize("shape", [(-1, 1), (1, -1), (-1, 2), (2, -1)])
 @pytest.mark.parametrize("kind", ["h5", "mat"])
 def test_columns_of_a_matrix(shape: tuple[int, int], kind: str, tmp_path: Path) -> None:

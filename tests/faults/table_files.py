@@ -24,6 +24,7 @@ from thud.floors.mobility_fit import fit_mobility
 from thud.floors.survey import levels_csv, rating_table, read_room_levels
 from thud.record import read_record
 from thud.recordings.config import read_config
+from thud.recordings.formats.text import read_channels
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
@@ -39,6 +40,8 @@ PATIENCE = 60
 
 def attempt(chance: random.Random) -> tuple[str, str]:
     """Return what becomes of a table, and how to see it."""
+    if chance.random() < 0.3:
+        return _attempt_notation(chance)
     name = chance.choice(list(READERS))
     original = _originals()[name]
     if chance.random() < 0.6:
@@ -58,6 +61,49 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     finally:
         path.unlink()
     return word, f"{name}: {wrong}: {content[:3000]!r}" if wrong else ""
+
+
+def _attempt_notation(chance: random.Random) -> tuple[str, str]:
+    """Return what becomes of numbers in a drawn notation: those that were written, or none."""
+    separator = chance.choice("\t;, ")
+    decimal = chance.choice(".,")
+    groups = ["", "", ".,".replace(decimal, ""), "'", "\N{NO-BREAK SPACE}"]
+    group = chance.choice([*groups, " "] if separator in "\t;" else groups)
+    # A column of decimal commas alone looks like two.
+    shape = chance.randrange(8, 30), chance.randrange(1 + (decimal == ","), 5)
+    digits = [chance.choice([0, 2, 3, 3, 6]) for _ in range(shape[1])]
+    table = np.empty(shape)
+    rows = []
+    for values in table:
+        row = [f"{chance.uniform(-1, 1) * 10 ** chance.uniform(0, 7):,.{n}f}" for n in digits]
+        values[:] = [float(cell.replace(",", "")) for cell in row]
+        row = [cell.translate({ord(","): group, ord("."): decimal}) for cell in row]
+        row = [f'"{cell}"' if separator in cell or chance.random() < 0.1 else cell for cell in row]
+        rows.append(separator.join(row))
+    path = Path("notation.csv")
+    path.write_text("\n".join(rows) + "\n")
+    recording = Path("recording.csv")
+    recording.write_text("fs: 8000\n" + "\n".join(rows) + "\n")
+    wrong, words = "", []
+    for file, read in ((path, read_table), (recording, _read_recording)):
+        try:
+            same = np.array_equal(read(file), table)
+            words.append("read" if same else "wrong")
+        except thud.InputError as error:
+            wrong = wrong or fault_of(error, str(file), "")
+            words.append("raw" if wrong else "refused")
+            if "line " not in str(error):
+                wrong = wrong or f"names no line: {error}"
+        finally:
+            file.unlink()
+    word = next((one for one in ("wrong", "raw", "refused") if one in words), "read")
+    wrong = wrong or (word if word == "wrong" else "")
+    return ("raw" if wrong else word), f"notation: {wrong}: {rows}" if wrong else ""
+
+
+def _read_recording(path: Path) -> np.ndarray:
+    channels = read_channels(path)
+    return np.column_stack([one.samples(0, one.n_sample) for one in channels])
 
 
 def _read_sets(path: Path, _: random.Random) -> str:

@@ -6,6 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
+from thud.columns import GROUPING, MARKS, to_number
 from thud.recordings.units import UNITS, find_unit
 
 if TYPE_CHECKING:
@@ -48,7 +49,10 @@ TITLE = (
     re.compile(r"(?P<name>[^\[\](){}]*)[\[({](?P<unit>[^\[\](){}]{0,20})[\])}]\s*"),
     re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s/,_]{1,12})\s*"),
 )
-NUMBER = re.compile(r"\s*(?P<number>[-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(?P<unit>.*)")
+NUMBER = re.compile(
+    rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
+    re.IGNORECASE,
+)
 # Longer titles and values carry no such words.
 LONGEST = 200
 
@@ -79,26 +83,37 @@ def split_title(title: str) -> tuple[str, str]:
     return text, ""
 
 
-def read_number(text: object) -> tuple[float, str] | None:
+def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
     """Return a number and the unit after it; None where there is no number.
+
+    Where both decimal marks fit, the given one is meant. Without one it is the point, and a number
+    such as 51,200, which may have either, is none.
 
     >>> read_number("51,2 kHz")
     (51.2, 'kHz')
     """
     if isinstance(text, int | float):
         return float(text), ""
-    found = NUMBER.fullmatch(str(text).strip().strip("\"'")[:LONGEST])
+    found = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:LONGEST])
     if not found:
         return None
-    return float(found["number"].replace(",", ".")), found["unit"].strip(" []()")
+    values = {mark: to_number(found["number"], mark) for mark in MARKS}
+    known = {value for value in values.values() if value is not None}
+    if not known or (len(known) > 1 and not decimal and "," in found["number"]):
+        return None
+    value = values[decimal or "."] if len(known) > 1 else known.pop()
+    return (value, found["unit"].strip(" []()")) if value is not None else None
 
 
-def find_rate(items: Iterable[tuple[str, object]]) -> float | None:
-    """Return the sample rate, Hz, from names and values of a header; None where there is none."""
+def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:
+    """Return the sample rate, Hz, from names and values of a header; None where there is none.
+
+    The decimal mark is that of `read_number`.
+    """
     for title, value in items:
         name, unit = split_title(title)
         word = plain(name)
-        number = read_number(value) if word in RATE or word in STEP else None
+        number = read_number(value, decimal) if word in RATE or word in STEP else None
         if number is None or not number[0] > 0:
             continue
         given = (number[1] or unit).casefold()

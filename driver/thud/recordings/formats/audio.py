@@ -28,6 +28,8 @@ UNKNOWN = 0xFFFFFFFF
 # Maximum number of channels, and of chunks of a file.
 MOST_CHANNELS = 1024
 MOST_CHUNKS = 10000
+# Limit of the number of samples in the header of FLAC.
+FLAC_SAMPLES = 2**36
 # Places of the date and the time in a broadcast chunk, and their lengths.
 DATE = slice(320, 330)
 CLOCK = slice(330, 338)
@@ -63,6 +65,12 @@ def read_channels(path: Path) -> list[Channel]:
         refuse(f"{name}: samples of the kind {kind}", ", ".join(SUBTYPES))
     if columns > MOST_CHANNELS:
         refuse(f"{name}: {columns} channels", f"up to {MOST_CHANNELS}")
+    # The library cannot seek in such a file, and whether it is cut off nobody can tell.
+    if is_flac and count >= FLAC_SAMPLES:
+        refuse(
+            f"{name}: its header has no number of samples, as encoders leave it that stream",
+            "FLAC files with their length: encode it again, as by `ffmpeg -i OLD.flac NEW.flac`",
+        )
     # The rest of a lossless file that is cut off is missing at its last sample.
     if count < 1 or (is_flac and not _is_complete(path, count)):
         refuse(f"{name}: is cut off or has no samples", "a complete file")

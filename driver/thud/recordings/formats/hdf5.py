@@ -19,6 +19,7 @@ from thud.recordings.words import (
     find_rate,
     find_word,
     is_time,
+    plain,
     read_number,
     split_title,
     text_of,
@@ -46,6 +47,9 @@ MOST_TIMES = 2**22
 # Classes of MATLAB that are vectors of numbers in the file but mean something else.
 MATLAB_CLASS = frozenset({"matlabclass"})
 MATLAB_OTHERS = {"char", "cell", "struct", "function_handle", "canonical empty"}
+
+# Attributes by which NetCDF scales packed values, and their defaults.
+SCALING = {"scalefactor": 1.0, "addoffset": 0.0}
 
 
 @dataclass(frozen=True)
@@ -157,22 +161,25 @@ def _entries(h5py: Any, group: Any, seen: set[int], name: str) -> Iterator[tuple
 
 
 def _attributes(h5py: Any, entry: Any) -> list[tuple[str, object]]:  # noqa: ANN401 - a library
-    """Return the attributes of an object that hold one number or text."""
-    if len(entry.attrs) > MOST_ATTRIBUTES:
-        return []
-    found = ((key, entry.attrs.get_id(key)) for key in entry.attrs)
-    return [
-        (key, text_of(entry.attrs[key]))
-        for key, one in found
-        if _is_word(h5py, one.shape, one.dtype)
-    ]
+    """Return the attributes of an object that hold one number or text, and any that scale it."""
+    found: list[tuple[str, object]] = []
+    for key in entry.attrs:
+        kind = entry.attrs.get_id(key)
+        if _is_word(h5py, kind.shape, kind.dtype):
+            found.append((key, text_of(entry.attrs[key])))
+        elif plain(key) in SCALING:
+            found.append((key, f"values of shape {kind.shape or ()}"))
+    if len(found) > MOST_ATTRIBUTES:
+        found = [(key, value) for key, value in found if plain(key) in SCALING]
+    return found
 
 
-def _is_word(h5py: Any, shape: tuple[int, ...], dtype: Any) -> bool:  # noqa: ANN401 - a library
+def _is_word(h5py: Any, shape: tuple[int, ...] | None, dtype: Any) -> bool:  # noqa: ANN401 - a library
     """Whether a value is one number or text; damaged files claim any number of them."""
     is_text = h5py.check_string_dtype(dtype) is not None
     return (
-        math.prod(shape) == 1
+        shape is not None  # of an empty attribute
+        and math.prod(shape) == 1
         and (dtype.kind in "iufSU" or is_text)
         and dtype.itemsize <= LONGEST_WORD
     )
@@ -209,10 +216,7 @@ def _channels(path: Path, one: _Found, times: list[_Found], before: int) -> list
     if rate is None and same is not None:
         rate, steps, since = _rate_of_times(path, same)
         date = date or since
-    scale, offset = (
-        number[0] if (number := read_number(find_word(one.header, frozenset({word})))) else usual
-        for word, usual in (("scalefactor", 1.0), ("addoffset", 0.0))
-    )
+    scale, offset = (_scaling(path, one, word) for word in SCALING)
     title = one.key.strip("/")
     samples = Hdf5Samples(path, one.key, None, scale, offset)
     return [
@@ -230,6 +234,21 @@ def _channels(path: Path, one: _Found, times: list[_Found], before: int) -> list
         )
         for i in range(count)
     ]
+
+
+def _scaling(path: Path, one: _Found, word: str) -> float:
+    """Return the factor or offset of a dataset; raise InputError where it is no such number."""
+    title = next((title for title, _ in one.header if plain(title) == word), "")
+    if not title:
+        return SCALING[word]
+    value = find_word(one.header, frozenset({word}))
+    number, unit = read_number(value) or (math.nan, "")
+    if unit or not math.isfinite(number) or (number == 0 and word == "scalefactor"):
+        name = f"{shown_path(path)}: {shown_text(one.key.strip('/'))}: {shown_text(title)}"
+        refuse(
+            f"{name} = {shown_text(value)!r} is not allowed", "a finite number, as a factor not 0"
+        )
+    return number
 
 
 def _rate_of_times(path: Path, times: _Found) -> tuple[float, tuple[str, ...], str]:

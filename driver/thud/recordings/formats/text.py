@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import itertools
 import re
 from dataclasses import dataclass, field
@@ -11,6 +10,17 @@ from typing import TYPE_CHECKING, TextIO
 import numpy as np
 
 from thud.checks import refuse
+from thud.columns import (
+    GROUPING,
+    Layout,
+    find_layout,
+    find_separator,
+    is_number,
+    read_lines,
+    split_line,
+    strip_comment,
+    to_number,
+)
 from thud.recordings.channel import WHOLE, Channel, require_small, shown_path, shown_text
 from thud.recordings.grid import even_grid
 from thud.recordings.signal import ArraySamples
@@ -34,19 +44,16 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-# The first of these that a line contains separates its columns; otherwise blanks do.
-SEPARATORS = ("\t", ";", ",")
 COMMENTS = "#%!*'/;"
-# Maximum lengths of a line, of a header in lines, and of a table in numbers.
-LONGEST = 2**16
+# Maximum lengths of a header in lines, and of a table in numbers.
 LONGEST_HEADER = 1000
 MOST_NUMBERS = 2**24
 MOST_COLUMNS = 256
-# Characters that are read and lines that are converted at once.
-PIECE = 2**20
+# Lines that are converted at once.
 BLOCK = 2**14
 SHORTEST = 8
-DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+")
+# What lines have that are split and converted one by one.
+UNUSUAL = re.compile(rf'["#{GROUPING.strip(" ")}]')
 # Between names and values of a header; lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
 MOST_TITLES = 3
@@ -54,7 +61,7 @@ MOST_TITLES = 3
 SAME_RATE = 0.01
 ALLOWED = (
     "columns of numbers, separated by commas, semicolons, tabs or blanks (decimal commas with "
-    "semicolons, tabs and blanks)"
+    "semicolons, tabs and blanks, or in quotes)"
 )
 
 
@@ -63,29 +70,20 @@ class _Table:
     """Lines of a file, sorted into header, titles and numbers."""
 
     name: str
-    separator: str | None = None
-    decimal_comma: bool = False
+    layout: Layout = field(default_factory=lambda: Layout(None))
     header: list[tuple[str, object]] = field(default_factory=list)
     titles: list[list[str]] = field(default_factory=list)
     first: int = 1
     width: int = 0
+    used: list[int] = field(default_factory=list)
 
     def cells(self, line: str) -> list[str]:
-        """Return the cells of a line."""
-        return [cell.strip() for cell in line.split(self.separator)]
+        """Return the cells of a line of numbers."""
+        return split_line(strip_comment(line), self.layout.separator)
 
-    def titles_of(self, line: str, columns: int) -> list[str]:
-        """Return the cells of a line of words, which may hold separators in quotes."""
-        if columns == 1:
-            return [line.strip()]
-        if self.separator and '"' in line:
-            return next(csv.reader([line], delimiter=self.separator))
-        return self.cells(line)
-
-    def clean(self, line: str) -> str:
-        """Return a line without its comment and what ends it, with decimal points."""
-        rest = line.partition("#")[0].strip().rstrip(";").rstrip()
-        return rest.replace(",", ".") if self.decimal_comma else rest
+    def titles_of(self, line: str) -> list[str]:
+        """Return the cells of a line of words."""
+        return [line.strip()] if self.width == 1 else split_line(line, self.layout.separator)
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -97,70 +95,67 @@ def read_channels(path: Path) -> list[Channel]:
     # A header may be in another encoding than UTF-8.
     with path.open(encoding=encoding, errors="replace") as text:
         table = _Table(shown_path(path))
-        lines = _lines(text, table.name)
-        begin = _read_header(lines, table)
-        values = _read_numbers(itertools.chain(begin, lines), table)
+        _read_header(read_lines(text, table.name, ALLOWED), table)
+        text.seek(0)
+        _find_decimal(_lines_of_numbers(text, table), table)
+        text.seek(0)
+        values = _read_numbers(_lines_of_numbers(text, table), table)
     return _channels(table, values)
 
 
-def _lines(text: TextIO, name: str) -> Iterator[str]:
-    """Yield the lines of a text without their ends; raise InputError where one is too long."""
-    while piece := text.read(PIECE):
-        lines = (piece + text.readline(LONGEST + 1)).removesuffix("\n").split("\n")
-        if max(map(len, lines)) > LONGEST or "\0" in piece:
-            what = "holds zero bytes" if "\0" in piece else f"is longer than {LONGEST} characters"
-            refuse(f"{name}: a line {what}", ALLOWED)
-        yield from lines
+def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
+    """Return the lines of a text below its header."""
+    return itertools.islice(read_lines(text, table.name, ALLOWED), table.first - 1, None)
 
 
-def _read_header(lines: Iterator[str], table: _Table) -> list[str]:
-    """Sort the lines above the numbers into a table; return the first lines of numbers."""
-    above: list[str] = []
-    for line in itertools.islice(lines, LONGEST_HEADER):
-        separator, comma = _separator(line.partition("#")[0].strip())
-        probe = _Table(table.name, separator, comma)
-        cells = probe.cells(probe.clean(line))
-        found = [_number(cell) for cell in cells]
-        # Beside the numbers a table may have words, such as a state.
-        if found and found[0] is not None and found.count(None) < len(found) / 2:
-            table.separator, table.decimal_comma = separator, comma
-            table.first = len(above) + 1
-            _sort_header(above, table, len(cells))
-            if separator == "," and _is_one_column(line.strip(), table):
-                table.separator, table.decimal_comma = ";", True
-                _sort_header(above, table, 1)
-            return [line]
-        above.append(line)
-    return refuse(f"{table.name}: cannot be read (no numbers)", ALLOWED)
-
-
-def _is_one_column(text: str, table: _Table) -> bool:
-    """Whether a comma is a decimal point: there is a rate, no time, and no title for each side."""
-    return (
-        DECIMAL_COMMA.fullmatch(text) is not None
-        and not table.titles
-        and find_rate(table.header) is not None
+def _find_decimal(lines: Iterator[str], table: _Table) -> None:
+    """Find the decimal mark of the columns of numbers."""
+    table.layout = find_layout(
+        (
+            (number, [cells[i] for i in table.used if i < len(cells)])
+            for number, line in enumerate(lines, table.first)
+            if "." in line or "," in line
+            for cells in (table.cells(line),)
+        ),
+        table.layout.separator,
+        table.name,
     )
 
 
-def _separator(text: str) -> tuple[str | None, bool]:
-    """Return what separates columns, None for blanks, and whether commas are decimal points."""
-    separator = next((one for one in SEPARATORS if one in text), None)
-    words = text.split()
-    if separator == "," and len(words) > 1 and all(DECIMAL_COMMA.fullmatch(w) for w in words):
-        return None, True
-    return separator, separator in {"\t", ";"}
+def _read_header(lines: Iterator[str], table: _Table) -> None:
+    """Sort the lines above the numbers into a table; find its separator and used columns."""
+    above: list[str] = []
+    for line in itertools.islice(lines, LONGEST_HEADER):
+        text = strip_comment(line)
+        table.layout = Layout(find_separator(text))
+        cells = table.cells(line)
+        used = [i for i, cell in enumerate(cells) if is_number(cell)]
+        # Beside the numbers a table may have words, such as a state.
+        if used[:1] == [0] and len(used) > len(cells) / 2:
+            table.first, table.width, table.used = len(above) + 1, len(cells), used
+            _sort_header(above, table)
+            if table.layout.separator == "," and _is_one_column(text, table):
+                table.layout, table.width, table.used = Layout(";"), 1, [0]
+                _sort_header(above, table)
+            return
+        above.append(line)
+    refuse(f"{table.name}: cannot be read (no numbers)", ALLOWED)
 
 
-def _sort_header(above: list[str], table: _Table, columns: int) -> None:
+def _is_one_column(text: str, table: _Table) -> bool:
+    """Whether a comma does not separate: there is a rate, no time, and no title for each side."""
+    return is_number(text) and not table.titles and find_rate(table.header) is not None
+
+
+def _sort_header(above: list[str], table: _Table) -> None:
     """Find names and values, and the titles of the columns, in the lines above the numbers."""
     texts = [text for line in above if (text := line.strip().lstrip(COMMENTS).strip())]
     for place, text in enumerate(texts):
-        cells = table.titles_of(text.rstrip(";"), columns)
+        cells = table.titles_of(text.rstrip(";"))
         words = plain(split_title(re.split(PAIR, text, maxsplit=1)[0])[0])
-        is_pair = words in RATE | STEP | DATE | UNIT and columns < 3  # noqa: PLR2004
-        is_near = place >= len(texts) - MOST_TITLES and len(cells) == columns and not is_pair
-        if is_near and all(_number(cell) is None for cell in cells):
+        is_pair = words in RATE | STEP | DATE | UNIT and table.width < 3  # noqa: PLR2004
+        is_near = place >= len(texts) - MOST_TITLES and len(cells) == table.width and not is_pair
+        if is_near and not any(map(is_number, cells)):
             table.titles.append(cells)
             continue
         pair = re.split(PAIR, text, maxsplit=1)
@@ -173,19 +168,14 @@ def _sort_header(above: list[str], table: _Table, columns: int) -> None:
 
 def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.float64]]:
     """Return the columns of numbers of the lines by their place; columns of words are left out."""
-    first = next(lines)
-    cells = table.cells(table.clean(first))
-    used = [i for i, cell in enumerate(cells) if _number(cell) is not None]
-    if len(cells) > MOST_COLUMNS:
-        refuse(f"{table.name}: {len(cells)} columns", f"up to {MOST_COLUMNS}")
-    table.width = len(cells)
+    if table.width > MOST_COLUMNS:
+        refuse(f"{table.name}: {table.width} columns", f"up to {MOST_COLUMNS}")
     blocks: list[NDArray[np.float64]] = []
-    lines = itertools.chain([first], lines)
     number, count = table.first, 0
     while block := list(itertools.islice(lines, BLOCK)):
-        values = _convert(block, table, used)
+        values = _convert(block, table)
         if values is None:
-            values = _convert_each(block, number, table, used)
+            values = _convert_each(block, number, table)
         blocks.append(values)
         number, count = number + len(block), count + values.size
         if count > MOST_NUMBERS:
@@ -193,55 +183,46 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
                 f"{table.name}: more than {MOST_NUMBERS / 1e6:.1f} million numbers as text",
                 "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
             )
-    return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(used)}
+    return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)}
 
 
-def _convert(block: list[str], table: _Table, used: list[int]) -> NDArray[np.float64] | None:
-    """Return the numbers of some lines; None where one is empty, has comments or is wrong."""
-    separator = table.separator
+def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
+    """Return the numbers of some lines; None where one is empty, unusual or wrong."""
+    separator, decimal, _ = table.layout
     joined = "\n".join(block)
     if separator is None:
         counts = {len(line.split()) for line in block}
     else:
         counts = {line.count(separator) + 1 for line in block}
-    if counts != {table.width} or "#" in joined:
+    if counts != {table.width} or UNUSUAL.search(joined) or (decimal == "," and "." in joined):
         return None
-    lines = joined.replace(",", ".").split("\n") if table.decimal_comma else block
+    lines = joined.replace(",", ".").split("\n") if decimal == "," else block
     try:
         return np.loadtxt(
-            lines, delimiter=separator, comments=None, usecols=used, ndmin=2, dtype=np.float64
-        )
+            lines, delimiter=separator, comments=None, usecols=table.used, ndmin=2,
+            dtype=np.float64,
+        )  # fmt: skip
     except (ValueError, OverflowError):
         return None
 
 
-def _convert_each(
-    block: list[str], first: int, table: _Table, used: list[int]
-) -> NDArray[np.float64]:
+def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.float64]:
     """Return the numbers of some lines; raise InputError where one has others or other columns."""
     rows = []
     for number, line in enumerate(block, first):
-        text = table.clean(line)
-        if not text:
+        if not strip_comment(line):
             continue
-        cells = table.cells(text)
-        row = [_number(cells[i]) if i < len(cells) else 0.0 for i in used]
+        cells = table.cells(line)
+        used = [cells[i] for i in table.used if i < len(cells)]
+        row = [to_number(cell, table.layout.decimal) for cell in used]
         if None in row:
-            wrong = shown_text(cells[used[row.index(None)]])[:40]
-            refuse(f"{table.name}: line {number}: {wrong!r} is not a number", ALLOWED)
+            wrong = table.layout.wrong(shown_text(used[row.index(None)]))
+            refuse(f"{table.name}: line {number}: {wrong}", ALLOWED)
         if len(cells) != table.width:
             what = f"{len(cells)} columns, {table.width} above it"
             refuse(f"{table.name}: line {number}: {what}", ALLOWED)
         rows.append(row)
-    return np.array(rows, dtype=np.float64).reshape(len(rows), len(used))
-
-
-def _number(cell: str) -> float | None:
-    """Return the number in a cell; None where it is not one."""
-    try:
-        return float(cell)
-    except ValueError:
-        return None
+    return np.array(rows, dtype=np.float64).reshape(len(rows), len(table.used))
 
 
 def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Channel]:
@@ -252,7 +233,7 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
         what = f"{rows} rows of {len(numeric)} numbers"
         refuse(f"{table.name}: {what}", f"{SHORTEST} rows or more of numbers")
     titles, units = _titles(table, table.width)
-    rate = find_rate(table.header)
+    rate = find_rate(table.header, table.layout.decimal)
     steps: tuple[str, ...] = ()
     time = next((i for i in numeric if is_time(titles[i]) or _is_time_unit(units[i])), None)
     if time is None and len(numeric) > 1 and (rate is None or _are_times(values[numeric[0]])):
