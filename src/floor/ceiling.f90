@@ -37,23 +37,28 @@ contains
          real_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of that air', '[0.001, 1]')]
    end function get_ceiling_fields
 
-   !> Mean in a band of the square of the ceiling's velocity over the floor's, which drives it through the air's stiffness:
-   !> abs((1 + i eta)/(1 + i eta - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
-   elemental function get_forced_share(ceiling, air, lower, upper) result(share)
+   !> Mean in a band of the square of the ceiling's velocity over the floor's, which drives it through the air's stiffness
+   !> against its mass and what it radiates, rho0 c0 sigma:
+   !> abs((1 + i eta)/(1 + i eta + i k d sigma - (f/f0)**2))**2, f0 = sqrt(rho0 c0**2/(depth mass))/(2 pi).
+   elemental function get_forced_share(ceiling, air, radiation_factor, lower, upper) result(share)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
+      !> Radiation factor of floor and ceiling.
+      real(wp), intent(in) :: radiation_factor
       !> Edges of the band, Hz.
       real(wp), intent(in) :: lower, upper
       real(wp) :: share
       complex(wp) :: b
-      real(wp) :: resonance
+      real(wp) :: period, damping
 
-      resonance = sqrt(air%density*air%sound_speed**2/(ceiling%depth*ceiling%mass))/(2*pi)
-      associate (low => lower/resonance, high => upper/resonance, eta => ceiling%loss_factor)
-         ! 1/((1 - x**2)**2 + eta**2) = Im(1/(b**2 - x**2))/eta with b**2 = 1 - i eta; the logarithms' arguments stay below
-         ! the real axis.
-         b = sqrt(cmplx(1.0_wp, -eta, wp))
-         share = (1 + eta**2)/(eta*(high - low))*aimag((log(b + high) - log(b - high) - log(b + low) + log(b - low))/(2*b))
+      ! The smallest number instead of masses so small that their product with the depth is 0.
+      period = 2*pi*sqrt(max(ceiling%depth*ceiling%mass/(air%density*air%sound_speed**2), tiny(1.0_wp)))
+      damping = ceiling%loss_factor + 2*pi*sqrt(lower*upper)*ceiling%depth*radiation_factor/air%sound_speed
+      associate (low => lower*period, high => upper*period)
+         ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of both ends'
+         ! atanh(x/b) as one: their imaginary parts lie between 0 and pi/2.
+         b = sqrt(cmplx(1.0_wp, -damping, wp))
+         share = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
       end associate
    end function get_forced_share
 
@@ -69,8 +74,8 @@ contains
       density = 2*pi*area*frequency/air%sound_speed**2*(1 + int(2*ceiling%depth*frequency/air%sound_speed))
    end function get_cavity_mode_density
 
-   !> Transmission of sound through the ceiling by its mass, 5 dB above that of normal incidence (field incidence), at most
-   !> all.
+   !> Transmission of sound through the ceiling by its mass: of a heavy one 5 dB above that of normal incidence (field
+   !> incidence), of one without mass all.
    elemental function get_mass_law(ceiling, air, frequency) result(transmission)
       type(ceiling_type), intent(in) :: ceiling
       type(air_type), intent(in) :: air
@@ -78,7 +83,7 @@ contains
       real(wp), intent(in) :: frequency
       real(wp) :: transmission
 
-      transmission = min(1.0_wp, sqrt(10.0_wp)/(1 + (pi*frequency*ceiling%mass/(air%density*air%sound_speed))**2))
+      transmission = 1/(1 + (pi*frequency*ceiling%mass/(air%density*air%sound_speed))**2/sqrt(10.0_wp))
    end function get_mass_law
 
 end module thud_ceiling

@@ -253,8 +253,10 @@ contains
    !> Energies of a third: floor, walls, room and the air above a ceiling, with what flows between them.
    !>
    !> Plates lose omega eta in all; they radiate rho0 c0 sigma/m'' into the room and as much to the other side. The room
-   !> loses 6 ln 10/T besides what goes back into them. Below a floor with a ceiling the air above this takes the sound,
-   !> which the ceiling lets through by its mass (Craik and Smith 2000), and the stiffness of that air drives the ceiling.
+   !> loses 6 ln 10/T besides what goes back into them. Of the sound below a floor with a ceiling the stiffness of the air
+   !> above this carries a share; that air takes the rest, which the ceiling lets through by its mass (Craik and Smith 2000).
+   !> For the part of the rest that passes the ceiling both ways there is no ceiling, and that air takes from the room what
+   !> passes the ceiling and is then reflected by it: a ceiling without mass is none.
    pure function get_band_energies(plate, room, prediction, band) result(energies)
       type(plate_type), intent(in) :: plate
       type(room_type), intent(in) :: room
@@ -266,6 +268,7 @@ contains
       type(energy_flow_type) :: flow
       type(plate_type) :: plates(1 + room%walls%lengths%count)
       real(wp), dimension(size(plates)) :: radiated
+      real(wp) :: transmission, share, rest
       integer :: i, at_room, at_cavity
 
       plates = [plate, get_walls(room%walls)]
@@ -278,10 +281,14 @@ contains
             2*pi*f*get_total_loss(plates, air, f), &
             [2*pi*f*plates%loss_factor + radiated, decay_of_60_db/prediction%reverberation_time(band)])
          if (ceiling%mass > 0.0_wp) then
+            transmission = get_mass_law(ceiling, air, f)
+            share = get_forced_share(ceiling, air, prediction%radiation_factor(band), third%lower, third%upper)
+            rest = max(1 - share, 0.0_wp)
             call add_subsystem(flow, get_cavity_mode_density(ceiling, air, area, f), 2*pi*f*ceiling%loss_factor)
-            call connect(flow, 1, at_cavity, radiated(1))
-            call connect(flow, at_room, at_cavity, air%sound_speed*area*get_mass_law(ceiling, air, f)/(4*room%volume))
-            call connect(flow, 1, at_room, radiated(1)*get_forced_share(ceiling, air, third%lower, third%upper))
+            call connect(flow, 1, at_cavity, radiated(1)*rest*(1 - transmission**2))
+            call connect(flow, at_room, at_cavity, &
+               air%sound_speed*area*transmission*(1 - transmission)/(4*room%volume))
+            call connect(flow, 1, at_room, radiated(1)*(share + rest*transmission**2))
          else
             call connect(flow, 1, at_room, radiated(1))
          end if
