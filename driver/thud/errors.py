@@ -25,6 +25,10 @@ class ReportWarning(UserWarning):
     """A report lacks a file or some letters, or replaces that of another recording."""
 
 
+class LockWarning(RuntimeWarning):
+    """A file system has no locks, so that runs that write to one directory are not kept apart."""
+
+
 class WorkerWarning(RuntimeWarning):
     """A worker of a study is not heard of; others do its work."""
 

@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, NoReturn
 from thud._api import version
 from thud.checks import suggestion
 from thud.cli.calibrate import CALIBRATE
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, exit_code, output, sentence
+from thud.cli.command import (
+    NO_FIGURES,
+    QUIET,
+    Command,
+    argument,
+    exit_code,
+    output,
+    sentence,
+    told_at_once,
+)
 from thud.cli.examples import EXAMPLES
 from thud.cli.explore import EXPLORE
 from thud.cli.export import EXPORT
@@ -126,7 +135,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
-            code = command.function(options)
+            with told_at_once():
+                code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
         print(f"thud-driver: interrupted; {kept}", file=sys.stderr)

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import sys
+import warnings
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.errors import InputError, ThudError
+from tqdm import tqdm
+
+from thud.errors import InputError, LockWarning, ThudError, WorkerWarning
 from thud.files import replace_file
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
 
     from thud.floors.mobility_fit import MobilityFit
     from thud.floors.survey import RoomLevels
@@ -64,6 +68,23 @@ def tell(remarks: Iterable[object]) -> None:
     """Print remarks."""
     for remark in remarks:
         print(f"thud-driver: {remark}", file=sys.stderr)
+
+
+@contextmanager
+def told_at_once() -> Iterator[None]:
+    """Print warnings of locks and lost workers as remarks, at once: the work goes on for long."""
+    usual = warnings.showwarning
+
+    def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
+        if issubclass(kind, (LockWarning, WorkerWarning)):
+            # A progress bar stays below it.
+            tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
+        else:
+            usual(warning, kind, *place)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 def conclude(

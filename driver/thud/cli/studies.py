@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import sys
-import warnings
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
-from thud.errors import NumericalError, ThudError, WorkerWarning
+from thud.errors import NumericalError, ThudError
 from thud.studies.directory import save
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
 
     from thud.studies.kind import How
 
@@ -79,8 +76,7 @@ def run_study(options: argparse.Namespace) -> int:
         print(kind.describe(study), file=sys.stderr)
     with kind.take(study, folder, replace=options.replace) as directory:
         try:
-            with _told_at_once(options.study):
-                result = kind.compute(study, directory, **how)
+            result = kind.compute(study, directory, **how)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
@@ -93,22 +89,6 @@ def run_study(options: argparse.Namespace) -> int:
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if kind.succeeded(result) else NumericalError.exit_code
-
-
-@contextmanager
-def _told_at_once(study: str) -> Iterator[None]:
-    """Print warnings of lost workers as remarks; the study goes on for long."""
-    usual = warnings.showwarning
-
-    def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
-        if issubclass(kind, WorkerWarning):
-            _tell(study, warning)
-        else:
-            usual(warning, kind, *place)
-
-    with warnings.catch_warnings():
-        warnings.showwarning = show  # type: ignore[assignment]
-        yield
 
 
 def _tell(study: str, remark: object) -> None:
