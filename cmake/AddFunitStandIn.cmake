@@ -20,7 +20,8 @@ function(add_pfunit_ctest name)
     OUTPUT "${directory}/driver.f90" ${generated}
     COMMAND "${Python_EXECUTABLE}" "${funit_directory}/preprocess.py" "${directory}/driver.f90" ${sources}
     DEPENDS ${sources} "${funit_directory}/preprocess.py"
-    COMMENT "Preprocessing ${name}")
+    COMMENT "Preprocessing ${name}"
+    VERBATIM)
   add_executable(${name} ${generated} "${directory}/driver.f90")
   set_target_properties(${name} PROPERTIES Fortran_MODULE_DIRECTORY "${directory}")
   target_link_libraries(${name} PRIVATE ${suite_LINK_LIBRARIES} funit_stand_in)

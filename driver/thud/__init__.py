@@ -23,6 +23,7 @@ from thud.ensemble import solve_many
 from thud.errors import (
     FitWarning,
     InputError,
+    LockWarning,
     NumericalError,
     PlausibilityWarning,
     ThudError,
@@ -140,6 +141,7 @@ __all__ = [  # noqa: PLE0604 - all are strings
     "FreeModes",
     "Impact",
     "InputError",
+    "LockWarning",
     "Motion",
     "NumericalError",
     "PlausibilityWarning",

@@ -25,6 +25,10 @@ class ReportWarning(UserWarning):
     """A figure, a file or some letters of a report are left out, or it replaces another one."""
 
 
+class LockWarning(RuntimeWarning):
+    """A file system has no locks, so that runs that write to one directory are not kept apart."""
+
+
 class WorkerWarning(RuntimeWarning):
     """A worker of a study is not heard of; others do its work."""
 

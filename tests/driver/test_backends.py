@@ -234,8 +234,7 @@ def test_lost_worker_is_one_sentence_on_the_screen(
     path = tmp_path / "study.toml"
     path.write_text("parameters.height.values = [1]")
     assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 0
-    said = f"thud-driver: {path}: the worker tcp://x was not heard of\n"
-    assert capsys.readouterr().err == said
+    assert capsys.readouterr().err == "thud-driver: the worker tcp://x was not heard of\n"
 
 
 def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:

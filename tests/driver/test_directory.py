@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import resource
 import signal
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import REPOSITORY
 
 import thud
 from thud import cli
@@ -21,6 +24,9 @@ from thud.studies import evaluation, fit
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
 from thud.studies.sweep import KIND
+
+sys.path.insert(0, str(REPOSITORY / "tests/faults"))
+from injection import can_inject, library
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -243,6 +249,48 @@ def test_a_study_is_computed_once_at_a_time(tmp_path: Path) -> None:
     ):
         thud.sweep(study, tmp_path)
     assert thud.sweep(study, tmp_path).sizes["height"] == 2
+
+
+def refuse_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let calls for a lock fail as on a file system that has none."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+
+
+def test_study_without_locks_is_computed_with_a_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    expected = values(thud.sweep(HEIGHTS))
+    refuse_locks(monkeypatch)
+    for form in ("netcdf", "zarr"):
+        with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))) as caught:
+            found = thud.sweep({"name": form, **HEIGHTS, "format": form}, tmp_path)
+        assert len(caught) == 1
+        assert values(found).identical(expected)
+    assert {path.name for path in tmp_path.iterdir()} == {"netcdf.nc", "zarr.zarr"}
+
+
+@pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
+def test_command_without_locks_ends_with_results_and_one_warning(tmp_path: Path) -> None:
+    """The calls of all libraries fail, of HDF5 too."""
+    (tmp_path / "two.toml").write_text("parameters.height.values = [0.5, 1]")
+    faults = {"FAULT_CALLS": "flock", "FAULT_ACTION": f"{errno.ENOLCK}", "FAULT_LOG": "calls"}
+    done = subprocess.run(
+        [sys.executable, "-m", "thud", "sweep", "two.toml", "-q", "-o", "new"],
+        cwd=tmp_path,
+        env={**os.environ, "LD_PRELOAD": library(), "FAULT_AT": "1", "FAULT_FROM": "1", **faults},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "calls").read_text().count("flock") > 1
+    assert thud.read_sweep(tmp_path / "new/two.nc").sizes["height"] == 2
+    assert done.stderr.count("\n") == 1
+    assert done.stderr.startswith("thud-driver: new: ")
 
 
 def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:

@@ -2,18 +2,43 @@
 
 from __future__ import annotations
 
+import errno
+import os
+import platform
+import re
+import subprocess
+import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import pytest
 
-from thud.files import replace_file
+import thud
+from thud.files import add_files, replace_file
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 
+@pytest.fixture
+def no_locks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let calls for a lock fail as on a file system that has none."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+
+
+@pytest.fixture(params=[True, False], ids=["locks", "no locks"])
+def locks(request: pytest.FixtureRequest) -> None:
+    """Have locks, or none."""
+    if not request.param:
+        request.getfixturevalue("no_locks")
+
+
+@pytest.mark.usefixtures("locks")
 def test_threads_that_write_the_same_file_do_not_disturb_each_other(tmp_path: Path) -> None:
     contents = [bytes([number]) * 100_000 for number in range(4)]
     start = threading.Barrier(len(contents))
@@ -34,6 +59,32 @@ def test_what_a_killed_writer_left_is_taken_up(tmp_path: Path) -> None:
     replace_file(tmp_path / "file", b"whole")
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     assert (tmp_path / "file").read_bytes() == b"whole"
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_leftovers_without_locks_are_removed_where_their_writer_has_ended(tmp_path: Path) -> None:
+    ended = subprocess.run([sys.executable, "-c", "import os; print(os.getpid())"],
+                           check=True, capture_output=True, text=True).stdout.strip()  # fmt: skip
+    names = {
+        "ended": f".file.part.1.{platform.node()}.{ended}",
+        "running": f".file.part.2.{platform.node()}.{os.getppid()}",
+        "elsewhere": ".file.part.3.other-host.1",
+        "old": ".file.part.4.other-host.1",
+        "another file": f".file2.part.5.{platform.node()}.{ended}",
+    }
+    for name in names.values():
+        (tmp_path / name).write_bytes(b"half")
+    os.utime(tmp_path / names["old"], (0, 0))
+    replace_file(tmp_path / "file", b"whole")
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == {"file", names["running"], names["elsewhere"], names["another file"]}
+
+
+@pytest.mark.usefixtures("no_locks")
+def test_results_without_locks_are_added_with_a_warning(tmp_path: Path) -> None:
+    with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))):
+        add_files(tmp_path, {"force.png": b"figure"})
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".thud", "force.png"]
 
 
 def test_link_of_the_temporary_name_is_not_followed(tmp_path: Path) -> None:

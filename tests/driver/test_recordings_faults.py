@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import struct
 import subprocess
@@ -24,9 +25,27 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
+from injection import can_inject, library
 from mutate_recordings import count_handles, mutate
 
 CAMPAIGN = REPOSITORY / "tests/faults/mutate_recordings.py"
+
+
+@pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
+def test_recording_is_read_where_the_file_system_has_no_locks(tmp_path: Path) -> None:
+    force = half_sine(44100)
+    WRITERS["plate.h5"](tmp_path / "plate.h5", force, 44100, "N")
+    read = "import thud; print(len(thud.read_recording('plate.h5').drops))"
+    faults = {"FAULT_CALLS": "flock", "FAULT_AT": "1", "FAULT_FROM": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", read],
+        cwd=tmp_path,
+        env={**os.environ, "LD_PRELOAD": library(), "FAULT_ACTION": f"{errno.ENOLCK}", **faults},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stderr, done.stdout) == ("", "1\n")
 
 
 def test_damaged_recordings_are_read_or_refused() -> None:

@@ -157,6 +157,12 @@ ON_DESCRIPTOR(fsync)
 ON_DESCRIPTOR(fdatasync)
 ON_DESCRIPTOR(syncfs)
 
+int flock(int descriptor, int operation)
+{
+   if (fault("flock", of(descriptor))) return -1;
+   return NEXT(int, flock, int, int)(descriptor, operation);
+}
+
 int mkdir(const char *path, mode_t mode)
 {
    if (fault("mkdir", path)) return -1;

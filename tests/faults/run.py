@@ -15,6 +15,7 @@ from pathlib import Path
 from aliasing import check_aliasing
 from attempts import attempts
 from campaign import Part, Report
+from checkouts import NAMES, check_checkouts
 from clusters import check_clusters
 from crowds import check_crowds, check_starts, check_threads
 from directories import check_calls, check_damage, check_races
@@ -54,6 +55,8 @@ def parts() -> dict[str, Part]:
         "many": Part(100_000, 200, check_many, share=1000),
         "lumped": Part(20_000, 60, check_lumped, share=100),
         "modal": Part(10_000, 8, check_modal, share=10),
+        # A build takes minutes.
+        "checkouts": Part(len(NAMES), 0, check_checkouts),
         "elements": Part(1000, 4, check_elements, share=4),
     }
 

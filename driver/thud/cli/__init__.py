@@ -9,8 +9,6 @@ import signal
 import sys
 from typing import TYPE_CHECKING, NoReturn
 
-from tqdm import tqdm
-
 from thud._api import version
 from thud.checks import suggestion
 from thud.cli.calibrate import CALIBRATE
@@ -35,7 +33,7 @@ from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
-from thud.errors import InputError, ReportWarning, ThudError
+from thud.errors import InputError, ThudError
 from thud.impact import FORCES
 from thud.levels import SOURCES
 
@@ -137,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if folder is not None and not folder.strip():
                 message = "--output has no value; allowed: a directory"
                 raise InputError(message)
-            with shown_at_once(ReportWarning, _tell):
+            with shown_at_once():
                 code = command.function(options)
         sys.stdout.flush()
     except KeyboardInterrupt as interrupt:
@@ -150,11 +148,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"thud-driver: {sentence(error)}", file=sys.stderr)
         return exit_code(error)
     return code
-
-
-def _tell(remark: object) -> None:
-    """Print a remark; a progress bar stays below it."""
-    tqdm.write(f"thud-driver: {remark}", file=sys.stderr)
 
 
 def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:

@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from tqdm import tqdm
+
 from thud.display import draw_all
-from thud.errors import InputError, ThudError
+from thud.errors import InputError, LockWarning, ReportWarning, ThudError, WorkerWarning
 from thud.files import replace_file
 
 if TYPE_CHECKING:
@@ -63,27 +65,30 @@ def channel_of(text: str | None) -> int | str | None:
     return int(text) if text is not None and text.isdecimal() else text
 
 
-@contextmanager
-def shown_at_once(kind: type[Warning], show: Callable[[object], None]) -> Iterator[None]:
-    """Show warnings of a kind as remarks."""
-    usual = warnings.showwarning
-
-    def show_warning(warning: Any, category: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
-        if issubclass(category, kind):
-            show(warning)
-        else:
-            usual(warning, category, *place)
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", kind)
-        warnings.showwarning = show_warning  # type: ignore[assignment]
-        yield
-
-
 def tell(remarks: Iterable[object]) -> None:
     """Print remarks."""
     for remark in remarks:
         print(f"thud-driver: {remark}", file=sys.stderr)
+
+
+@contextmanager
+def shown_at_once() -> Iterator[None]:
+    """Print warnings of reports, locks and workers as remarks, at once: the work may go on."""
+    usual = warnings.showwarning
+    kinds = ReportWarning, LockWarning, WorkerWarning
+
+    def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
+        if issubclass(kind, kinds):
+            # A progress bar stays below it.
+            tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
+        else:
+            usual(warning, kind, *place)
+
+    with warnings.catch_warnings():
+        for kind in kinds:
+            warnings.simplefilter("always", kind)
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield
 
 
 def conclude(

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, shown_at_once
-from thud.errors import NumericalError, ThudError, WorkerWarning
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.errors import NumericalError, ThudError
 from thud.studies.directory import save
 from thud.studies.kinds import KINDS, get_kind
 
@@ -77,9 +77,7 @@ def run_study(options: argparse.Namespace) -> int:
         print(kind.describe(study), file=sys.stderr)
     with kind.take(study, folder, replace=options.replace) as directory:
         try:
-            # The study goes on for long.
-            with shown_at_once(WorkerWarning, partial(_tell, options.study)):
-                result = kind.compute(study, directory, **how)
+            result = kind.compute(study, directory, **how)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error

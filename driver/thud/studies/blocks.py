@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from thud.checks import refuse
-from thud.files import replace_file, uninterrupted
+from thud.files import own_path, remove, replace_file, uninterrupted
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
-from thud.studies.directory import remove
 
 if TYPE_CHECKING:
     import os
@@ -95,7 +94,9 @@ class Blocks:
     def _write_zarr(self, paths: list[Path]) -> None:
         """Write a Zarr group, some variables at a time: only these have to fit into memory."""
         part = self.path.with_name(f".{self.path.name}.part")
+        # An interrupted removal leaves it.
         shutil.rmtree(part, ignore_errors=True)
+        part = own_path(part)
         with _open(paths[0]) as first:
             sizes = {str(name): values.nbytes for name, values in first.data_vars.items()}
         names = list(sizes)
@@ -200,7 +201,9 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
                 dataset = _open_zarr(path)
             else:
                 _require_whole(path)
-                dataset = xr.open_dataset(path, engine="h5netcdf")
+                # Whole files are renamed to this name, so that no lock is needed; some file
+                # systems have none.
+                dataset = xr.open_dataset(path, engine="h5netcdf", driver_kwds={"locking": False})
         with dataset:
             yield dataset
 

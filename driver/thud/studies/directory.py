@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from thud.checks import refuse
 from thud.display import left_out
 from thud.errors import InputError
-from thud.files import lock, replace_file
+from thud.files import lock, remove, replace_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -107,17 +106,6 @@ def save(
 
         paths += save_all(figures, folder)
     return paths
-
-
-def remove(path: Path) -> None:
-    """Remove a file or a directory, if it exists; an interrupt leaves its name all or nothing."""
-    if path.is_dir() and not path.is_symlink():
-        gone = path.with_name(f".{path.name}.part")
-        shutil.rmtree(gone, ignore_errors=True)
-        path.rename(gone)
-        shutil.rmtree(gone)
-    else:
-        path.unlink(missing_ok=True)
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:

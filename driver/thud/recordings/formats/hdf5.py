@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import os
 from dataclasses import dataclass, replace
@@ -65,7 +66,7 @@ class Hdf5Samples:
     def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
         """Return the samples from start to before stop."""
         h5py = library("h5py", "HDF5")
-        with guarded(self.path, "HDF5"), h5py.File(os.fsencode(self.path), "r") as file:
+        with guarded(self.path, "HDF5"), _open(h5py, self.path) as file:
             piece: Any = slice(start, stop)
             if self.column is not None:
                 axis, place = self.column
@@ -102,7 +103,7 @@ def read_channels(path: Path) -> list[Channel]:
     """Return the numeric vectors of a file, and the columns of its slender matrices."""
     h5py = library("h5py", "HDF5")
     name = shown_path(path)
-    with h5py.File(os.fsencode(path), "r") as file:
+    with _open(h5py, path) as file:
         found = _walk(h5py, file, path)
         times = [one for one in found if is_time(one.key.rpartition("/")[2])]
         channels: list[Channel] = []
@@ -112,6 +113,16 @@ def read_channels(path: Path) -> list[Channel]:
     if not channels:
         refuse(f"{name}: has no dataset of {SHORTEST} or more real numbers", "a recorded channel")
     return channels
+
+
+def _open(h5py: Any, path: Path) -> Any:  # noqa: ANN401 - a library
+    """Open a file, without a lock where the file system has none."""
+    try:
+        return h5py.File(os.fsencode(path), "r")
+    except OSError as error:
+        if error.errno not in (errno.ENOLCK, errno.ENOTSUP):
+            raise
+    return h5py.File(os.fsencode(path), "r", locking=False)
 
 
 def _walk(h5py: Any, file: Any, path: Path) -> list[_Found]:  # noqa: ANN401 - a library
