@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import thud
+from thud.floors import modal_room
 from thud.floors.modal_room import SAMPLE_RATE, fast_levels, plate_frequencies
 from thud.plot.plate_modes import plate_modes
 
@@ -133,6 +134,20 @@ def test_levels_are_those_of_an_integration_in_time(
         0.05,
         "dB",
     )
+
+
+@pytest.mark.parametrize(("loss", "reverberation_time"), [(0.9, 0.05), (0.004, 0.2), (0.05, 3.0)])
+def test_record_is_long_enough_for_floor_room_and_detector(
+    impact: thud.Impact, loss: float, reverberation_time: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twice the decay changes levels by no more than what wraps around: 60 dB below."""
+    floor = replace(FLOOR, loss_factor=loss, edges="absorption")
+    room = replace(ROOM, reverberation_time=reverberation_time)
+    places = {"balls": [BALL], "microphones": [MICROPHONE]}
+    level = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
+    monkeypatch.setattr(modal_room, "WAITED", 2 * modal_room.WAITED)
+    longer = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
+    assert level == pytest.approx(longer, abs=2 * 20 * np.log10(1 + 10 ** (-60 / 20)))
 
 
 def test_detector_shows_tones_and_their_bursts(oracle: Callable[..., None]) -> None:
