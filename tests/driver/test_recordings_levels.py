@@ -435,6 +435,26 @@ def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     assert f"resonance of {plate.resonance:.4g} Hz" in sentence
 
 
+def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
+    """k/(k - m w2 + i w c), with the mass that is added."""
+    plate = Plate(1600.0, 30.0, mass=10.0, added_mass=4.0)
+    stiffness = 10 * (2 * np.pi * 1600) ** 2
+    damping = 10 * 2 * np.pi * 1600 / 30
+    omega = 2 * np.pi * np.array([10.0, 900.0, 1352.0, 4000.0])
+    expected = stiffness / (stiffness - 14 * omega**2 + 1j * omega * damping)
+    np.testing.assert_allclose(plate.response(omega / 2 / np.pi), expected)
+    # Kept up to twice the resonance, nothing from four times on, cos2 of the octave between.
+    f = plate.resonance * np.array([0.1, 1.99, 2 * 2 ** (1 / 3), 2 * np.sqrt(2), 4, 9])
+    np.testing.assert_allclose(plate.passed(f), [1, 1, 0.75, 0.5, 0, 0], atol=1e-12)
+    uncertain = replace(plate, frequency_uncertainty=1e-6)
+    edge = thud.get_bands().upper
+    step = replace(plate, frequency=1600 * (1 + 1e-6), quality=1e9)
+    change = np.abs(step.response(edge) / replace(plate, quality=1e9).response(edge))
+    np.testing.assert_allclose(
+        uncertain.level_uncertainty(), np.abs(20 * np.log10(change)), rtol=1e-4
+    )
+
+
 def test_constant_force_passes_the_correction() -> None:
     for length in (100, 4097):
         corrected = correct_plate(np.full(length, 7.0), 25600.0, Plate(1600, 30))
