@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
 from thud.levels import record_force
-from thud.recordings import contact, estimates, flanks
+from thud.recordings import calibration, contact, drops, estimates, flanks
 from thud.recordings.contact import Contact, cells_between, even_edges
 from thud.recordings.plate import Plate
+from thud.recordings.signal import Signal
 
 RATE = 25600.0
 
@@ -129,6 +131,67 @@ def test_noise_of_the_quiet_is_that_outside_the_gate() -> None:
     # The median of absolute values has a relative error of 1.17/sqrt(n).
     assert found.deviation == pytest.approx(7.0, rel=4 * 1.17 / np.sqrt(0.2 * RATE))
     assert (found.white, found.pink, found.brown) == tuple(one.background.variances[:3])
+
+
+@pytest.mark.parametrize(("drift", "hum"), [(2.9, 3.1), (3.1, 2.9), (-3.1, 0.0)])
+def test_drift_and_hum_are_told_from_three_deviations_on(drift: float, hum: float) -> None:
+    one = make_drop(1.0, RATE).contact
+    under = np.zeros(len(one.under))
+    under[slice(*one.gate)] = np.linspace(-2, 12, len(one.gated))
+    known = SimpleNamespace(drift=(drift * 4, 4.0), hum=(60.0, hum * 0.5, 0.5))
+    steps = estimates._told_background(replace(one, under=under, background=known))  # type: ignore[arg-type] # noqa: SLF001
+    told = " ".join(steps)
+    # The mean of what lies under the contact.
+    assert "offset of 5 N" in told
+    assert ("drift" in told) == (abs(drift) > 3)
+    assert ("hum of 60 Hz" in told) == (hum > 3)
+
+
+@pytest.mark.parametrize(("size", "rate"), [(0.05, 25600.0), (12.0, 25600.0), (30.0, 5000.0)])
+def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
+    size: float, rate: float
+) -> None:
+    """A density of a (0.45 rate/f)**2 beyond half the rate, folded to the edge of the octave."""
+    one = make_drop(0.0, rate).contact
+    time = np.arange(len(one.force)) / rate
+    force = one.force + size * np.cos(2 * np.pi * 0.45 * rate * time)
+    one = replace(one, force=force)
+    count = len(one.gated)
+    length = count + int(rate / 20) + 3 * count
+    f = np.fft.rfftfreq(length, 1 / rate)
+    power = np.abs(np.fft.rfft(one.gated, length)) ** 2
+    top = np.sqrt(power[f > 0.4 * rate].mean()) * (0.45 * rate / (rate - 707.9)) ** 2
+    own = np.sqrt(power[(f > 354.8) & (f < 707.9)].mean())
+    expected = 20 * np.log10(1 + top / own)
+    told = estimates._told_aliased(one)  # noqa: SLF001
+    assert bool(told) == (expected > 0.1)
+    if told:
+        assert f"by {expected:.1f} dB" in told[0]
+    # Noise has content there too: three times its power is none.
+    white = top**2 * ((rate - 707.9) / 0.45 / rate) ** 4 / count / rate * 2
+    for factor, expected in ((0.1, bool(told)), (0.34, False)):
+        draws = np.array([[factor * white, 0, 0, 0, 0]])
+        noisy = replace(one, background=replace(one.background, draws=draws))
+        assert bool(estimates._told_aliased(noisy)) == expected  # noqa: SLF001
+
+
+def test_level_at_an_edge_is_that_of_a_line_with_its_uncertainty() -> None:
+    rng = np.random.default_rng(6)
+    level = 3 + 0.02 * np.arange(100) + rng.normal(scale=0.1, size=100)
+    for begin, end, edge in ((0, 60, 60), (40, 100, 40)):
+        # A tenth at both ends is left out: what settles.
+        place = np.arange(begin + 6, end - 6)
+        (slope, value), covariance = np.polyfit(place - edge, level[place], 1, cov=True)
+        del slope
+        found = calibration._level_at(level, begin, end, edge)  # noqa: SLF001
+        assert found == pytest.approx((value, np.sqrt(covariance[1, 1])))
+    # Of several steps: their own uncertainty, or the scatter where that is more.
+    for own in (0.01, 5.0):
+        sizes = [10.0, 11.0, 12.5]
+        mean, deviation = calibration._mean([(size, own) for size in sizes])  # noqa: SLF001
+        assert mean == pytest.approx(np.mean(sizes))
+        assert deviation == pytest.approx(max(own / np.sqrt(3), stats.sem(sizes)))
+    assert calibration._mean([(10.0, 0.2)]) == (10.0, 0.2)  # noqa: SLF001
 
 
 # Flanks: times of 30 cells, whose noise is known.
@@ -253,12 +316,43 @@ def test_edge_is_where_the_force_of_a_line_begins_and_passes_a_percent() -> None
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
     force = half_sine(RATE, 0.1, int(0.22 * RATE)) + 40
     force[2700] += 300
-    from thud.recordings.drops import find_windows  # noqa: PLC0415
-    from thud.recordings.signal import Signal  # noqa: PLC0415
-
-    (window,) = find_windows(Signal.from_array(force, RATE))
+    (window,) = drops.find_windows(Signal.from_array(force, RATE))
     found = contact.find_contact(window, force[window.start : window.stop])
     expected = uniform_filter1d(force - 40, round(RATE / 1250)).max()
     assert found.peak == pytest.approx(expected, rel=1e-3)
     assert found.gated.max() == pytest.approx((force - 40).max(), abs=0.5)
     assert found.quiet == pytest.approx((0.1, 0.1), abs=1e-3)
+
+
+def test_peak_of_a_pulse_is_above_the_line_between_the_quiet_beside_it() -> None:
+    cells = np.zeros(300)
+    rise = np.arange(24)
+    pulse = np.sin(np.pi * rise / 24) ** 2 * (1 + 0.3 * np.cos(np.pi * rise / 24))
+    cells[100:124] += 1000 * pulse
+    # The quiet behind lies 60 N higher, that of another pulse before it does not count.
+    cells += np.interp(np.arange(300), [105, 117], [0, 60])
+    cells[60:80] += 800 * np.sin(np.pi * np.arange(20) / 20)
+    (_, found) = drops._pulses(cells, 0, 1000.0)  # noqa: SLF001
+    smooth = uniform_filter1d(cells, 3)
+    top = np.argmax(smooth)
+    half = np.flatnonzero(smooth > smooth[top] / 2)
+    half = half[half > 95]
+    line = 60 * (top - half[0]) / (half[-1] - half[0])
+    assert found.peak == pytest.approx(smooth[top] - line, abs=0.5)
+    # Its edges lie two cells outside of a fifth of it, and cells are samples here.
+    local = smooth - 60 * np.clip((np.arange(300) - half[0]) / (half[-1] - half[0]), 0, 1)
+    above = np.flatnonzero(local > found.peak / 5)
+    above = above[above > 95]
+    assert (found.start, found.stop) == (above[0] - 2, above[-1] + 3)
+
+
+def test_pulses_rise_above_six_deviations_of_the_cells() -> None:
+    """Of the cells below the baseline, whose median is 0.6745 deviations of normal noise."""
+    rng = np.random.default_rng(4)
+    pulse = np.sin(np.pi * np.arange(20) / 20)
+    level = 10 / np.sqrt(3)  # of means over three cells
+    for height, expected in ((4.5, 1), (8.5, 2)):
+        cells = rng.normal(scale=10, size=4000)
+        cells[1000:1020] += 1000 * pulse
+        cells[2000:2020] += height * level * pulse
+        assert len(drops._pulses(cells, 0, 1000.0)) == expected  # noqa: SLF001
