@@ -428,6 +428,8 @@ def test_white_residuals_pass_and_others_do_not() -> None:
     )
     assert "change their sign 0 times" in " ".join(residual_doubts(np.abs(white), time))
     assert not residual_doubts(slow[:10], time[:10])
+    # A constant is no frequency: it is told by its runs alone.
+    assert not any("coloured" in one for one in residual_doubts(white + 3, time))
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from thud.recordings.config import Config
 from thud.recordings.contact import Estimate
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
+from thud.recordings.faults import repair
 from thud.recordings.levels import measure_levels
 from thud.recordings.quantities import average_mass, average_restitution, drop_quantities
 from thud.recordings.restitution import Fall
@@ -501,6 +502,28 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     lost[5200:5300] = 0
     with pytest.raises(thud.InputError, match="dropouts"):
         drops(lost, 48e3)
+
+
+@pytest.mark.parametrize("offset", [-3000.0, 0.0, 3000.0])
+def test_held_samples_jump_by_a_part_of_the_peak_above_the_quiet(offset: float) -> None:
+    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=80, offset=offset)
+    (window,) = find_windows(Signal.from_array(force, 48e3, "file.wav"))
+    first = window.start + window.contact[0] + 200
+    rise = np.diff(force[first : first + 60]).mean()
+    # 4 % of 1500 N.
+    for factor, expected in ((0.85, False), (1.15, True)):
+        count = round(factor * 0.04 * 1500 / rise)
+        held = force.copy()
+        held[first : first + count] = force[first]
+        (window,) = find_windows(Signal.from_array(held, 48e3, "file.wav"))
+        filled, steps, remarks = repair(window)
+        assert bool(remarks) == bool(steps) == expected
+        found = filled[first - window.start :][:count]
+        truth = force[first : first + count] if expected else np.full(count, force[first])
+        # A line between the ends of the flank, and the noise.
+        np.testing.assert_allclose(found, truth, atol=1.5)
+        if expected:
+            assert f"dropouts of {1e3 * count / 48e3:.3g} ms" in remarks[0]
 
 
 @pytest.mark.parametrize("part", [slice(4900, None), slice(None, 5600)])

@@ -708,6 +708,12 @@ def test_probability_of_conformity_counts_both_limits() -> None:
     decisions = [decide([q, *NOMINAL[1:]]).decisions[0] for q in (half, wide)]
     assert decisions[0].probability == pytest.approx(0.5)
     assert decisions[1].probability == pytest.approx(0.6827, abs=1e-4)
+    # Of four drops, Student's t; what is not known or an upper bound has no probability.
+    few = Quantity(39.5, (Contribution("repeatability", 0.4, 3),))
+    expected = student.cdf(0.5 / 0.4, 3) - student.cdf(-1.5 / 0.4, 3)
+    assert decide([few, *NOMINAL[1:]]).decisions[0].probability == pytest.approx(expected)
+    bound = replace(few, upper_bound=True)
+    assert math.isnan(decide([bound, *NOMINAL[1:]]).decisions[0].probability)
 
 
 @pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])
