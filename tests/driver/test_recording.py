@@ -167,6 +167,8 @@ def test_numbers_that_may_be_two_are_refused(
         ("time;force\n0;0\n1;2 N\n", "line 3: '2 N' is not a number"),
         ("0,001,5,2\n0,002,5\n", "line 2: 3 columns, 4 above it"),
         ("1,0\n2,\n", "line 2: '' is not a number"),
+        ("0,1\n1,2\0\n", "zero bytes"),
+        ("0,1\n" + "1" * 70_000 + ",2\n", "longer than 65536 characters"),
         ("0,1\n1,2\n", "2 rows of 2 numbers"),
         ("".join(f"{i},1,2\n" for i in range(9)), "9 rows of 3 numbers"),
         ("".join(f"{i},nan\n" for i in range(9)), "not finite"),
@@ -182,6 +184,7 @@ def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None
     with pytest.raises(thud.InputError, match=rf"plate\.csv: .*({words}).*; allowed: ") as caught:
         read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
     assert "\n" not in str(caught.value)
+    assert str(caught.value).count("allowed:") == 1
 
 
 def test_missing_record_is_told(tmp_path: Path) -> None:
