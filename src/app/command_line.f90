@@ -12,7 +12,7 @@ module thud_command_line
    use thud_schema, only: get_schema
    use thud_sets_run, only: run_sets
    use thud_suggestion, only: get_suggestion
-   use thud_system, only: get_system_message, prepare_process, standard_error, standard_output, write_text
+   use thud_system, only: get_system_message, is_closed, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted
    implicit none (type, external)
    private
@@ -98,7 +98,7 @@ contains
       end if
    end subroutine execute
 
-   !> Writes to the screen; a closed or full output is an error.
+   !> Writes to the screen; a full output is an error, and one that nobody reads is none.
    subroutine write_line(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -108,10 +108,10 @@ contains
       integer :: status
 
       call write_text(descriptor, text//newline, status)
-      if (status == 0) return
+      if (status == 0 .or. is_closed(status)) return
       exit_code = bad_input
       if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
-         //get_system_message(status)//'); allowed: a screen, a pipe that is read, or a disk with space'//newline, status)
+         //get_system_message(status)//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
    end subroutine write_line
 
    !> Makes a request of the arguments.

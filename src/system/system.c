@@ -271,6 +271,12 @@ int thud_write(int descriptor, const char *bytes, size_t length)
    return 0;
 }
 
+// Whether the number of an error of writing says that nobody reads: the pipe or the descriptor is closed.
+int thud_is_closed(int status)
+{
+   return status == EPIPE || status == EBADF;
+}
+
 // Closes a file; some disks are found to be full only then.
 int thud_close(int descriptor)
 {

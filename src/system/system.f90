@@ -10,7 +10,7 @@ module thud_system
    public :: standard_error, standard_output
    public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
    public :: end_calls, end_process, exchange_directories, flush_directory, get_file_size, get_free_bytes, get_system_message
-   public :: is_terminal, keep_interrupts, link_file, list_directory, lock_directory, open_descriptor, open_end
+   public :: is_closed, is_terminal, keep_interrupts, link_file, list_directory, lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
    !> Descriptors of the process.
@@ -53,6 +53,7 @@ module thud_system
    procedure(path_call), bind(c, name='thud_flush') :: c_flush
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
+   procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
 
    interface
       !> Ends the process at once; nothing must be left to be written.
@@ -282,6 +283,15 @@ contains
 
       status = int(c_write(int(descriptor, c_int), text, len(text, c_size_t)))
    end subroutine write_text
+
+   !> Whether a text was not written because nobody reads it: the pipe or the descriptor is closed.
+   function is_closed(status) result(closed)
+      !> That of `write_text`.
+      integer, intent(in) :: status
+      logical :: closed
+
+      closed = c_is_closed(int(status, c_int)) /= 0
+   end function is_closed
 
    !> Brings all files of a directory to the disk.
    subroutine flush_directory(path, status)

@@ -33,7 +33,7 @@ from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
-from thud.errors import InputError, ThudError
+from thud.errors import InputError, NumericalError, ThudError
 from thud.impact import FORCES
 from thud.levels import SOURCES
 
@@ -143,10 +143,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
-            # Standard output is full or closed: discard what is still buffered.
+            # Standard output is full: discard what is still buffered.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"thud-driver: {sentence(error)}", file=sys.stderr)
         return exit_code(error)
+    except MemoryError as error:
+        cause = f" ({error})" if str(error) else ""
+        message = f"the memory does not suffice{cause}; allowed: a smaller task, or more memory"
+        print(f"thud-driver: {message}", file=sys.stderr)
+        return NumericalError.exit_code
     return code
 
 

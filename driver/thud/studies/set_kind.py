@@ -140,9 +140,12 @@ class SetKind(DropsKind[R]):
 
     def compute(self, study: SetStudy, folder: Path | None, **how: Unpack[How]) -> R:
         """Return the result of all sets, computed or continued."""
-        if study.plan:
-            study = replace(study, surrogate=train(study, folder, how))
-        return self.conclude(study, compute_sets(study, folder, how))
+        try:
+            if study.plan:
+                study = replace(study, surrogate=train(study, folder, how))
+            return self.conclude(study, compute_sets(study, folder, how))
+        except MemoryError as error:
+            refuse(f"{study.count} sets do not fit in memory", "fewer sets", error)
 
     @abstractmethod
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
