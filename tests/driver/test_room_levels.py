@@ -151,6 +151,8 @@ def test_levels_that_cannot_be_rated_are_refused(arguments: tuple[object, ...], 
 def test_rooms_that_cannot_be_are_refused(time: float, volume: float) -> None:
     with pytest.raises(thud.InputError, match="> 0"):
         thud.standardised_level([60.0], time, volume)
+    with pytest.raises(thud.InputError, match=f"reverberation_time = {min(time, 0.4):g}|volume ="):
+        thud.standardised_level([60.0, 61.0], [0.4, time], volume)
 
 
 def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
