@@ -81,6 +81,8 @@ def test_curve_that_begins_under_load_is_doubted(
         ([0, 1e-3, 1e-3, 2e-3, 3e-3], range(5), "deflection does not rise at point 3; allowed: "),
         ([0, 1e-3, 2e-3, 3e-3, np.nan], range(5), "holds what is no finite number; allowed: fin"),
         ([0, 1e-3, 2e-3, 3e-3, 4e-3], [4, 3, 2, 1, 0], "force does not rise with the deflection"),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [1, 1, 1, 1, 1], "force does not rise with the deflection"),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [-2, -1, 0, 0, 0], "force does not rise with the deflectio"),
         ([0, 1e-3, 2e-3, 3e-3, 0.2], range(5), "m is not allowed; allowed: less than the diameter"),
         ([0, 1e-12, 2e-12, 3e-12, 4e-12], range(5), "where the model shows no force"),
         ("curve", range(5), "deflection"),

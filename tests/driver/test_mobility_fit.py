@@ -103,6 +103,12 @@ def test_opposite_directions_change_the_sign(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
 
 
+def test_direction_that_is_not_stated_keeps_the_sign(tmp_path: Path) -> None:
+    path = write_universal(tmp_path / "point.uff", 11, MOBILITY, rsp_dir=0)
+    found = thud.fit_mobility(path, order=8)
+    np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [

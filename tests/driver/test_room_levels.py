@@ -240,6 +240,11 @@ def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:
         thud.standardised_level(GOOD.level, GOOD.reverberation_time, 30.0)
     )
     assert GOOD.standardised_rating == thud.rating(GOOD.standardised)
+    two = replace(GOOD, positions=GOOD.positions[:2])
+    assert two.spread == pytest.approx(abs(np.diff(two.positions, axis=0)[0]) / np.sqrt(2))
+    energy = [10 ** (thud.rating(one).a_weighted / 10) for one in two.positions]
+    error = abs(energy[0] - energy[1]) / 2 / np.mean(energy)
+    assert two.position_uncertainty == pytest.approx(10 / np.log(10) * error)
     one = replace(GOOD, positions=GOOD.positions[:1], background=None)
     assert (one.spread, one.position_uncertainty) == (None, None)
     assert one.level.tolist() == one.measured.tolist()
