@@ -8,7 +8,7 @@ module thud_many
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields, get_model_number
    use thud_column, only: column_type
-   use thud_compute, only: get_judged_force
+   use thud_compute, only: get_cost, get_judged_force
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type
@@ -25,9 +25,6 @@ module thud_many
    private
 
    public :: leave_many, many_type, new_many, solve_many, take_many
-
-   !> Approximate time of a drop on a plate beyond that of a drop on a rigid floor, s.
-   real(wp), parameter :: floor_cost = 1.2e-2_wp
 
    !> Approximate time of one drop in a batch, s.
    real(wp), parameter :: batch_cost = 1.5e-5_wp
@@ -92,9 +89,8 @@ contains
 
       call get_level_bands(case%bands, many%bands, many%first_band)
       many%judged = judged
-      many%cost = case%models(get_model_number(case))%model%get_cost()
-      if (suits_batch(case, columns)) many%cost = batch_cost
-      if (case%has_floor) many%cost = many%cost + floor_cost
+      many%cost = batch_cost
+      if (.not. suits_batch(case, columns)) many%cost = get_cost(case)
       many%further_name = get_further_names(case, many%bands(many%first_band:))
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
