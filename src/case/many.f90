@@ -17,17 +17,18 @@ module thud_many
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_sampling, only: check_sampling, get_sample_count
+   use thud_sampling, only: check_sampling, get_sample_count, get_step_count
    use thud_shell_sets, only: set_outcome_type, set_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
+   use thud_source_model, only: typical_contact
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: leave_many, many_type, new_many, solve_many, take_many
 
-   !> Approximate time of one drop in a batch, s.
-   real(wp), parameter :: batch_cost = 1.5e-5_wp
+   !> Approximate time of one step in a batch, s.
+   real(wp), parameter :: batch_cost = 1.5e-8_wp
 
    !> Why a drop has no results.
    type :: reason_type
@@ -89,8 +90,9 @@ contains
 
       call get_level_bands(case%bands, many%bands, many%first_band)
       many%judged = judged
-      many%cost = batch_cost
-      if (.not. suits_batch(case, columns)) many%cost = get_cost(case)
+      many%cost = get_cost(case)
+      if (size(columns) > 0 .and. suits_batch(case, columns)) many%cost = batch_cost*get_step_count(case%sampling, &
+         typical_contact)
       many%further_name = get_further_names(case, many%bands(many%first_band:))
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted
