@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.cli.command import results_of
 from thud.tables import format_rows
 
 if TYPE_CHECKING:
@@ -15,13 +15,12 @@ def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy take their time.
     from thud.plot.history import draw_history  # noqa: PLC0415
-    from thud.plot.look import save_all  # noqa: PLC0415
+    from thud.plot.look import picture_files  # noqa: PLC0415
     from thud.report.history import read_history  # noqa: PLC0415
 
     history = read_history(options.reports, different_balls=options.different_balls)
-    folder = Path(options.output)
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = save_all({"history": draw_history(history)}, folder)
+    results = results_of(options, "history", options.reports)
+    paths = results.write(picture_files({"history": draw_history(history)}))
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))

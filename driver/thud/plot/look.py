@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from thud._schema import BandSet, LevelsForce
 from thud.checks import require_kind, shown
 from thud.errors import InputError
-from thud.files import replace_file
+from thud.files import Results, replace_file
 from thud.impact import Impact
 from thud.levels import get_bands
 from thud.recordings.recording import Recording
@@ -211,46 +211,54 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     if kind not in FORMATS:
         message = f"{path}: ending {shown(kind)} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
+    replace_file(path, _picture(figure, Path(path).stem, kind))
+
+
+def _picture(figure: Figure, name: str, kind: str) -> bytes:
+    """Return the content of the file of a figure."""
     content = io.BytesIO()
     # Without a date and with constant names, the same figure gives the same bytes.
     date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
-    title = Path(path).stem.replace("_", " ").capitalize()
+    title = name.replace("_", " ").capitalize()
     # Text in vector graphics stays text.
     with mpl.rc_context({"svg.hashsalt": "thud", "svg.fonttype": "none"}):
         figure.savefig(content, format=kind, metadata={"Title": title, **date})
-    replace_file(path, content.getvalue())
+    return content.getvalue()
 
 
-def save_all(figures: Mapping[str, Figure], directory: str | os.PathLike[str]) -> list[Path]:
+def picture_files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Return the contents of figures as PNG and SVG by the names of their files."""
+    return {
+        f"{name}.{kind}": _picture(figure, name, kind)
+        for name, figure in figures.items()
+        for kind in ("png", "svg")
+    }
+
+
+def save_all(
+    figures: Mapping[str, Figure], directory: str | os.PathLike[str], *, replace: bool = False
+) -> list[Path]:
     """Save figures as PNG and SVG under their names and return the paths of the files.
 
-    Raises
-    ------
-    OSError
-        Where a file cannot be written.
-    """
-    paths = []
-    for name, figure in figures.items():
-        for ending in ("png", "svg"):
-            paths.append(Path(directory, f"{name}.{ending}"))
-            save(figure, paths[-1])
-    return paths
-
-
-def save_page(
-    name: str, figure: Figure, html: str, directory: str | os.PathLike[str]
-) -> list[Path]:
-    """Save a figure as PNG and SVG beside the page of the same name; return the paths.
-
-    The directory is made where there is none.
+    Parameters
+    ----------
+    figures
+        Figures by name.
+    directory
+        Directory of the files; it is made where there is none.
+    replace
+        Replace also files that thud has not written.
 
     Raises
     ------
+    InputError
+        Where a file is in the way.
     OSError
         Where a file cannot be written.
     """
-    page = Path(directory, f"{name}.html")
-    page.parent.mkdir(parents=True, exist_ok=True)
-    pictures = save_all({name: figure}, directory)
-    replace_file(page, html.encode())
-    return [*pictures, page]
+    return Results(Path(directory), "plot", replace=replace).write(picture_files(figures))
+
+
+def page_files(name: str, figure: Figure, html: str) -> dict[str, bytes]:
+    """Return the contents of a figure and of the page of the same name by the names of files."""
+    return {**picture_files({name: figure}), f"{name}.html": html.encode()}
