@@ -385,7 +385,7 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     with pytest.warns(ReportWarning, match=r"report\.pdf is not written .*; allowed: pip install"):
         paths = write_report(one, folder)
     assert [path.name for path in paths] == ["report.json", "report.html"]
-    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "report.json"]
+    assert sorted(path.name for path in folder.glob("report.*")) == ["report.html", "report.json"]
     assert not capsys.readouterr().out
 
 
