@@ -596,7 +596,8 @@ def test_command_writes_figure_and_table(
     monkeypatch.chdir(tmp_path)
     assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
     folder = tmp_path / "outputs/sweep"
-    assert sorted(path.name for path in folder.iterdir()) == ["sweep.nc", "sweep.png", "sweep.svg"]
+    names = [".thud", "sweep.nc", "sweep.png", "sweep.svg"]
+    assert sorted(path.name for path in folder.iterdir()) == names
     printed = capsys.readouterr()
     assert "80 sets of hollow_sphere, about 0.085 MB on disk" in printed.err
     assert "peak_force, N" in printed.out

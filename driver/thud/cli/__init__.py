@@ -50,7 +50,7 @@ COMMANDS = {
         "run cases, write their results and figures",
         (
             argument("cases", nargs="+", metavar="CASE.nml", help="namelist files"),
-            output(
+            *output(
                 "the results; one below it for each of several cases (default: outputs/<case name>)"
             ),
             argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
@@ -71,7 +71,7 @@ COMMANDS = {
                 metavar="CASE.nml|RECORD.csv",
                 help="namelist files, and recordings with columns of time, s, and force, N",
             ),
-            output("the page (default: outputs/comparison)", default="outputs/comparison"),
+            *output("the page (default: outputs/comparison)"),
             argument(
                 "--force",
                 choices=FORCES,
@@ -100,7 +100,7 @@ COMMANDS = {
                 metavar="REPORT",
                 help="report.json files, or directories that hold them",
             ),
-            output("the chart (default: outputs/history)", default="outputs/history"),
+            *output("the chart (default: outputs/history)"),
             argument(
                 "--different-balls", action="store_true", help="allow reports of different balls"
             ),
@@ -115,7 +115,7 @@ COMMANDS = {
     "examples": EXAMPLES,
     "figures": Command(
         "draw the figures of the paper and of the documentation",
-        (output("the figures (default: outputs/figures)", default="outputs/figures"), QUIET),
+        (*output("the figures (default: outputs/figures)"), QUIET),
         draw_figures,
     ),
 }
