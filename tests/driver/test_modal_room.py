@@ -186,6 +186,7 @@ def test_random_positions_keep_their_distance_and_are_the_same_again(impact: thu
         ({"balls": [[1.0, 9.0]]}, r"balls = \[1.0, 9.0\] is not allowed; allowed: 0 to 4.5"),
         ({"microphones": [[1.0, 1.0]]}, r"microphones have the shape \(1, 2\)"),
         ({"seed": -1}, "seed = -1"),
+        ({"seed": 2**32}, "seed = 4294967296"),
         ({"floor": thud.Oscillator()}, "no plate that radiates"),
         ({"floor": thud.Plate(thickness=2.0, length=0.5, width=0.5)}, "first natural frequency"),
         ({"room": thud.Room(volume=1e5)}, "statistical prediction holds"),
@@ -265,6 +266,10 @@ def test_positions_of_small_rooms_keep_a_quarter_of_the_side() -> None:
     for places in (np.zeros((0, 3)), np.zeros((1001, 3)), np.zeros((1, 2))):
         with pytest.raises(thud.InputError, match="a have the shape"):
             module._positions("a", places, sides, draw)  # noqa: SLF001
+
+
+def test_seeds_are_those_of_32_bits() -> None:
+    assert module._seed(2**32 - 1) == 2**32 - 1  # noqa: SLF001
 
 
 def test_each_mode_of_the_room_decays_as_the_nearest_third(found: thud.ModalRoom) -> None:
