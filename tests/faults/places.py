@@ -6,14 +6,16 @@ import signal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from campaign import Finding
-from forks import Order, forks
-from kills import judge_again, judge_end, judge_files, prepare
-from scenarios import NEW, OUT, SCENARIOS
+from forks import forks
+from kills import judge, order, prepare
+from scenarios import OUT, SCENARIOS
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
+
+    from campaign import Finding
+    from forks import Order
 
 NAMES = [name for name, one in SCENARIOS.items() if one.weight]
 # Variables that say where programs keep what is no result.
@@ -29,23 +31,10 @@ def check_places(tries: list[tuple[int, random.Random]], folder: Path) -> Iterab
         _free(place)
         prepare(place, name, old=old)
         kind = chance.choice(list(KINDS))
-        order, told = KINDS[kind](Order(SCENARIOS[name].given(NEW), str(place)), chance)
-        done = forks().run(order)
+        disturbed, what = KINDS[kind](order(name, place), chance)
+        done = forks().run(disturbed)
         _free(place)
-        word = _judge_words(done.code, done.said) or judge_end(done)
-        word = word or judge_files(name, place, old=old, done=done.code == 0)
-        again = forks().run(Order(SCENARIOS[name].given(NEW), str(place)))
-        word, _, what = (word or judge_again(name, place, again, old=old)).partition(": ")
-        detail = f"{name}, old {old}, {kind} {told}: {done}, {again}, {what}"
-        yield Finding(word or f"{kind} {'done' if done.code == 0 else 'refused'}", detail)
-
-
-def _judge_words(code: int, said: str) -> str:
-    """Return the fault of an end that is no sentence, if any."""
-    if code == 0:
-        return ""
-    last = (said.splitlines() or [""])[-1]
-    return "" if code in (1, 2) and last.startswith("thud") else "crashed: no sentence"
+        yield judge(name, place, done, f"{kind} {what}", old=old)
 
 
 def _free(place: Path) -> None:
@@ -55,41 +44,40 @@ def _free(place: Path) -> None:
             path.chmod(0o755)
 
 
-def _few_descriptors(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _few_descriptors(usual: Order, chance: random.Random) -> tuple[Order, str]:
     # With fewer neither an interpreter begins nor the loader of libraries.
-    most = chance.randint(4 if order.command[0] == "thud" else 8, 24)
-    return order._replace(limits={"RLIMIT_NOFILE": most}), str(most)
+    most = chance.randint(4 if usual.command[0] == "thud" else 8, 24)
+    return usual._replace(limits={"RLIMIT_NOFILE": most}), str(most)
 
 
-def _small_files(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _small_files(usual: Order, chance: random.Random) -> tuple[Order, str]:
     # Words on the screen are a file here.
     most = int(10 ** chance.uniform(3, 5))
-    return order._replace(limits={"RLIMIT_FSIZE": most}), str(most)
+    return usual._replace(limits={"RLIMIT_FSIZE": most}), str(most)
 
 
-def _read_only(order: Order, chance: random.Random) -> tuple[Order, str]:
-    place = Path(order.folder)
+def _read_only(usual: Order, chance: random.Random) -> tuple[Order, str]:
+    place = Path(usual.folder)
     path = chance.choice([place, place / OUT] if (place / OUT).exists() else [place])
     path.chmod(0o555)
-    return order._replace(humble=True), path.name
+    return usual._replace(humble=True), path.name
 
 
-def _no_homes(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _no_homes(usual: Order, chance: random.Random) -> tuple[Order, str]:
     names = chance.sample(HOMES, chance.randint(1, len(HOMES)))
     where = chance.choice(["/nonexistent", "/dev/null", "/proc/self", "/dev/full"])
-    return order._replace(env=dict.fromkeys(names, where), humble=True), f"{names} {where}"
+    return usual._replace(env=dict.fromkeys(names, where), humble=True), f"{names} {where}"
 
 
-def _other_clock(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _other_clock(usual: Order, chance: random.Random) -> tuple[Order, str]:
     seconds = chance.choice((-1, 1)) * 10 ** chance.uniform(0, 8)
-    return order._replace(env={"FAULT_CLOCK": f"{seconds:.0f}"}), f"{seconds:.0f}"
+    return usual._replace(env={"FAULT_CLOCK": f"{seconds:.0f}"}), f"{seconds:.0f}"
 
 
-def _interrupted(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _interrupted(usual: Order, chance: random.Random) -> tuple[Order, str]:
     """Kill it first, so that the clock goes back between two runs of one study."""
-    usual = 0.5 * chance.random()
-    forks().run(order._replace(signals=[(usual, signal.SIGKILL)]))
-    return _other_clock(order, chance)
+    forks().run(usual._replace(signals=[(0.5 * chance.random(), signal.SIGKILL)]))
+    return _other_clock(usual, chance)
 
 
 KINDS = {

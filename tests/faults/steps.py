@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import errno
-import signal
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from campaign import Finding
-from forks import Order, forks
+from forks import fail
 from injection import KILLS
-from kills import judge_again, judge_end, judge_files, prepare
-from scenarios import NEW, SCENARIOS
+from kills import judge, order, prepare
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
+    from campaign import Finding
     from forks import Done
 
 ERRORS = [str(number) for number in (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EROFS)]
@@ -27,14 +25,10 @@ FULL = f"{errno.ENOSPC} from there on"
 NAMES = ("sweep", "zarr", "surrogate", "fit", "measure", "export")
 
 
-def _run(name: str, place: Path, at: int, action: str) -> Done:
-    """Run a scenario whose call of that number goes wrong, none for 0."""
-    number, _, on = action.partition(" ")
-    env = {"FAULT_AT": str(at), "FAULT_ACTION": number, "FAULT_UNDER": str(place)}
-    env["FAULT_LOG"] = str(place.with_suffix(".log"))
-    if on:
-        env["FAULT_FROM"] = "1"
-    return forks().run(Order(SCENARIOS[name].given(NEW), str(place), env=env))
+def _run(name: str, place: Path, at: int, action: str) -> tuple[Done, list[str]]:
+    """Run a scenario whose call of that number in its directory goes wrong, none for 0."""
+    prepare(place, name, old=True)
+    return fail(order(name, place)._replace(env={"FAULT_UNDER": str(place)}), at, action)
 
 
 @cache
@@ -44,10 +38,7 @@ def plan() -> list[tuple[str, str, int]]:
     with TemporaryDirectory(prefix="thud_faults_") as folder:
         place = Path(folder, "steps")
         for name in NAMES:
-            prepare(place, name, old=True)
-            _run(name, place, 0, "")
-            calls = len(place.with_suffix(".log").read_text().splitlines())
-            place.with_suffix(".log").unlink()
+            calls = len(_run(name, place, 0, "")[1])
             tries += [
                 (name, action, at + 1)
                 for action in (*KILLS, *ERRORS, FULL)
@@ -59,21 +50,8 @@ def plan() -> list[tuple[str, str, int]]:
 def check_steps(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
     """Let one call after the other go wrong, then run the command again."""
     for number, _ in tries:
-        name, action, at = plan()[number]
-        place = folder / "steps"
-        prepare(place, name, old=True)
-        log = place.with_suffix(".log")
-        log.unlink(missing_ok=True)
-        done = _run(name, place, at, action)
-        calls = log.read_text().splitlines()
+        name, action, at = plan()[number % len(plan())]
+        done, calls = _run(name, folder / "steps", at, action)
         call = calls[at - 1] if at <= len(calls) else "none"
-        word = judge_end(done)
-        if action not in KILLS and done.code in (-signal.SIGKILL, 130, 143):
-            word = "crashed"
-        elif done.code == 1 and not done.said.splitlines()[-1].startswith("thud-driver: "):
-            word = "crashed: no sentence"
-        word = word or judge_files(name, place, old=True, done=done.code == 0)
-        again = forks().run(Order(SCENARIOS[name].given(NEW), str(place)))
-        word, _, what = (word or judge_again(name, place, again, old=True)).partition(": ")
-        detail = f"{name}, {action} at {call}: {done}, {again}, {what}"
-        yield Finding(word or f"{name} {'done' if done.code == 0 else 'stopped'}", detail)
+        what = f"{action} at {call}"
+        yield judge(name, folder / "steps", done, what, old=True, killed=action in KILLS)
