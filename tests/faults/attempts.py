@@ -19,7 +19,7 @@ import warnings
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 from campaign import Finding, draw
 
@@ -35,6 +35,7 @@ SPACE, GROWTH = 4 * 2**30, 400 * 2**20
 SANITIZED = "libasan" in os.environ.get("LD_PRELOAD", "")
 # Names of what parts keep in the directory of temporary files.
 KEPT = "thud_faults_"
+SEEDS = "seeds"
 
 
 def find(name: str, part: Part, seeds: list[int]) -> Iterator[Finding]:
@@ -50,14 +51,8 @@ def find(name: str, part: Part, seeds: list[int]) -> Iterator[Finding]:
 
 def _watch(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[Finding]:
     """Yield the findings of a process, the last one of the attempt that it ended with."""
-    with tempfile.TemporaryFile() as said, _process(name, folder, said.fileno()) as worker:
-        assert worker.stdin
-        assert worker.stdout
-        lines: queue.Queue[str] = queue.Queue()
-        threading.Thread(target=_forward, args=(worker.stdout, lines), daemon=True).start()
-        with suppress(BrokenPipeError):
-            worker.stdin.write(json.dumps(seeds))
-            worker.stdin.close()
+    (folder / SEEDS).write_text(json.dumps(seeds))
+    with tempfile.TemporaryFile() as said, _process(name, folder, said) as (worker, lines):
         for place in range(len(seeds)):
             line = _next_line(worker, lines, part.limit if place else part.limit + PATIENCE)
             if line:
@@ -74,19 +69,23 @@ def _watch(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[Fi
 
 
 @contextmanager
-def _process(name: str, folder: Path, errors: int) -> Iterator[subprocess.Popen[str]]:
+def _process(
+    name: str, folder: Path, said: IO[bytes]
+) -> Iterator[tuple[subprocess.Popen[str], queue.Queue[str]]]:
     """Start a process that attempts, and end it with all that it has started."""
     command = [sys.executable, __file__, name, "--work", str(folder)]
-    pipe = subprocess.PIPE
-    worker = subprocess.Popen(
-        command, stdin=pipe, stdout=pipe, stderr=errors, text=True, start_new_session=True
-    )
-    try:
-        yield worker
-    finally:
-        with suppress(ProcessLookupError):
-            os.killpg(worker.pid, signal.SIGKILL)
-        worker.wait()
+    lines: queue.Queue[str] = queue.Queue()
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=said, text=True, start_new_session=True
+    ) as worker:
+        thread = threading.Thread(target=_forward, args=(worker.stdout, lines))
+        thread.start()
+        try:
+            yield worker, lines
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(worker.pid, signal.SIGKILL)
+            thread.join()
 
 
 def _forward(source: Iterable[str], lines: queue.Queue[str]) -> None:
@@ -179,7 +178,7 @@ def _memory() -> int:
 
 
 def _work(name: str, part: Part, folder: Path) -> None:
-    """Make the attempts whose seeds the standard input gives; print word and detail of each."""
+    """Make the attempts of the seeds in a directory; print word and detail of each."""
     answers = os.fdopen(os.dup(1), "w")
     # Whatever else is printed goes to the same file as errors, which must not grow.
     os.dup2(2, 1)
@@ -188,7 +187,7 @@ def _work(name: str, part: Part, folder: Path) -> None:
         assert b"__asan_init" in core.read_bytes(), f"{core} has no sanitizer"
     else:
         resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
-    for found in _observe(name, part, json.loads(sys.stdin.read()), folder):
+    for found in _observe(name, part, json.loads((folder / SEEDS).read_text()), folder):
         answers.write(json.dumps(found) + "\n")
         answers.flush()
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import os
 import statistics
 from functools import cache
 from pathlib import Path
@@ -24,7 +23,6 @@ SLOW_FRACTION = 0.04
 # Rounds before the growth counts, and the growth allowed in their second half.
 WARM = 40
 GROWTH = 0.01
-PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 @cache
@@ -43,7 +41,7 @@ def _expected() -> dict[str, object]:
 
 @cache
 def _sizes() -> list[int]:
-    """Return the resident sizes after the rounds of this process, bytes."""
+    """Return the memory after the rounds of this process, bytes."""
     return []
 
 
@@ -58,7 +56,7 @@ def check_soak(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Find
         name = chance.choice(list(calls))
         found.append(Finding("same" if same(calls[name](), expected[name]) else "mixed", name))
     gc.collect()
-    _sizes().append(int(Path("/proc/self/statm").read_text().split()[1]) * PAGE)
+    _sizes().append(_memory())
     if _handles() > handles or growth() > GROWTH:
         detail = (
             f"{_handles() - handles} descriptors, {growth():.3%} of {_sizes()[-1] / 1e6:.0f} MB"
@@ -68,13 +66,19 @@ def check_soak(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Find
 
 
 def growth() -> float:
-    """Return the growth of the resident size in the second half of the rounds, as part of it."""
+    """Return the growth of the memory in the second half of the rounds, as part of it."""
     sizes = _sizes()
     if len(sizes) < WARM:
         return 0.0
     half = sizes[len(sizes) // 2 :]
     count = len(half) // 5
     return statistics.median(half[-count:]) / statistics.median(half[:count]) - 1
+
+
+def _memory() -> int:
+    """Return the resident memory, bytes, but for pages of files, which the system drops."""
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(status.partition("RssAnon:")[2].split()[0])
 
 
 def _handles() -> int:
