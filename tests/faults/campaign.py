@@ -12,6 +12,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
+    Tries = list[tuple[int, random.Random]]
+    Check = Callable[[Tries, Path], Iterable["Finding"]]
+
 # What must never happen; every other finding is fine.
 FAULTS = ("crashed", "hung", "NaN", "lost", "mixed", "raw", "grown", "left behind", "wrong")
 # Seeds of the tries of a campaign follow each other; those of the next campaign begin here.
@@ -48,7 +51,7 @@ class Part(NamedTuple):
 
     tries: int | Callable[[], int]
     small: int
-    check: Callable[[list[tuple[int, random.Random]], Path], Iterable[Finding]]
+    check: Check
     share: int = 1
     limit: int = 300
     may_stop: bool = False
@@ -65,7 +68,7 @@ def draw(name: str, seed: int) -> tuple[int, random.Random]:
 
 def each(
     attempt: Callable[[random.Random], tuple[str, str]],
-) -> Callable[[list[tuple[int, random.Random]], Path], Iterable[Finding]]:
+) -> Check:
     """Return the check that makes one attempt after the other."""
     return lambda tries, _: (Finding(*attempt(chance)) for _, chance in tries)
 

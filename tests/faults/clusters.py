@@ -16,11 +16,10 @@ from kills import judge, prepare
 from scenarios import NEW, SCENARIOS, cluster
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Callable, Iterable
     from pathlib import Path
 
-    from campaign import Finding
+    from campaign import Finding, Tries
     from scenarios import Cluster
 
 HOST = "127.0.0.1"
@@ -111,7 +110,7 @@ TROUBLES = {
 }
 
 
-def check_clusters(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_clusters(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Let a study on a scheduler meet trouble, then go on with it in threads."""
     place = folder / "cluster"
     for number, chance in tries:

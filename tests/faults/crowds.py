@@ -24,9 +24,9 @@ from public_calls import fast_calls, quiet, same
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from campaign import Tries
     from public_calls import Calls
 
-    Tries = list[tuple[int, random.Random]]
 
 CROWD = 8
 # Ways to start what works at the same time; the last forks while threads compute.

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Iterable, Iterator
 
-    Tries = list[tuple[int, random.Random]]
+    from campaign import Tries
+
 
 INPUTS = {
     "a": "&case name = 'case' / &ball / &drop / &model /",

@@ -10,7 +10,7 @@ import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
-from campaign import Finding
+from campaign import Finding, each
 from edge_cases import LUMPED, WEIGHTS, draw_case
 from edge_comparisons import COMPARISONS, is_of_step
 from edge_laws import BALANCE, get_fault
@@ -20,16 +20,18 @@ from thud.case import case_text
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-
-def check_lumped(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Try lumped models."""
-    return [_try(chance.choices(LUMPED, WEIGHTS)[0], chance) for _, chance in tries]
+    from campaign import Check, Tries
 
 
-def check_many(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+def check_models(models: Sequence[str], weights: Sequence[int] = (1,)) -> Check:
+    """Return the check of single drops of models."""
+    return each(lambda chance: _try(chance.choices(models, weights)[0], chance))
+
+
+def check_many(tries: Tries, _: Path) -> Iterable[Finding]:
     """Try lumped models on a rigid floor by `thud.solve_many`."""
     models = LUMPED[:2]
     cases = [draw_case(chance.choices(models, WEIGHTS[:2])[0], chance, 0) for _, chance in tries]
@@ -69,16 +71,6 @@ def _many(cases: list[thud.Case]) -> Iterable[Finding]:
             yield Finding("remarked")
         else:
             yield Finding("wrong", f"{many.restitution[i]}; {case_text(case).decode().split()}")
-
-
-def check_modal(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Try the modal ball."""
-    return [_try("modal_ball", chance) for _, chance in tries]
-
-
-def check_elements(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Try finite elements, with small meshes."""
-    return [_try("finite_element", chance) for _, chance in tries]
 
 
 def _try(model: str, chance: random.Random) -> Finding:

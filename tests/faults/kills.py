@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
+    from campaign import Tries
     from forks import Done
 
-    Tries = list[tuple[int, random.Random]]
     Files = dict[str, bytes]
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)

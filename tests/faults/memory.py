@@ -12,9 +12,10 @@ from campaign import Finding
 from injection import PATIENCE, executable
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Iterable
     from pathlib import Path
+
+    from campaign import Tries
 
 HEAD = "&ball / &drop / "
 CASES = {
@@ -32,7 +33,7 @@ CASES = {
 LOADED = 80e6
 
 
-def check_memory(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_memory(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Run a case with an address space of 50 to 1000 MB."""
     for _, chance in tries:
         name = chance.choice(list(CASES))

@@ -37,11 +37,15 @@ INSERTIONS = [
     "\x1b", "\x7f", "\u2028", "\u00a0",
 ]  # fmt: skip
 # Time that an accepted case may take on average, s, and that of reading and writing one.
-MEAN_TIME, FILE_TIME = 0.005, 0.01
+MEAN_TIME, FILE_TIME = 0.006, 0.01
 # Fraction of the cases without a model, and of those over a radiator, that are computed.
 WITHOUT_MODEL, OVER_RADIATOR = 0.05, 0.2
 # Floors over which a room may be.
 RADIATORS = ("plate", "floating_floor", "joist_floor")
+# Groups that a case of their owner has.
+NEEDED = (
+    "modes", "mesh", "room", "compression", "measured_modes", "measured_mobility", "hunt_crossley",
+)  # fmt: skip
 # Samples, and elements of a mesh, up to which a case is computed.
 MANY_SAMPLES, MANY_ELEMENTS = 20_000, 64
 NO_NUMBER = re.compile(rb"(?i)(?<![a-z_])(nan|inf|infinity)(?![a-z_])|\*\*\*")
@@ -153,9 +157,8 @@ def _differing(files: dict[str, bytes]) -> list[str]:
 def _no_numbers(name: str, found: object) -> str:
     """Return the name of the first entry that is not finite."""
     if isinstance(found, dict):
-        return next(
-            (bad for key, one in found.items() if (bad := _no_numbers(f"{name}.{key}", one))), ""
-        )
+        inner = (_no_numbers(f"{name}.{key}", value) for key, value in found.items())
+        return next(filter(None, inner), "")
     if isinstance(found, bytes):
         return f"{name}: {found!r}" if NO_NUMBER.search(found) else ""
     return "" if np.isfinite(found).all() else name  # type: ignore[call-overload]
@@ -196,30 +199,15 @@ def _text(chance: random.Random) -> str:
     seen = set(groups)
     for owner in owners:
         for group in {key.group: None for key in KEYS if key.owner == owner}:
-            needed = group in (
-                "modes",
-                "mesh",
-                "room",
-                "compression",
-                "measured_modes",
-                "measured_mobility",
-                "hunt_crossley",
-            )
-            if group in seen or not (needed or chance.random() < 0.8):
+            if group in seen or not (group in NEEDED or chance.random() < 0.8):
                 continue
             seen.add(group)
-            text += _group(
-                group,
-                [key for key in KEYS if (key.owner, key.group) == (owner, group)],
-                length,
-                steady,
-                chance,
-            )
+            keys = [key for key in KEYS if (key.owner, key.group) == (owner, group)]
+            text += _group(group, keys, length, steady, chance)
     for _ in range(chance.choice([0, 0, 0, 0, 0, 1, 2])):
         at = chance.randrange(len(text) + 1)
-        text = (
-            text[:at] + chance.choice([*INSERTIONS, ""]) + text[at + chance.choice([0, 0, 1, 9]) :]
-        )
+        insertion = chance.choice([*INSERTIONS, ""])
+        text = text[:at] + insertion + text[at + chance.choice([0, 0, 1, 9]) :]
     return text
 
 

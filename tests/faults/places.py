@@ -1,12 +1,16 @@
-"""Commands with few descriptors, small files, no place to write, and clocks set back."""
+"""Commands whose calls of the system go wrong, without space or rights, and clocks set back."""
 
 from __future__ import annotations
 
+import errno
 import signal
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from forks import forks
+from forks import fail, forks
+from injection import KILLS
 from kills import judge, order, prepare
 from scenarios import OUT, SCENARIOS
 
@@ -14,15 +18,19 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
-    from campaign import Finding
-    from forks import Order
+    from campaign import Finding, Tries
+    from forks import Done, Order
 
 NAMES = [name for name, one in SCENARIOS.items() if one.weight]
+ERRORS = [str(number) for number in (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EROFS)]
+# A disk that stays full.
+FULL = f"{errno.ENOSPC} from there on"
+STEPPED = ("sweep", "zarr", "surrogate", "fit", "measure", "export")
 # Variables that say where programs keep what is no result.
 HOMES = ("HOME", "TMPDIR", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
 
-def check_places(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_places(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Run a command where something is missing, then where nothing is."""
     for number, chance in tries:
         name = NAMES[number % len(NAMES)]
@@ -88,3 +96,35 @@ KINDS = {
     "clock": _other_clock,
     "clock and kill": _interrupted,
 }
+
+
+def _run(name: str, place: Path, at: int, action: str) -> tuple[Done, list[str]]:
+    """Run a scenario whose call of that number in its directory goes wrong, none for 0."""
+    prepare(place, name, old=True)
+    return fail(order(name, place)._replace(env={"FAULT_UNDER": str(place)}), at, action)
+
+
+@cache
+def plan() -> list[tuple[str, str, int]]:
+    """Return scenario, action and number of the call."""
+    tries = []
+    with TemporaryDirectory(prefix="thud_faults_") as folder:
+        place = Path(folder, "steps")
+        for name in STEPPED:
+            calls = len(_run(name, place, 0, "")[1])
+            tries += [
+                (name, action, at + 1)
+                for action in (*KILLS, *ERRORS, FULL)
+                for at in range(0, calls, 1 + calls // 100)
+            ]
+    return tries
+
+
+def check_steps(tries: Tries, folder: Path) -> Iterable[Finding]:
+    """Let one call after the other go wrong, then run the command again."""
+    for number, _ in tries:
+        name, action, at = plan()[number % len(plan())]
+        done, calls = _run(name, folder / "steps", at, action)
+        call = calls[at - 1] if at <= len(calls) else "none"
+        what = f"{action} at {call}"
+        yield judge(name, folder / "steps", done, what, old=True, killed=action in KILLS)

@@ -138,7 +138,7 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
     """Return calls with another value each: rates, floors, recordings, cases, rooms, bands."""
 
     def rates(chance: random.Random) -> thud.Sampling:
-        return thud.Sampling(chance.uniform(16e3, 64e3), chance.uniform(0.035, 0.06))
+        return thud.Sampling(chance.uniform(16e3, 64e3), chance.uniform(0.06, 0.09))
 
     def case(chance: random.Random) -> thud.Case:
         ball = thud.Ball(wall_thickness=chance.uniform(0.02, 0.04))

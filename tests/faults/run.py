@@ -22,14 +22,14 @@ from clusters import check_clusters
 from crowds import check_crowds, check_starts, check_threads
 from directories import check_calls, check_damage, check_races
 from directories import plan as plan_calls
-from edges import check_elements, check_lumped, check_many, check_modal
+from edge_cases import LUMPED, WEIGHTS
+from edges import check_many, check_models
 from kills import check_kills, check_slow_kills
 from memory import check_memory
-from places import check_places
+from places import check_places, check_steps
+from places import plan as plan_steps
 from servers import check_explorer
 from soak import check_soak
-from steps import check_steps
-from steps import plan as plan_steps
 
 
 def parts() -> dict[str, Part]:
@@ -54,9 +54,9 @@ def parts() -> dict[str, Part]:
         "studies": Part(100_000, 60, each(study_files.attempt), limit=20, may_stop=True),
         "tables": Part(10_000, 60, each(table_files.attempt), limit=20, may_stop=True),
         "many": Part(100_000, 200, check_many, share=1000),
-        "lumped": Part(20_000, 60, check_lumped),
-        "modal": Part(10_000, 8, check_modal, limit=20, may_stop=True),
-        "elements": Part(1000, 4, check_elements, limit=15, may_stop=True),
+        "lumped": Part(20_000, 60, check_models(LUMPED, WEIGHTS)),
+        "modal": Part(10_000, 8, check_models(["modal_ball"]), limit=20, may_stop=True),
+        "elements": Part(1000, 4, check_models(["finite_element"]), limit=15, may_stop=True),
     }
 
 

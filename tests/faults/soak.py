@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Iterable
 
+    from campaign import Tries
     from public_calls import Calls
 
 # Fraction of the calls that take longer.
@@ -45,24 +46,22 @@ def _sizes() -> list[int]:
     return []
 
 
-def check_soak(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+def check_soak(tries: Tries, _: Path) -> Iterable[Finding]:
     """Make a round of calls, then look at memory and descriptors; each try is two calls."""
     fast, slow, changing = _calls()
     expected, handles = _expected(), _handles()
-    found = []
-    for _, chance in tries:
+    for place, (_, chance) in enumerate(tries, 1):
         chance.choice(list(changing.values()))(chance)
         calls = slow if chance.random() < SLOW_FRACTION else fast
         name = chance.choice(list(calls))
-        found.append(Finding("same" if same(calls[name](), expected[name]) else "mixed", name))
-    gc.collect()
-    _sizes().append(_memory())
-    if _handles() > handles or growth() > GROWTH:
-        detail = (
-            f"{_handles() - handles} descriptors, {growth():.3%} of {_sizes()[-1] / 1e6:.0f} MB"
-        )
-        found[-1] = Finding("grown", detail)
-    return found
+        found = Finding("same" if same(calls[name](), expected[name]) else "mixed", name)
+        if place == len(tries):
+            gc.collect()
+            _sizes().append(_memory())
+            if _handles() > handles or growth() > GROWTH:
+                more = f"{_handles() - handles} descriptors, {growth():.3%}"
+                found = Finding("grown", f"{more} of {_sizes()[-1] / 1e6:.0f} MB")
+        yield found
 
 
 def growth() -> float:
