@@ -103,7 +103,7 @@ def judge(  # noqa: PLR0913 - what was disturbed, and how
     name: str, place: Path, done: Done, what: str, *, old: bool, killed: bool = False
 ) -> Finding:
     """Return the finding of a command that was disturbed, after it has run again undisturbed."""
-    word = _judge_end(done, killed=killed)
+    word = judge_end(done, killed=killed)
     word = word or _judge_files(name, place, old=old, done=done.code == 0)
     again = forks().run(order(name, place))
     word, _, why = (word or _judge_again(name, place, again, old=old)).partition(": ")
@@ -111,7 +111,7 @@ def judge(  # noqa: PLR0913 - what was disturbed, and how
     return Finding(word or f"{name} {'done' if done.code == 0 else 'stopped'}", detail)
 
 
-def _judge_end(done: Done, *, killed: bool) -> str:
+def judge_end(done: Done, *, killed: bool = False) -> str:
     """Return the fault in how a command has ended, if any: a word and what it is about."""
     if done.code == -signal.SIGALRM or done.left:
         return "hung"
