@@ -522,3 +522,19 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
         answer = one.predict(case, {"height": np.array([1.0])})["restitution"]
         assert np.isfinite(answer).all() == known
         assert one.withheld == ([] if known else ["restitution"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bound": 0.0}, {"bound": -0.1}, {"peaks": 1.5}, {"identity": {}}, {"length": np.zeros(2)},
+        {"region": np.array([[1.1, 0.9], [2.0, 3.0]])}, {"length": np.ones(3)},
+        {"case": thud.Case(model=None)}, {"outputs": {"elastic_level": 5, "peak_force": 7}},
+        *({name: np.full(shape, np.nan)} for name, shape in (
+            ("points", (64, 2)), ("length", 2), ("weights", (64, 12)), ("mean", 12),
+            ("residuals", (64, 12)))),
+    ],
+)  # fmt: skip
+def test_surrogate_whose_parts_do_not_fit_is_not_whole(change: dict[str, Any]) -> None:
+    assert answering().is_whole
+    assert not replace(answering(), **change).is_whole
