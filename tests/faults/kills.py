@@ -62,15 +62,13 @@ def prepare(place: Path, name: str, *, old: bool) -> None:
 def check_kills(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Kill a command at a random time, then run it again."""
     names = [name for name, one in SCENARIOS.items() for _ in range(one.weight)]
-    for _, chance in tries:
-        yield _check(chance.choice(names), chance, folder / "kill")
+    return (_check(chance.choice(names), chance, folder / "kill") for _, chance in tries)
 
 
 def check_slow_kills(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Do the same with commands that draw, or start processes of their own."""
     names = [name for name, one in SCENARIOS.items() if not one.weight]
-    for number, chance in tries:
-        yield _check(names[number % len(names)], chance, folder / "kill")
+    return (_check(names[number % len(names)], chance, folder / "kill") for number, chance in tries)
 
 
 def _check(name: str, chance: random.Random, place: Path) -> Finding:
