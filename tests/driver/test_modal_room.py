@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 from thud.floors.modal_room import SAMPLE_RATE, fast_levels, plate_frequencies
@@ -167,14 +168,17 @@ def test_random_positions_keep_their_distance_and_are_the_same_again(impact: thu
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"balls": 0}, "balls = 0 is not allowed; allowed: whole numbers from 1"),
-        ({"balls": [[1.0, 9.0]]}, r"balls = \[1.0, 9.0\] is not allowed; allowed: 0 to 4.5"),
-        ({"microphones": [[1.0, 1.0]]}, r"microphones have the shape \(1, 2\)"),
-        ({"seed": -1}, "seed = -1"),
-        ({"floor": thud.Oscillator()}, "no plate that radiates"),
-        ({"floor": thud.Plate(thickness=2.0, length=0.5, width=0.5)}, "first natural frequency"),
-        ({"room": thud.Room(volume=1e5)}, "statistical prediction holds"),
-        ({"room": thud.Room(volume=-1.0)}, "&room: volume = -1"),
+        ({"balls": 0}, naming("balls", 0, 1)),
+        ({"balls": [[1.0, 9.0]]}, naming("balls", 9.0, 0, 4.5)),
+        ({"microphones": [[1.0, 1.0]]}, naming("microphones", "(1, 2)")),
+        ({"seed": -1}, naming("seed", -1)),
+        ({"floor": thud.Oscillator()}, naming("&floor: name", "plate")),
+        (
+            {"floor": thud.Plate(thickness=2.0, length=0.5, width=0.5)},
+            naming("floor", "25393 Hz", "400 Hz"),
+        ),
+        ({"room": thud.Room(volume=1e5)}, naming("volume", "400 Hz", 20000)),
+        ({"room": thud.Room(volume=-1.0)}, naming("&room: volume", "-1.0")),
     ],
 )
 def test_what_has_no_modal_answer_is_refused(
