@@ -193,7 +193,7 @@ def test_screen_that_takes_nothing_is_told_in_one_sentence(
     )
     assert (tmp_path / "code").read_text() == "1\n"
     errors = (tmp_path / "errors").read_text()
-    assert errors.count("thud-driver: standard output: ") == 1
+    assert errors.count("standard output") == 1
     assert "Traceback" not in errors
     assert "ignored" not in errors
 

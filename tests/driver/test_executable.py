@@ -293,7 +293,8 @@ def test_interrupted_run_says_so(
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)
         said = process.communicate()[1]
-    assert said == ("" if ignored else "thud: interrupted; nothing was written\n")
+    assert ("interrupted" in said) != ignored
+    assert said.count("\n") == (0 if ignored else 1)
     assert process.returncode == (0 if ignored else 130)
     assert (tmp_path / "outputs/case").exists() == ignored
 

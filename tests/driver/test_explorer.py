@@ -181,7 +181,7 @@ def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> N
     assert ["restitution", None, ""] in report["answer"]["numbers"]
     remarks = report["answer"]["remarks"]
     # The page puts the name before them.
-    assert any(remark.startswith("the force rings on") for remark in remarks)
+    assert any("ring" in remark for remark in remarks)
 
 
 @pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])

@@ -157,7 +157,7 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
     soundfile.write(tmp_path / "lost.wav", values, rate, "PCM_24")
     whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "lost.wav", tmp_path)
     np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
-    assert any("1 dropouts of 0.125 ms" in step for step in filled.steps)
+    assert any(re.search(naming("dropout", "0.125 ms"), step) for step in filled.steps)
     assert any("dropout" in remark for remark in filled.remarks)
     assert not any("dropout" in remark for remark in whole.remarks)
 
@@ -300,7 +300,7 @@ def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> Non
             check=False,
         )
     assert done.returncode == 1
-    assert done.stderr.count("standard output: ") == 1
+    assert done.stderr.count("standard output") == 1
     assert (tmp_path / "out/report.json").exists()
 
 
@@ -427,9 +427,9 @@ def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> No
     drop = found.drops[0]
     np.testing.assert_array_equal(found.levels(), measure_levels([drop], low_pass=True)[0].level)
     assert not np.array_equal(found.levels(), usual.levels())
-    assert any("low-pass, -3 dB at 1.25 kHz" in step for step in found.steps)
+    assert any(re.search(naming("low-pass", "1.25 kHz"), step) for step in found.steps)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
-    told = [remark for remark in found.remarks if remark.startswith("force plate: ")]
+    told = [remark for remark in found.remarks if "force plate" in remark]
     assert len(told) == 2
     assert "0.2 Hz" in told[0]
     assert "4000 N" in told[1]
@@ -450,6 +450,6 @@ def test_calibration_record_gives_lines_of_a_configuration(
     assert found["calibration_uncertainty"] == pytest.approx(0.002, rel=0.05)
     assert not said.err
     assert cli.main(arguments) == 0
-    assert "not counted" in capsys.readouterr().err
+    assert "uncertainty" in capsys.readouterr().err
     assert cli.main(arguments[:2]) == 1
     assert re.search(naming("force", "mass"), capsys.readouterr().err)

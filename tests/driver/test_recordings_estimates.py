@@ -75,7 +75,7 @@ def test_offset_of_12_n_does_not_stretch_the_contact(finite_elements: thud.Impac
     force, _ = make_recording(pulse(finite_elements), rate, offset=12.0)
     (drop,) = drops(force, rate)
     assert drop.contact_time.value == pytest.approx(finite_elements.measured_contact_time, abs=1e-4)
-    assert "an offset of 12 N was removed" in drop.steps
+    assert any(re.search(naming("offset", "12 N"), step) for step in drop.steps)
 
 
 @pytest.mark.parametrize("gap", [0.03, 0.1, 3.0])
@@ -292,7 +292,7 @@ def test_hum_and_drift_are_named_and_removed() -> None:
     )  # fmt: skip
     (drop,) = drops(force, 48e3)
     told = " ".join(drop.steps)
-    assert "hum of 60 Hz" in told
+    assert "60 Hz" in told
     assert "drift" in told
     np.testing.assert_allclose(levels(drop)[:3], ORACLE[:3], rtol=0, atol=0.05)
     assert drop.impulse.value == pytest.approx(clean.sum() / 48e3, rel=2e-3)

@@ -364,7 +364,7 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
     # Of 1764 times rounded to 1 us the slope is off by 1e-6 sqrt(1 / 1764**3) steps and more.
     assert signal.sample_rate == pytest.approx(44100, rel=4e-6)
     (step,) = signal.steps
-    assert step.startswith("The times, rounded to 1e-06 s, were replaced by an even grid of 44")
+    assert re.search(naming("times", "1e-06 s"), step)
 
 
 def test_date_of_a_broadcast_file(tmp_path: Path) -> None:
@@ -752,7 +752,8 @@ def test_files_that_change_are_told(tmp_path: Path) -> None:
 def test_missing_packages_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_pulse(tmp_path, "plate.tdms")
     monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
-    assert re.search(naming("plate.tdms", "nptdms"), refusal(path))
+    with pytest.raises(InputError, match=naming("TDMS", "nptdms", "pip install")):
+        open_signals(path)
 
 
 # --- the examples
@@ -796,7 +797,7 @@ def test_arrays_are_signals() -> None:
     assert (signal.name, signal.n_sample, signal.full_scale) == ("model", 3, None)
     assert signal.checksum == Signal.from_array([0, 1, 2], 8000).checksum
     for force, rate in (([[1.0]], 8000), ([np.nan], 8000), ([1.0], 0), ([1.0], np.inf), (["a"], 1)):
-        with pytest.raises(InputError, match="force" if rate == 8000 else "force|rate"):
+        with pytest.raises(InputError, match="recording|sample_rate"):
             Signal.from_array(force, rate)
 
 
