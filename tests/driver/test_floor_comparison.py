@@ -64,7 +64,7 @@ def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
 
 
 def test_tapping_machine_refuses_what_is_no_concrete_plate() -> None:
-    with pytest.raises(thud.InputError, match=naming("density", 500)):
+    with pytest.raises(thud.InputError, match=naming("density", 7, 1.21, 1.92)):
         thud.tapping_level(thud.Plate(density=500.0))
     with pytest.raises(thud.InputError, match=naming("Oscillator", "Plate")):
         thud.tapping_level(thud.Oscillator())  # type: ignore[arg-type]
@@ -115,7 +115,7 @@ def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[st
     bare = tmp_path / "bare.nml"
     bare.write_text("&ball /\n&drop /\n&model /\n", encoding="utf-8")
     assert main(["floor", str(bare), "-o", str(tmp_path / "none")]) == 1
-    assert str(bare) in capsys.readouterr().err
+    assert "bare" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
 
 

@@ -129,7 +129,7 @@ def test_other_universal_files_are_refused(
         (FREQUENCY[:1], MOBILITY[:1], naming(1, "0 Hz")),
         (FREQUENCY, MOBILITY[:5], naming(300, 5)),
         (-FREQUENCY[::-1], MOBILITY, naming("line 1", "Hz")),
-        (1e5 * FREQUENCY, MOBILITY, naming("frequency", "1.0e7 Hz")),
+        (1e5 * FREQUENCY, MOBILITY, naming("pole_frequency", "1.0e7 Hz")),
     ],
 )
 def test_tables_of_no_floor_are_refused(

@@ -99,7 +99,7 @@ def test_results_are_kept_where_no_set_has_any(run: Run, case: Path, tmp_path: P
     case.write_text(CASE.replace("2.45", "-1"))
     result = run(case, "--sets", "table.csv", "-o", "out", "-q", "--check")
     assert result.returncode == 1
-    assert re.search(naming(case, 2, "&ball: mass", -1.0), result.stderr)
+    assert re.search(naming("table.csv", 2, "&ball: mass", -1.0), result.stderr)
     assert (tmp_path / "out/sets.csv").read_bytes() == before
 
 
