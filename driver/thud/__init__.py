@@ -184,9 +184,11 @@ def __dir__() -> list[str]:
 def _maker(module: str, function: str) -> Callable[..., object]:
     """Return a function of a module that is imported at first use."""
 
-    def make(*arguments: object) -> object:
+    def make(*arguments: object, **keywords: object) -> object:
         with require_extra("studies"):
-            return getattr(importlib.import_module(f"thud.{module}"), function)(*arguments)
+            return getattr(importlib.import_module(f"thud.{module}"), function)(
+                *arguments, **keywords
+            )
 
     return make
 
@@ -203,7 +205,7 @@ MAKERS.update(
     recording=_maker("plot.recording", "recording_figure"),
     floors=_maker("plot.floors", "draw_floors"),
     floors_html=_maker("plot.floors", "floors_html"),
-    save_page=_maker("plot.look", "save_page"),
+    page_files=_maker("plot.look", "page_files"),
     modal_room=_maker("plot.modal_room", "draw_modal_room"),
     mobility_fit=_maker("plot.mobility_fit", "mobility_fit"),
     prediction=_maker("plot.prediction", "draw_prediction"),

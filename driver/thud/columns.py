@@ -101,6 +101,8 @@ def read_titled(
         # A header may be in another encoding than UTF-8.
         with Path(path).open(encoding="utf-8-sig", errors="replace") as text:
             lines = [strip_comment(line) for line in read_lines(text, str(path), allowed)]
+    except InputError:  # is a ValueError
+        raise
     except (OSError, ValueError) as error:
         message = f"{path}: cannot be read ({error}); allowed: {allowed}"
         raise InputError(message) from error

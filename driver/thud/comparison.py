@@ -18,12 +18,13 @@ from thud.case import Case, read_case
 from thud.checks import refuse, refuse_value, require_choice, require_kind
 from thud.display import Displayed
 from thud.errors import InputError, PlausibilityWarning, ThudError
+from thud.files import Results
 from thud.impact import FORCES, Impact, compute
 from thud.levels import SOURCES, get_bands
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 from thud.plot.levels import common_source
-from thud.plot.look import save_page
+from thud.plot.look import page_files
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 
@@ -119,15 +120,23 @@ class Comparison(Displayed):
         """Return the page as self-contained HTML with interactive plots."""
         return comparison_html(self.impacts, self.force, self.source, self.table())
 
-    def save(self, directory: str | os.PathLike[str]) -> list[Path]:
-        """Write ``comparison.png``, ``.svg`` and ``.html`` and return their paths.
+    def files(self) -> dict[str, bytes]:
+        """Return ``comparison.png``, ``.svg`` and ``.html`` by name."""
+        return page_files("comparison", self.figure, self.html())
+
+    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
+        """Write the files of `files` and return their paths.
+
+        Files that thud has not written are replaced with `replace` only.
 
         Raises
         ------
+        InputError
+            Where a file is in the way.
         OSError
             Where they cannot be written.
         """
-        return save_page("comparison", self.figure, self.html(), directory)
+        return Results(Path(directory), "compare", replace=replace).write(self.files())
 
 
 def _digits(force: float) -> str:

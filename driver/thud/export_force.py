@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
+import os
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from thud._api import version
 from thud.case import case_text
 from thud.checks import refuse, refuse_value, require_kind, require_number, require_whole
-from thud.files import replace_file
+from thud.files import content_of, refuse_foreign, replace_file
 from thud.immutable import Immutable
 from thud.impact import Impact
 from thud.levels import RECORDED_BAND
@@ -24,8 +25,6 @@ from thud.recordings.channel import library
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
-    import os
-
     from numpy.typing import NDArray
 
 KINDS = {
@@ -41,6 +40,8 @@ CONVENTION = (
 RATES = (2500.0, 1e6)
 LARGEST_RATIO = 1000
 REACH = 10
+# Begin of the last line of what another reader has to know.
+NOTE_END = "Written by thud "
 # Length of the lines of a universal file and of its names.
 UFF_LINE = 80
 UFF_NAME = 10
@@ -109,7 +110,7 @@ class BlockedForce(Immutable):
             f"Origin: {self.origin}",
             f"SHA-256: {self.checksum}",
             *self.remarks,
-            f"Written by thud {version()}",
+            f"{NOTE_END}{version()}",
         )
         # Names of files may not be UTF-8, and words of a laboratory have several lines.
         texts = (line.encode("utf-8", "replace").decode() for line in lines)
@@ -209,8 +210,8 @@ def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
     return replace(found, remarks=(*given.remarks, told))
 
 
-def export_wav(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a WAV file of 32-bit floats, and a text file beside it with what WAV cannot tell.
+def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a WAV file of 32-bit floats, and a text file beside it with what WAV cannot tell.
 
     The samples are fractions of full scale. A full scale is a power of two in newtons, so that
     scaling costs no digit; it stands in the comment of the file and in the text.
@@ -236,22 +237,18 @@ def export_wav(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
     ) as file:
         file.comment = "; ".join(words)
         file.write((force.force / scale).astype(np.float32))
-    note = Path(f"{path}.txt")
-    replace_file(path, content.getvalue())
-    replace_file(note, _lines(words))
-    return [Path(path), note]
+    return {path: content.getvalue(), f"{path}.txt": _lines(words)}
 
 
-def export_csv(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a table of time, s, and force, N, each with all its digits."""
+def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a table of time, s, and force, N, each with all its digits."""
     head = [*(f"# {line}" for line in force.words()), "time_s,force_N"]
     rows = zip(force.time.tolist(), force.force.tolist(), strict=True)
-    replace_file(path, _lines([*head, *(f"{time!r},{value!r}" for time, value in rows)]))
-    return [Path(path)]
+    return {path: _lines([*head, *(f"{time!r},{value!r}" for time, value in rows)])}
 
 
-def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a universal file, data set 58 in text: a time response, excitation force, N.
+def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a universal file, data set 58 in text: a time response, excitation force, N.
 
     The format holds 12 digits of the force and 6 of the time step.
     """
@@ -288,12 +285,11 @@ def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
     with TemporaryDirectory() as folder:
         file = Path(folder, "force.uff")
         pyuff.UFF(str(file)).write_sets([data_set], "overwrite")
-        replace_file(path, file.read_bytes())
-    return [Path(path)]
+        return {path: file.read_bytes()}
 
 
-def export_mat(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a MATLAB file, version 5: time, force, spectrum and what they are."""
+def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a MATLAB file, version 5: time, force, spectrum and what they are."""
     import scipy.io  # noqa: PLC0415 - takes its time
 
     frequency, spectrum = force.spectrum()
@@ -310,12 +306,11 @@ def export_mat(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
         },
         oned_as="column",
     )
-    replace_file(path, content.getvalue())
-    return [Path(path)]
+    return {path: content.getvalue()}
 
 
-def export_spectrum(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
-    """Write a table of the complex spectrum; see `BlockedForce.spectrum`."""
+def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a table of the complex spectrum; see `BlockedForce.spectrum`."""
     frequency, spectrum = force.spectrum()
     table = np.column_stack(
         [frequency, spectrum.real, spectrum.imag, np.abs(spectrum), np.angle(spectrum)]
@@ -324,18 +319,75 @@ def export_spectrum(force: BlockedForce, path: str | os.PathLike[str]) -> list[P
         *(f"# {line}" for line in (*force.words(), f"Spectrum: {CONVENTION}")),
         "frequency_Hz,real_Ns,imaginary_Ns,magnitude_Ns,phase_rad",
     ]
-    replace_file(path, _lines([*head, *(",".join(map(repr, row)) for row in table.tolist())]))
-    return [Path(path)]
+    return {path: _lines([*head, *(",".join(map(repr, row)) for row in table.tolist())])}
 
 
-# By option of the command: ending of the name of the file, and function.
+# By option of the command: ending of the name of the file, and what makes its content.
 EXPORTS = {
-    "wav": (".wav", export_wav),
-    "csv": (".csv", export_csv),
-    "uff": (".uff", export_uff),
-    "mat": (".mat", export_mat),
-    "spectrum": ("_spectrum.csv", export_spectrum),
+    "wav": (".wav", wav_files),
+    "csv": (".csv", csv_files),
+    "uff": (".uff", uff_files),
+    "mat": (".mat", mat_files),
+    "spectrum": ("_spectrum.csv", spectrum_files),
 }
+
+
+def export_wav(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a WAV file, and a text file beside it; see `wav_files` and `export`."""
+    return export("wav", force, path)
+
+
+def export_csv(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a table of time and force; see `csv_files` and `export`."""
+    return export("csv", force, path)
+
+
+def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a universal file; see `uff_files` and `export`."""
+    return export("uff", force, path)
+
+
+def export_mat(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a MATLAB file; see `mat_files` and `export`."""
+    return export("mat", force, path)
+
+
+def export_spectrum(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a table of the complex spectrum; see `spectrum_files` and `export`."""
+    return export("spectrum", force, path)
+
+
+def export(kind: str, force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a force to the file of a path, which is replaced if it exists.
+
+    Parameters
+    ----------
+    kind
+        Format, one of ``EXPORTS``.
+    force
+        The force.
+    path
+        Path of the file.
+
+    Raises
+    ------
+    InputError
+        Where the format cannot hold the force, the file is the recording of the force, or the text
+        beside a WAV file would replace one that is not of thud.
+    OSError
+        Where a file cannot be written.
+    """
+    _, make = EXPORTS[kind]
+    contents = make(force, os.fspath(path))
+    for place in map(Path, contents):
+        known = content_of(place.resolve())
+        if known is not None and hashlib.sha256(known).hexdigest() == force.checksum:
+            refuse(f"{place} is the recording of the force", "another path")
+        if known is not None and place != Path(path) and NOTE_END.encode() not in known:
+            refuse_foreign(place)
+    for name, content in contents.items():
+        replace_file(name, content)
+    return [Path(name) for name in contents]
 
 
 def _lines(lines: list[str] | tuple[str, ...]) -> bytes:

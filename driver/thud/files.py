@@ -1,4 +1,4 @@
-"""Atomic writes, and locks of directories that one run at a time may write to."""
+"""Files of results: written atomically, under locks, and never over those of the user."""
 
 from __future__ import annotations
 
@@ -9,21 +9,26 @@ import platform
 import secrets
 import shutil
 import signal
+import stat
 import threading
 import time
 import warnings
-from contextlib import contextmanager, suppress
+import zlib
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
 
+from thud.checks import refuse
 from thud.errors import InputError, LockWarning
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
-# Lists the files of a result directory that runs may replace, and the checksums of some.
+# Lists the files that thud has written to a directory; its first line.
 MANIFEST = ".thud"
-# Temporary name of a file in a result directory; listed too, so that it is removed after a kill.
+HEAD = "# files that thud has written, with checksums (CRC-32)"
+# Temporary name of a file in a result directory.
 PART = ".thud.new"
 # Age at which a temporary file of another host is no longer being written, s.
 _MAX_AGE = 86400.0
@@ -91,54 +96,237 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
     """Write a file atomically, also over an existing one; an OSError names the path."""
     try:
         target = Path(path)
+        if target.exists():
+            _require_regular(target.stat(), target)
         _replace(target, content, target.with_name(f".{target.name}.part"))
     except ValueError as error:  # a path that no file system can hold
         message = f"{path!r} is not allowed; allowed: the path of a file"
         raise InputError(message) from error
 
 
-def add_files(
-    directory: str | os.PathLike[str], files: Mapping[str, bytes], marker: bytes | None = None
-) -> None:
-    """Add files, such as figures, to the results of a run.
+@dataclass(frozen=True)
+class Results:
+    """A directory for results, in which thud replaces only files that it has written itself.
 
-    Contents are given by name; existing files are replaced. A later run of another input in the
-    same directory removes them. The marker is the content of the file that identifies the results,
-    ``effective.nml`` or ``sets.nml``; raise InputError where another run has replaced them since.
+    The manifest of the directory lists these with their checksums: a file that is not listed, or
+    that has changed since, is the user's, and so is whatever is no regular file.
+
+    Attributes
+    ----------
+    folder : Path
+        The directory, made where it is needed.
+    command : str
+        The command that writes; empty for the results of a case and their figures, which the next
+        input replaces as a whole.
+    inputs : tuple of path-like
+        Files that the results depend on, which are never replaced.
+    replace : bool
+        Replace also files that thud has not written.
+    is_locked : bool
+        The caller holds the lock of the directory.
     """
-    if not files:
-        return
-    folder = Path(directory)
-    with locked(folder):
-        if marker is not None and marker not in _markers(folder):
-            message = f"{folder} now holds results of another input; allowed: run the case again"
-            raise InputError(message)
-        listed = read_manifest(folder) | dict.fromkeys([PART, *files], "")
-        # Written first: a file that is not listed counts as the user's.
-        lines = [f"{name}\t{checksum}".rstrip() for name, checksum in sorted(listed.items())]
-        manifest = "\n".join([*lines, ""]).encode("utf-8", "surrogateescape")
-        for name, content in {MANIFEST: manifest, **files}.items():
-            _replace(folder / name, content, folder / PART)
+
+    folder: Path
+    command: str = ""
+    inputs: tuple[str | os.PathLike[str], ...] = ()
+    replace: bool = False
+    is_locked: bool = False
+
+    def require(self, names: Iterable[str]) -> None:
+        """Raise InputError where a file is in the way that must not be replaced."""
+        self._require(dict.fromkeys(names), self._listed())
+
+    def write(
+        self, contents: Mapping[str, bytes], stale: Iterable[str] = (), marker: bytes | None = None
+    ) -> list[Path]:
+        """Write files by name; return their paths.
+
+        Parameters
+        ----------
+        contents
+            Contents of the files.
+        stale
+            Names of files that are removed where an earlier call has written them and this one
+            does not.
+        marker
+            Content of the file that identifies the results of a case, ``effective.nml`` or
+            ``sets.nml``, where the files belong to these results.
+
+        Raises
+        ------
+        InputError
+            Where a file is in the way, or another run has replaced the results of the case.
+        OSError
+            Where a file cannot be written.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with nullcontext() if self.is_locked else locked(self.folder):
+            if marker is not None and marker not in _markers(self.folder):
+                refuse(f"{self.folder} now holds results of another input", "run the case again")
+            listed = self._listed()
+            self._require(contents, listed)
+            gone = [
+                n
+                for n in {*stale} - {*contents}
+                if _is_listed(self.folder / n, listed) and listed[n].command == self.command
+            ]
+            if not contents and not gone:
+                return []
+            new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
+            # Whatever of both contents a killed writer leaves is listed.
+            both = {
+                n: Entry((*listed[n].checksums, *e.checksums), e.command) if n in listed else e
+                for n, e in new.items()
+            }
+            self._put({MANIFEST: _manifest(listed | both), **contents})
+            for name in gone:
+                (self.folder / name).unlink()
+            after = {name: e for name, e in (listed | new).items() if name not in gone}
+            if after:
+                self._put({MANIFEST: _manifest(after)})
+            else:
+                (self.folder / MANIFEST).unlink()
+        return [self.folder / name for name in contents]
+
+    def _put(self, contents: Mapping[str, bytes]) -> None:
+        for name, content in contents.items():
+            _replace(self.folder / name, content, self.folder / PART)
+
+    def _listed(self) -> dict[str, Entry]:
+        try:
+            return read_manifest(self.folder)
+        except InputError:
+            if not self.replace or (self.folder / MANIFEST).is_dir():
+                raise
+            return {}
+
+    def _require(self, contents: Mapping[str, bytes | None], listed: Mapping[str, Entry]) -> None:
+        """Raise InputError where a file is in the way of one of a name and a content."""
+        for name, content in contents.items():
+            path = self.folder / name
+            if not os.path.lexists(path):
+                continue
+            self.require_no_input(path)
+            if path.is_dir() and not path.is_symlink():
+                refuse(f"{path} is a directory", "another directory for the results")
+            same = content is not None and content_of(path) == content
+            if not (self.replace or same or _is_listed(path, listed)):
+                refuse_foreign(path)
+
+    def require_no_input(self, path: Path) -> None:
+        """Raise InputError where a path is that of an input."""
+        if is_one_of(path, self.inputs):
+            refuse(f"{path} is an input, which is never replaced", "another directory")
 
 
-def read_manifest(folder: Path) -> dict[str, str]:
-    """Return the checksums of the files of a result directory by name, "" where not known.
+class Entry(NamedTuple):
+    """What a manifest says of a file: the checksums that it may have, and what has written it."""
 
-    They are CRC-32 in hexadecimal digits. Without a manifest there are none.
+    checksums: tuple[str, ...]
+    command: str = ""
+
+
+def refuse_foreign(path: Path) -> NoReturn:
+    """Raise InputError of a file that thud has not written."""
+    refuse(
+        f"{path} is in the way: thud has not written it, or it has changed since",
+        "another directory, or --replace (replace=True) to replace it",
+    )
+
+
+def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
+    """Whether a path leads to one of some files, whatever their names are."""
+    for other in others:
+        with suppress(OSError, ValueError):
+            if path.samefile(other):
+                return True
+    return False
+
+
+def is_regular(path: Path) -> bool:
+    """Whether a path is that of a regular file and no link; to open anything else could block."""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def read_input(path: Path) -> bytes:
+    """Return the content of an input; raise OSError where it is no regular file."""
+    _require_regular(path.stat(), path)
+    return path.read_bytes()
+
+
+def _require_own(found: os.stat_result, part: Path) -> None:
+    _require_regular(found, part)
+    # It would be written to under its other name, too.
+    if found.st_nlink > 1:
+        raise OSError(errno.EEXIST, f"{part.name} is a link", str(part))
+
+
+def _require_regular(found: os.stat_result, path: Path) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
+
+
+def content_of(path: Path) -> bytes | None:
+    """Return the content of a regular file, None of anything else."""
+    with suppress(OSError):
+        return path.read_bytes() if is_regular(path) else None
+    return None
+
+
+def checksum(content: bytes) -> str:
+    """Return the checksum of a content as manifests hold it: CRC-32 in hexadecimal digits."""
+    return f"{zlib.crc32(content):08X}"
+
+
+def read_manifest(folder: Path) -> dict[str, Entry]:
+    """Return what the manifest of a directory lists by name, nothing where there is none.
+
+    The last checksum of a file is that of its latest content.
+
+    Raises
+    ------
+    InputError
+        Where there is something else of its name.
     """
-    listed: dict[str, str] = {}
-    with suppress(FileNotFoundError):
-        for line in (folder / MANIFEST).read_text("utf-8", "surrogateescape").splitlines():
-            name, _, checksum = line.partition("\t")
-            listed[name] = checksum or listed.get(name, "")
+    path = folder / MANIFEST
+    if not os.path.lexists(path):
+        return {}
+    content = content_of(path)
+    head, *lines = (content or b"").decode("utf-8", "surrogateescape").split("\n")
+    if head != HEAD:
+        refuse_foreign(path)
+    listed: dict[str, Entry] = {}
+    for line in lines:
+        name, sums, command = [*line.split("\t"), "", ""][:3]
+        known = listed[name].checksums if name in listed else ()
+        if sums:
+            listed[name] = Entry((*known, sums), command)
     return listed
+
+
+def _manifest(listed: Mapping[str, Entry]) -> bytes:
+    lines = [
+        f"{name}\t{one}\t{entry.command}".rstrip("\t")
+        for name, entry in sorted(listed.items())
+        for one in entry.checksums
+    ]
+    return "\n".join([HEAD, *lines, ""]).encode("utf-8", "surrogateescape")
+
+
+def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
+    """Whether thud has written a file."""
+    content = content_of(path) if path.name in listed else None
+    return content is not None and checksum(content) in listed[path.name].checksums
 
 
 def _markers(folder: Path) -> Iterator[bytes]:
     """Yield the contents of the files that identify the results of a directory."""
     for name in ("effective.nml", "sets.nml"):
-        with suppress(OSError):
-            yield (folder / name).read_bytes()
+        if (content := content_of(folder / name)) is not None:
+            yield content
 
 
 @contextmanager
@@ -219,11 +407,10 @@ def _replace(target: Path, content: bytes, part: Path) -> None:
     killed one leaves is taken up by the next.
     """
     try:
-        if target.is_dir():
-            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
-        # A link of this name may be another user's, to a file of ours.
-        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW
+        # A link of this name may be another user's, to a file of ours; to open a pipe could block.
+        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
         with _held(part, flags, fcntl.LOCK_EX) as (own, descriptor, _):
+            _require_own(os.fstat(descriptor), own)
             try:
                 # Closed before it is renamed: some disks are found to be full only then.
                 with os.fdopen(os.dup(descriptor), "wb") as file:

@@ -6,7 +6,6 @@ import base64
 import fcntl
 import re
 import warnings
-import zlib
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from thud._schema import SCALARS
 from thud.case import Case
 from thud.checks import refuse, shown
 from thud.errors import PlausibilityWarning, ThudError
-from thud.files import MANIFEST, locked, read_manifest
+from thud.files import MANIFEST, checksum, locked, read_input, read_manifest
 from thud.floor_impact import FloorImpact
 from thud.impact import Impact
 from thud.motion import Motion
@@ -82,11 +81,11 @@ class _Files:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self.checksums = read_manifest(folder)
+        self.listed = read_manifest(folder)
 
     def __contains__(self, name: str) -> bool:
         """Return whether a file is part of the results."""
-        return bool(self.checksums.get(name)) if self.checksums else (self.folder / name).exists()
+        return name in self.listed if self.listed else (self.folder / name).exists()
 
     def read(self, name: str) -> str:
         """Return the text of a file; raise InputError where the run has not written it."""
@@ -95,8 +94,9 @@ class _Files:
                 f"{self.folder}: {shown(name)} is named as a file of it",
                 "names without directories",
             )
-        content = (self.folder / name).read_bytes()
-        if self.checksums and f"{zlib.crc32(content):08X}" != self.checksums.get(name):
+        content = read_input(self.folder / name)
+        known = self.listed[name].checksums if name in self.listed else ("",)
+        if self.listed and checksum(content) != known[-1]:
             refuse(
                 f"{self.folder / name} is not as the run has written it",
                 "results of one run; run the case again",
@@ -112,7 +112,7 @@ def _new_impact(files: _Files) -> Impact:
         numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
     remarks = _texts(numbers.get("remarks", {}).get("remark", []))
-    if not files.checksums:
+    if not files.listed:
         remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
         warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
         remarks += (remark,)

@@ -6,6 +6,7 @@ their sentence from the first moment, while the rest is imported, too.
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sys
@@ -16,10 +17,13 @@ from threading import Thread, main_thread
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from io import TextIOWrapper
     from types import FrameType, TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+# Errors of a screen that nobody reads: its pipe or its descriptor is closed.
+_CLOSED = frozenset({errno.EPIPE, errno.EBADF})
 # Time in which another signal is a copy of the first: some callers send it to process and group, s.
 _COPIES = 1.0
 # Time between two attempts to interrupt, and time after which an import is not waited for, s.
@@ -140,26 +144,36 @@ def _open_screen() -> None:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_WRONLY if number == 0 else os.O_RDONLY)
-    sys.stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
+    stdout = sys.stdout or os.fdopen(1, "w", closefd=False)
     # Names may hold letters that the encoding of the screen lacks.
-    cast("TextIOWrapper", sys.stdout).reconfigure(errors="backslashreplace")
-    sys.stderr = cast("TextIO", _Lossy(sys.stderr or os.fdopen(2, "w", closefd=False)))
+    cast("TextIOWrapper", stdout).reconfigure(errors="backslashreplace")
+    sys.stdout = cast("TextIO", _Screen(stdout, _CLOSED))
+    stderr = sys.stderr or os.fdopen(2, "w", closefd=False)
+    sys.stderr = cast("TextIO", _Screen(stderr, frozenset(errno.errorcode)))
 
 
-class _Lossy:
-    """Standard error; what it cannot take is lost, and the work goes on."""
+class _Screen:
+    """Standard output or error; where it cannot write for one of some reasons, the text is lost."""
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO, reasons: frozenset[int]) -> None:
         self._stream = stream
+        self._reasons = reasons
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever the stream has
         return getattr(self._stream, name)
 
     def write(self, text: str) -> int:
-        with suppress(OSError):
-            self._stream.write(text)
+        self._try(lambda: self._stream.write(text))
         return len(text)
 
     def flush(self) -> None:
-        with suppress(OSError):
-            self._stream.flush()
+        self._try(self._stream.flush)
+
+    def _try(self, act: Callable[[], object]) -> None:
+        try:
+            act()
+        except OSError as error:
+            if error.errno not in self._reasons:
+                raise
+            # What is still buffered goes there, too.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())

@@ -12,7 +12,7 @@ module thud_command_line
    use thud_schema, only: get_schema
    use thud_sets_run, only: run_sets
    use thud_suggestion, only: get_suggestion
-   use thud_system, only: get_system_message, prepare_process, standard_error, standard_output, write_text
+   use thud_system, only: get_system_message, is_closed, prepare_process, standard_error, standard_output, write_text
    use thud_text, only: newline, quoted
    implicit none (type, external)
    private
@@ -30,8 +30,8 @@ module thud_command_line
    real(wp), parameter :: blas_memory = 160.0e6_wp
 
    !> Options by their long names.
-   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--sets', '--threads', '--check', &
-      '--quiet', '--keys', '--schema', '--help', '--version']
+   character(len=*), parameter :: known_options(*) = [character(len=9) :: '--output', '--replace', '--sets', '--threads', &
+      '--check', '--quiet', '--keys', '--schema', '--help', '--version']
 
    !> What the command line asks for.
    type :: request_type
@@ -39,6 +39,8 @@ module thud_command_line
       character(len=:), allocatable :: case_file
       !> Output directory, empty where not given.
       character(len=:), allocatable :: output
+      !> Replace also files that thud has not written.
+      logical :: replace = .false.
       !> Path of a table of sets, empty where not given.
       character(len=:), allocatable :: sets
       !> Threads for them.
@@ -79,9 +81,9 @@ contains
          if (allocated(error)) then
             continue
          else if (request%sets == '') then
-            call run_case(request%case_file, request%output, case, results, outcome, error)
+            call run_case(request%case_file, request%output, request%replace, case, results, outcome, error)
          else
-            call run_sets(request%case_file, request%sets, request%threads, request%output, outcome, error)
+            call run_sets(request%case_file, request%sets, request%threads, request%output, request%replace, outcome, error)
          end if
          call end_progress()
          if (allocated(error)) then
@@ -98,7 +100,7 @@ contains
       end if
    end subroutine execute
 
-   !> Writes to the screen; a closed or full output is an error.
+   !> Writes to the screen; a full output is an error, and one that nobody reads is none.
    subroutine write_line(descriptor, text, exit_code)
       !> `standard_output` or `standard_error`.
       integer, intent(in) :: descriptor
@@ -108,10 +110,10 @@ contains
       integer :: status
 
       call write_text(descriptor, text//newline, status)
-      if (status == 0) return
+      if (status == 0 .or. is_closed(status)) return
       exit_code = bad_input
       if (descriptor == standard_output) call write_text(standard_error, 'thud: standard output cannot be written (' &
-         //get_system_message(status)//'); allowed: a screen, a pipe that is read, or a disk with space'//newline, status)
+         //get_system_message(status)//'); allowed: a screen, a pipe, or a disk with space'//newline, status)
    end subroutine write_line
 
    !> Makes a request of the arguments.
@@ -140,6 +142,8 @@ contains
          case ('--schema')
             call get_schema(request%information)
             return
+         case ('--replace')
+            request%replace = .true.
          case ('--check')
             request%check = .true.
          case ('--quiet', '-q')
@@ -155,7 +159,7 @@ contains
             if (index(argument, '-') == 1) then
                call get_suggestion(argument, known_options, suggestion)
                error = input_error(quoted(argument)//' is not a known option'//suggestion//'; allowed: --output DIR, ' &
-                  //'--sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
+                  //'--replace, --sets TABLE, --threads N, --check, --quiet, --keys, --schema, --help, --version')
             else if (allocated(request%case_file)) then
                error = input_error(quoted(argument)//' is a second case; allowed: one')
             else
@@ -218,8 +222,8 @@ contains
    pure function usage() result(text)
       character(len=:), allocatable :: text
 
-      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--check] [--quiet] | --keys | --schema | ' &
-         //'--help | --version'
+      text = 'thud CASE.nml [--sets TABLE.csv [--threads N]] [--output DIR] [--replace] [--check] [--quiet] | ' &
+         //'--keys | --schema | --help | --version'
    end function usage
 
    !> The help text.
@@ -231,6 +235,7 @@ contains
          //newline//'Usage: '//usage()//newline//newline &
          //'  CASE.nml           input, a namelist file; inputs/ holds examples'//newline &
          //'  -o, --output DIR   directory for the results (default: outputs/<case>, of sets <case>_sets)'//newline &
+         //'  --replace          replace also files that thud has not written'//newline &
          //'  --sets TABLE.csv   many drops: keys in the first line, one drop in each other; the rest is as in'//newline &
          //'                     CASE.nml'//newline &
          //'  --threads N        threads for them (default: 1)'//newline &

@@ -1,7 +1,7 @@
 !> Computes a case: free modes, slow compression, the force history of its model, levels and verdict. It knows no files.
 module thud_compute
    use thud_band, only: band_type, get_level_bands, octave_count
-   use thud_case, only: case_type, get_floor_number, get_model_number
+   use thud_case, only: case_type, check_case, get_floor_number, get_model_number
    use thud_compression, only: compression_type, get_deflections, get_pressed_ball
    use thud_error, only: error_type
    use thud_floor_result, only: floor_result_type
@@ -20,7 +20,7 @@ module thud_compute
    implicit none (type, external)
    private
 
-   public :: compress_case, compute_case, drop_on_floor, get_judged_force, is_conforming, judge_case, predict_room
+   public :: compress_case, compute_case, drop_on_floor, get_cost, get_judged_force, is_conforming, judge_case, predict_room
    public :: predict_room_level, results_type, verdict_type
 
    !> Memory that a sample of a record takes, its transforms and text included, bytes; measured.
@@ -104,6 +104,26 @@ contains
       ! Models that leave the receiver alone have dropped on a rigid floor.
       if (.not. allocated(on_floor%floor_velocity)) deallocate (on_floor)
    end subroutine drop_on_floor
+
+   !> Approximate time of the drop of a case and its levels on one core, s.
+   function get_cost(case) result(cost)
+      type(case_type), intent(in) :: case
+      !> The time, s; of a case that is refused that of the refusal.
+      real(wp) :: cost
+      type(error_type), allocatable :: error
+      type(receiver_type) :: receiver
+
+      cost = 1.0e-3_wp
+      call check_case(case, error)
+      if (allocated(error)) return
+      associate (model => case%models(get_model_number(case))%model)
+         cost = cost + model%get_cost(case%ball, case%sampling)
+         if (.not. (case%has_floor .and. model%couples())) return
+         call case%floors(get_floor_number(case))%model%get_receiver(receiver, error)
+         if (allocated(error) .or. is_rigid(receiver)) return
+         cost = cost + 1.0e-3_wp + model%get_cost(case%ball, case%sampling, receiver)
+      end associate
+   end function get_cost
 
    !> Slow compression of the ball of a case by its model.
    subroutine compress_case(case, compression, error)

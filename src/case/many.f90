@@ -8,7 +8,7 @@ module thud_many
    use thud_blocked_drop, only: blocked_type, solve_blocked
    use thud_case, only: case_type, check_case, get_active_fields, get_model_number
    use thud_column, only: column_type
-   use thud_compute, only: get_judged_force
+   use thud_compute, only: get_cost, get_judged_force
    use thud_ensemble, only: are_alike, new_projections, projections_type, solve_ensemble
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type
@@ -17,20 +17,18 @@ module thud_many
    use thud_interrupt, only: check_interrupt, is_interrupted
    use thud_kinds, only: wp
    use thud_power, only: not_a_number
-   use thud_sampling, only: check_sampling, get_sample_count
+   use thud_sampling, only: check_sampling, get_sample_count, get_step_count
    use thud_shell_sets, only: set_outcome_type, set_type
    use thud_source_limits, only: conforms, get_source_limits, source_limits_type
+   use thud_source_model, only: typical_contact
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
    public :: leave_many, many_type, new_many, solve_many, take_many
 
-   !> Approximate time of a drop on a plate beyond that of a drop on a rigid floor, s.
-   real(wp), parameter :: floor_cost = 1.2e-2_wp
-
-   !> Approximate time of one drop in a batch, s.
-   real(wp), parameter :: batch_cost = 1.5e-5_wp
+   !> Approximate time of one step in a batch, s.
+   real(wp), parameter :: batch_cost = 1.5e-8_wp
 
    !> Why a drop has no results.
    type :: reason_type
@@ -92,9 +90,9 @@ contains
 
       call get_level_bands(case%bands, many%bands, many%first_band)
       many%judged = judged
-      many%cost = case%models(get_model_number(case))%model%get_cost()
-      if (suits_batch(case, columns)) many%cost = batch_cost
-      if (case%has_floor) many%cost = many%cost + floor_cost
+      many%cost = get_cost(case)
+      if (size(columns) > 0 .and. suits_batch(case, columns)) many%cost = batch_cost*get_step_count(case%sampling, &
+         typical_contact)
       many%further_name = get_further_names(case, many%bands(many%first_band:))
       wanted = new_projections(case%sampling%sample_rate, many%bands(octave_count + 1:), get_sample_count(case%sampling))
       if (.not. are_alike(wanted, many%projections)) many%projections = wanted

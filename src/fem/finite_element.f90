@@ -4,7 +4,7 @@
 !> added up around each sample: the force is their mean over the interval, and the impulse of the
 !> record is that of the run.
 module thud_finite_element
-   use thud_ball, only: ball_type
+   use thud_ball, only: ball_type, get_density
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_elastic_body, only: cavity_closed, no_failure
@@ -23,8 +23,9 @@ module thud_finite_element
    use thud_nodal_areas, only: get_nodal_areas
    use thud_pressed_ball, only: new_pressed_ball, press, pressed_ball_type
    use thud_progress, only: report_progress
-   use thud_receiver, only: receiver_type
-   use thud_sampling, only: sampling_type
+   use thud_receiver, only: get_pole_count, receiver_type
+   use thud_sampling, only: get_step_count, sampling_type
+   use thud_source_model, only: typical_contact
    use thud_text, only: to_text
    use thud_theory_limit, only: get_wave_limit, theory_limit_type
    implicit none (type, external)
@@ -70,17 +71,33 @@ module thud_finite_element
 contains
 
    !> Approximate time of one drop on one core, s.
-   function get_cost(options) result(cost)
+   function get_cost(ball, options, sampling, receiver) result(cost)
+      type(ball_type), intent(in) :: ball
       class(finite_element_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost
+      real(wp) :: speed, interval, time, n_step, element_cost
 
-      ! The number of elements, and of steps, which grows as they shrink.
-      cost = 0.15_wp*(options%mesh%radial_elements/8.0_wp)*(options%mesh%polar_elements/64.0_wp)**2
-      ! Branches cost more than all the rest.
-      if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) then
-         cost = 3*cost
-      end if
+      ! Stable steps follow pressure waves through the elements, the smallest of which lie at the inner surface.
+      speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
+      associate (mesh => options%mesh)
+         interval = options%step_safety/(speed*hypot(mesh%radial_elements/ball%wall_thickness, &
+            mesh%polar_elements/(pi*(ball%outer_radius - ball%wall_thickness))))
+         element_cost = 3.5e-8_wp
+         ! Branches cost more than all the rest.
+         if (any(options%material%viscosity == [character(len=name_length) :: 'fractional', 'constant_loss', 'prony'])) then
+            element_cost = 4*element_cost
+         end if
+         element_cost = element_cost*mesh%radial_elements*mesh%polar_elements
+      end associate
+      time = typical_contact + options%flight_before + options%flight_after
+      if (options%bounces > 1) time = sampling%duration
+      n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)
+      cost = 1.2e-2_wp + n_step*element_cost
+      if (present(receiver)) cost = cost + n_step*3.0e-9_wp*get_pole_count(receiver)
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball, Pa (that of its published free modes, section 4.1).

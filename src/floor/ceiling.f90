@@ -55,8 +55,8 @@ contains
       period = 2*pi*sqrt(max(ceiling%depth*ceiling%mass/(air%density*air%sound_speed**2), tiny(1.0_wp)))
       damping = ceiling%loss_factor + 2*pi*sqrt(lower*upper)*ceiling%depth*radiation_factor/air%sound_speed
       associate (low => lower*period, high => upper*period)
-         ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of both ends'
-         ! atanh(x/b) as one: their imaginary parts lie between 0 and pi/2.
+         ! 1/((1 - x**2)**2 + damping**2) = Im(1/(b**2 - x**2))/damping with b**2 = 1 - i damping. The difference of
+         ! atanh(x/b) at both ends as one: the imaginary parts lie between 0 and pi/2.
          b = sqrt(cmplx(1.0_wp, -damping, wp))
          share = (1 + ceiling%loss_factor**2)/(damping*(high - low))*aimag(atanh((high - low)*b/(b**2 - low*high))/b)
       end associate

@@ -1,27 +1,43 @@
 !> Sets of files: which files of a directory belong together, and how another set replaces them.
 !>
-!> A manifest lists the files of the set, those that a run has written with the checksum of their content; all others in
-!> the directory are the user's and stay. A workspace is a directory with the next set and its manifest.
+!> A manifest lists the files that thud has written with the checksums of their contents and the command, blank for the
+!> set; all others in the directory, and those that have changed since, are the user's and stay. A workspace is a directory
+!> with the next set and its manifest.
 module thud_file_set
-   use, intrinsic :: iso_fortran_env, only: int32
+   use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_error, only: error_type, input_error
    use thud_interrupt, only: check_interrupt
-   use thud_system, only: close_descriptor, exchange_directories, get_system_message, link_file, list_directory, &
-      name_length, open_end, remove_file, rename_file, write_text
+   use thud_system, only: close_descriptor, exchange_directories, get_file_checksum, get_file_size, get_system_message, &
+      link_file, list_directory, name_length, open_end, remove_file, rename_file, write_text
    use thud_text, only: newline
    implicit none (type, external)
    private
 
-   public :: add_names, clear_workspace, get_kept, is_workspace, read_names, replace_set
+   public :: add_entries, clear_workspace, entry_type, get_kept, is_listed, is_workspace, manifest, new_entries
+   public :: read_manifest, replace_set
 
-   !> Name of the manifest.
+   !> Name of the manifest, and its first line.
    character(len=*), parameter :: manifest = '.thud'
+   character(len=*), parameter :: head = '# files that thud has written, with checksums (CRC-32)'
+
+   !> Temporary name of a file that the driver writes.
+   character(len=*), parameter :: temporary = manifest//'.new'
 
    !> Before the name of a file that is set aside in the workspace.
    character(len=*), parameter :: aside = manifest//'~'
 
-   !> Between a name and its checksum.
+   !> Between name, checksum and command.
    character(len=*), parameter :: tab = achar(9)
+
+   !> A line of a manifest.
+   type :: entry_type
+      !> Name of the file.
+      character(len=name_length) :: name = ''
+      !> Checksum of its content, hexadecimal; blank before it is written.
+      character(len=8) :: sum = ''
+      !> The command that has written it; blank for the results of a case and their figures.
+      character(len=32) :: command = ''
+   end type entry_type
 
 contains
 
@@ -35,115 +51,149 @@ contains
       yes = size(names) == 0 .or. any(index(names, manifest) == 1)
    end function is_workspace
 
-   !> Names of the files of a directory that stay beside the next set: figures of the same input.
-   subroutine get_kept(place, names, same, kept)
+   !> Entries of files.
+   pure function new_entries(names, sums) result(entries)
+      !> The names: [n_file].
+      character(len=*), intent(in) :: names(:)
+      !> Checksums of their contents: [n_file].
+      integer(int32), intent(in) :: sums(:)
+      !> The entries: [n_file].
+      type(entry_type) :: entries(size(names))
+      integer :: i
+
+      do i = 1, size(names)
+         entries(i)%name = names(i)
+         write (entries(i)%sum, '(z8.8)') sums(i)
+      end do
+   end function new_entries
+
+   !> Whether a file of a directory is as its manifest lists it.
+   function is_listed(place, name, entries) result(yes)
+      character(len=*), intent(in) :: place
+      character(len=*), intent(in) :: name
+      !> The manifest: [n_entry].
+      type(entry_type), intent(in) :: entries(:)
+      logical :: yes
+      integer(int64) :: checksum
+      character(len=8) :: digits
+
+      yes = any(entries%name == name)
+      if (.not. yes) return
+      call get_file_checksum(place//'/'//trim(name), checksum)
+      write (digits, '(z8.8)') checksum
+      yes = checksum >= 0 .and. any(entries%name == name .and. entries%sum == digits)
+   end function is_listed
+
+   !> Which files of a directory stay beside the next set: figures of the same input, and results of other commands.
+   subroutine get_kept(place, names, same, kept, gone)
       !> The directory, under its lock.
       character(len=*), intent(in) :: place
       !> Names of the next set: [n_file].
       character(len=*), intent(in) :: names(:)
       !> It is of the same input.
       logical, intent(in) :: same
-      !> The names: [n_kept].
-      character(len=name_length), allocatable, intent(out) :: kept(:)
-      character(len=name_length), allocatable :: found(:), listed(:)
+      !> The manifest of those that stay: [n_kept].
+      type(entry_type), allocatable, intent(out) :: kept(:)
+      !> Names of those that do not: [n_gone].
+      character(len=name_length), allocatable, intent(out) :: gone(:)
+      type(entry_type), allocatable :: entries(:)
+      logical, allocatable :: stays(:)
+      logical :: is_manifest
       integer :: i
 
-      call read_names(place, listed)
-      call list_directory(place, found)
-      kept = pack(listed, [(same .and. any(found == listed(i)) .and. .not. any(names == listed(i)), i=1, size(listed))])
+      call read_manifest(place, entries, is_manifest)
+      entries = pack(entries, [(.not. any(names == entries(i)%name) .and. is_listed(place, entries(i)%name, entries), &
+         i=1, size(entries))])
+      stays = same .or. entries%command /= ''
+      kept = pack(entries, stays)
+      gone = pack(entries%name, .not. stays)
    end subroutine get_kept
 
    !> Puts the set of a workspace in the place of the one before.
-   subroutine replace_set(workspace, place, names, kept, exchangeable, error)
+   subroutine replace_set(workspace, place, entries, gone, exchangeable, error)
       !> The workspace; its remaining files are to be cleared.
       character(len=*), intent(in) :: workspace
       !> The directory, under its lock.
       character(len=*), intent(in) :: place
-      !> Names of the files, the last of which says whose they are: [n_file].
-      character(len=*), intent(in) :: names(:)
-      !> Names of files that stay beside them: [n_kept].
-      character(len=*), intent(in) :: kept(:)
+      !> The files, the last of which says whose they are: [n_file].
+      type(entry_type), intent(in) :: entries(:)
+      !> Names of files before that go with those: [n_gone].
+      character(len=*), intent(in) :: gone(:)
       !> The two directories may be exchanged.
       logical, intent(in) :: exchangeable
       !> A file cannot be written or moved; the directory is as it was.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: listed(:), replaced(:)
-      integer :: i
+      character(len=name_length), allocatable :: replaced(:)
       logical :: done
 
-      call read_names(place, listed)
-      replaced = [character(len=name_length) :: names, pack(listed, [(.not. any(kept == listed(i)), i=1, size(listed))])]
+      replaced = [character(len=name_length) :: entries%name, gone]
       done = exchangeable
-      if (done) call exchange(workspace, place, replaced, names, done)
-      if (.not. done) call move_files(workspace, place, replaced, names, error)
+      if (done) call exchange(workspace, place, replaced, done)
+      if (.not. done) call move_files(workspace, place, replaced, entries, error)
    end subroutine replace_set
 
    !> Exchanges workspace and directory; nothing has changed where that is impossible.
-   subroutine exchange(workspace, place, replaced, names, done)
+   subroutine exchange(workspace, place, replaced, done)
       character(len=*), intent(in) :: workspace, place
       !> Names of files that are not carried over: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
-      !> Names of the new files: [n_file].
-      character(len=*), intent(in) :: names(:)
       !> They are exchanged.
       logical, intent(out) :: done
       character(len=name_length), allocatable :: found(:), left(:)
-      type(error_type), allocatable :: error
       logical :: changed
       integer :: i
 
       done = .true.
       call list_directory(place, found)
       do i = 1, size(found)
-         if (found(i) == manifest .or. any(replaced == found(i))) cycle
+         if (any(found(i) == [character(len=name_length) :: manifest, temporary, replaced])) cycle
          call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
          if (.not. done) return
       end do
-      ! Without a manifest the old files would count as the user's.
-      if (.not. any(found == manifest)) call add_names(place, names, error)
-      done = .not. allocated(error)
-      if (done) call exchange_directories(workspace, place, done)
+      call exchange_directories(workspace, place, done)
       if (.not. done) return
       ! The user may have changed files meanwhile; those that are the same are left alone.
       call list_directory(workspace, left)
       do i = 1, size(left)
-         if (left(i) == manifest .or. any(replaced == left(i))) cycle
+         if (any(left(i) == [character(len=name_length) :: manifest, temporary, replaced])) cycle
          call rename_file(workspace//'/'//trim(left(i)), place//'/'//trim(left(i)), changed)
       end do
    end subroutine exchange
 
    !> Moves files one by one: those before are set aside in the workspace, so that two inputs are never mixed.
-   subroutine move_files(workspace, place, replaced, names, error)
+   subroutine move_files(workspace, place, replaced, entries, error)
       character(len=*), intent(in) :: workspace, place
       !> Names that the files before may have: [n_replaced].
       character(len=*), intent(in) :: replaced(:)
-      !> Names of the new files, the last of which says whose they are: [n_file].
-      character(len=*), intent(in) :: names(:)
+      !> The new files, the last of which says whose they are: [n_file].
+      type(entry_type), intent(in) :: entries(:)
       !> A file cannot be moved; the directory is as it was.
       type(error_type), allocatable, intent(out) :: error
+      type(entry_type), allocatable :: listed(:)
       character(len=name_length), allocatable :: found(:)
       character(len=name_length) :: marker
       integer :: n, i
-      logical :: done
+      logical :: done, is_manifest
 
-      marker = names(size(names))
+      marker = entries(size(entries))%name
       call list_directory(place, found)
+      call read_manifest(place, listed, is_manifest)
       found = [pack(found, found == marker), pack(found, [(found(i) /= marker .and. any(replaced == found(i)), &
          i=1, size(found))])]
       ! A writer killed from here on leaves files that are listed, but no marker.
-      call add_names(place, names, error)
+      if (is_manifest) call add_entries(place, entries, error)
       if (allocated(error)) return
       n = size(found)
       block
-         character(len=len(workspace) + name_length + 8), dimension(n + size(names)) :: from, to
+         character(len=len(workspace) + name_length + 8), dimension(n + size(entries)) :: from, to
 
          do i = 1, n
             from(i) = place//'/'//found(i)
             to(i) = workspace//'/'//aside//found(i)
          end do
-         do i = 1, size(names)
-            from(n + i) = workspace//'/'//names(i)
-            to(n + i) = place//'/'//names(i)
+         do i = 1, size(entries)
+            from(n + i) = workspace//'/'//entries(i)%name
+            to(n + i) = place//'/'//entries(i)%name
          end do
          do i = 1, size(from)
             call rename_file(trim(from(i)), trim(to(i)), done)
@@ -162,15 +212,16 @@ contains
    subroutine clear_workspace(workspace, place)
       !> The workspace, under its lock; the directory.
       character(len=*), intent(in) :: workspace, place
-      character(len=name_length), allocatable :: found(:), listed(:)
-      logical :: done
+      character(len=name_length), allocatable :: found(:)
+      type(entry_type), allocatable :: listed(:)
+      logical :: done, is_manifest
       integer :: i
 
-      call read_names(workspace, listed)
+      call read_manifest(workspace, listed, is_manifest)
       call list_directory(workspace, found)
       do i = 1, size(found)
          if (found(i) == manifest) cycle
-         if (.not. any([listed == found(i), index(found(i), aside) == 1])) then
+         if (.not. any([listed%name == found(i), index(found(i), aside) == 1, found(i) == temporary])) then
             call link_file(workspace//'/'//trim(found(i)), place//'/'//trim(found(i)), done)
          end if
          call remove_file(workspace//'/'//trim(found(i)))
@@ -180,51 +231,64 @@ contains
       if (all(found == manifest)) call remove_file(workspace//'/'//manifest)
    end subroutine clear_workspace
 
-   !> Names in the manifest of a directory.
-   subroutine read_names(path, names)
+   !> The manifest of a directory.
+   subroutine read_manifest(path, entries, is_manifest)
       character(len=*), intent(in) :: path
-      !> The names, none without a manifest: [n_name].
-      character(len=name_length), allocatable, intent(out) :: names(:)
-      character(len=name_length + 16) :: line
+      !> Its lines, none without a manifest: [n_entry].
+      type(entry_type), allocatable, intent(out) :: entries(:)
+      !> There is one, or nothing of its name.
+      logical, intent(out) :: is_manifest
+      character(len=name_length + 64) :: line
       character(len=256) :: message
-      integer :: unit, status, n
+      integer(int64) :: checksum
+      integer :: unit, status, n, i
 
-      allocate (names(64))
+      allocate (entries(64))
       n = 0
-      open (newunit=unit, file=path//'/'//manifest, status='old', action='read', iostat=status, iomsg=message)
+      ! To open a pipe could block.
+      call get_file_checksum(path//'/'//manifest, checksum)
+      is_manifest = checksum == -1
+      status = -1
+      if (checksum >= 0) open (newunit=unit, file=path//'/'//manifest, status='old', action='read', iostat=status, &
+         iomsg=message)
       if (status == 0) then
-         do
+         read (unit, '(a)', iostat=status, iomsg=message) line
+         is_manifest = status == 0 .and. line == head
+         do while (is_manifest)
             read (unit, '(a)', iostat=status, iomsg=message) line
             if (status /= 0) exit
-            if (n == size(names)) names = [names, names]
+            if (n == size(entries)) entries = [entries, entries]
             n = n + 1
-            names(n) = line(:index(line//tab, tab) - 1)
+            i = index(line//tab, tab)
+            entries(n) = entry_type(name=line(:i - 1))
+            line = line(i + 1:)
+            i = index(line//tab, tab)
+            entries(n)%sum = line(:i - 1)
+            entries(n)%command = line(i + 1:)
          end do
          close (unit)
       end if
-      names = names(:n)
-   end subroutine read_names
+      entries = entries(:n)
+   end subroutine read_manifest
 
-   !> Adds names to the manifest of a directory; the last checksum of a name holds.
-   subroutine add_names(path, names, error, sums)
+   !> Adds lines to the manifest of a directory.
+   subroutine add_entries(path, entries, error)
       character(len=*), intent(in) :: path
-      !> The names: [n_name].
-      character(len=*), intent(in) :: names(:)
+      !> The lines: [n_entry].
+      type(entry_type), intent(in) :: entries(:)
       !> They cannot be written.
       type(error_type), allocatable, intent(out) :: error
-      !> Checksums of the contents (default: not known): [n_name].
-      integer(int32), intent(in), optional :: sums(:)
       character(len=:), allocatable :: text
-      character(len=8) :: digits
+      integer(int64) :: bytes
       integer :: descriptor, status, closed, i
 
       text = ''
-      do i = 1, size(names)
-         text = text//trim(names(i))
-         if (present(sums)) then
-            write (digits, '(z8.8)') sums(i)
-            text = text//tab//digits
-         end if
+      call get_file_size(path//'/'//manifest, bytes)
+      if (bytes <= 0) text = head//newline
+      do i = 1, size(entries)
+         text = text//trim(entries(i)%name)
+         if (entries(i)%sum /= '') text = text//tab//entries(i)%sum
+         if (entries(i)%command /= '') text = text//tab//trim(entries(i)%command)
          text = text//newline
       end do
       call open_end(path//'/'//manifest, descriptor, status)
@@ -234,6 +298,6 @@ contains
       if (status < 0) call check_interrupt(error)
       if (status > 0) error = input_error('--output '//path//': '//manifest//' cannot be written (' &
          //get_system_message(status)//'); allowed: a directory that you may write to, with space on its disk')
-   end subroutine add_names
+   end subroutine add_entries
 
 end module thud_file_set

@@ -5,14 +5,15 @@
 !> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
-   use, intrinsic :: iso_fortran_env, only: int32
+   use, intrinsic :: iso_fortran_env, only: int32, int64
    use thud_error, only: error_type, input_error
    use thud_file, only: read_text_file, text_file_type
-   use thud_file_set, only: add_names, clear_workspace, get_kept, is_workspace, read_names, replace_set
+   use thud_file_set, only: add_entries, clear_workspace, entry_type, get_kept, is_listed, is_workspace, manifest, &
+      new_entries, read_manifest, replace_set
    use thud_interrupt, only: check_interrupt
    use thud_system, only: add_to_checksum, can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
-      get_system_message, keep_interrupts, list_directory, lock_directory, name_length, pass_interrupts, remove_file, &
-      rename_file, resolve_path, write_text
+      get_file_checksum, get_system_message, is_same_file, keep_interrupts, list_directory, lock_directory, &
+      name_length, pass_interrupts, path_length, remove_file, rename_file, resolve_path, write_text
    use thud_text, only: newline
    implicit none (type, external)
    private
@@ -32,6 +33,10 @@ module thud_result_directory
       character(len=:), allocatable :: path, place, workspace
       !> The file that says whose results these are.
       type(text_file_type) :: marker
+      !> Paths of the files that the results depend on: [n_input].
+      character(len=path_length), allocatable :: inputs(:)
+      !> Files that thud has not written are replaced, too.
+      logical :: replace = .false.
       !> Names of all files of the set: [n_file].
       character(len=name_length), allocatable :: names(:)
       !> Checksums of their contents: [n_file].
@@ -49,28 +54,34 @@ module thud_result_directory
 contains
 
    !> Refuses a directory that holds anything but results of the same case.
-   subroutine check_owner(path, marker, differs, error)
+   subroutine check_owner(path, marker, replace, differs, error)
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.
       type(text_file_type), intent(in) :: marker
+      !> It may hold anything.
+      logical, intent(in) :: replace
       !> It holds the same case with another input.
       logical, intent(out) :: differs
       !> It belongs to something else, or is no directory.
       type(error_type), allocatable, intent(out) :: error
       integer :: owner
 
-      call find_owner(path, marker, owner, error)
+      call find_owner(path, marker, replace, owner, error)
       differs = owner == other_input
    end subroutine check_owner
 
    !> Writes a set of files into a directory, completely or not at all.
-   subroutine write_results(path, marker, files, differs, error)
+   subroutine write_results(path, marker, files, inputs, replace, differs, error)
       !> The directory, which is made where it is missing.
       character(len=*), intent(in) :: path
       !> The file that says whose results these are.
       type(text_file_type), intent(in) :: marker
       !> The other files: [n_file].
       type(text_file_type), intent(in) :: files(:)
+      !> Paths of the files that the results depend on, which are never replaced: [n_input].
+      character(len=*), intent(in) :: inputs(:)
+      !> Files that thud has not written are replaced, too.
+      logical, intent(in) :: replace
       !> They replace results of the same case with another input.
       logical, intent(out) :: differs
       !> They cannot be written; the directory is as it was.
@@ -78,7 +89,7 @@ contains
       type(result_directory_type) :: directory
       integer :: i
 
-      call open_results(path, marker, files%name, directory, error)
+      call open_results(path, marker, files%name, inputs, replace, directory, error)
       do i = 1, size(files)
          call write_file(directory, files(i), error)
       end do
@@ -86,34 +97,38 @@ contains
    end subroutine write_results
 
    !> Waits for other writers of a directory and begins to write.
-   subroutine open_results(path, marker, names, directory, error)
+   subroutine open_results(path, marker, names, inputs, replace, directory, error)
       !> The directory, which is made where it is missing.
       character(len=*), intent(in) :: path
       !> The file that says whose results these are.
       type(text_file_type), intent(in) :: marker
       !> Names of the other files: [n_file].
       character(len=*), intent(in) :: names(:)
+      !> Paths of the files that the results depend on, which are never replaced: [n_input].
+      character(len=*), intent(in) :: inputs(:)
+      !> Files that thud has not written are replaced, too.
+      logical, intent(in) :: replace
       !> The directory, to be closed in any case.
       type(result_directory_type), intent(out) :: directory
       !> It belongs to something else, or cannot be written.
       type(error_type), allocatable, intent(out) :: error
-      integer :: owner, i
+      type(entry_type) :: unwritten(size(names) + 1)
+      integer :: owner
 
       directory%path = path
       directory%marker = marker
+      allocate (directory%inputs(size(inputs)))
+      directory%inputs = inputs
+      directory%replace = replace
       directory%names = [character(len=name_length) :: names, marker%name]
       allocate (directory%sums(size(directory%names)), source=0_int32)
       call take_workspace(directory, error)
       if (.not. allocated(error)) call lock_place(directory, owner, error)
       call close_descriptor(directory%lock)
       if (allocated(error)) return
-      do i = 1, size(directory%names)
-         if (directory_exists(directory%place//'/'//trim(directory%names(i)))) error = input_error('--output '//path//': ' &
-            //trim(directory%names(i))//' is a directory; allowed: a file of this name')
-      end do
-      if (allocated(error)) return
       call clear_workspace(directory%workspace, directory%place)
-      call add_names(directory%workspace, directory%names, error)
+      unwritten%name = directory%names
+      call add_entries(directory%workspace, unwritten, error)
    end subroutine open_results
 
    !> Ends the writing: all files are in the directory, or none.
@@ -216,18 +231,21 @@ contains
    end subroutine require_written
 
    !> Whose results a directory holds.
-   subroutine find_owner(path, marker, owner, error)
+   subroutine find_owner(path, marker, replace, owner, error)
       character(len=*), intent(in) :: path
       !> The file that will say whose results it holds.
       type(text_file_type), intent(in) :: marker
+      !> It may hold anything.
+      logical, intent(in) :: replace
       !> `no_owner`, `same_input` or `other_input`.
       integer, intent(out) :: owner
       !> It belongs to something else, or is no directory.
       type(error_type), allocatable, intent(out) :: error
       type(error_type), allocatable :: unreadable
-      character(len=name_length), allocatable :: found(:), listed(:)
+      type(entry_type), allocatable :: entries(:)
+      character(len=name_length), allocatable :: found(:)
       character(len=:), allocatable :: text
-      logical :: there
+      logical :: there, is_manifest
 
       owner = no_owner
       if (.not. directory_exists(path)) then
@@ -237,19 +255,72 @@ contains
       end if
       call list_directory(path, found)
       if (all(found == inner_workspace)) return
-      call read_text_file(path//'/'//trim(marker%name), text, unreadable)
-      if (.not. allocated(unreadable)) then
+      call read_manifest(path, entries, is_manifest)
+      if (directory_exists(path//'/'//manifest) .or. .not. (is_manifest .or. replace)) then
+         error = foreign_error(path, manifest)
+      else if (is_listed(path, marker%name, entries)) then
+         call read_text_file(path//'/'//trim(marker%name), text, unreadable)
+         if (allocated(unreadable)) text = ''
          if (index(text, marker%content(:index(marker%content, newline))) == 1) owner = merge(same_input, other_input, &
             text == marker%content)
-         if (owner /= no_owner) return
-      else if (.not. any(found == marker%name)) then
+      else if (any(found == marker%name)) then
+         if (.not. replace) error = foreign_error(path, marker%name)
+      else if (any(entries%name == marker%name)) then
          ! A writer killed while it moved files one by one has left the manifest without the marker.
-         call read_names(path, listed)
-         if (any(listed == marker%name)) return
+         return
       end if
-      error = input_error('--output '//path//' holds files of something else; allowed: a new or empty directory, or ' &
-         //'results of the same case')
+      if (owner /= no_owner .or. allocated(error) .or. replace) return
+      error = input_error('--output '//path//' holds files of something else; allowed: a new or empty directory, ' &
+         //'results of the same case, or --replace')
    end subroutine find_owner
+
+   !> Refuses to replace inputs, directories, and files that thud has not written.
+   subroutine check_files(directory, error)
+      type(result_directory_type), intent(in) :: directory
+      !> Names the file that is in the way.
+      type(error_type), allocatable, intent(out) :: error
+      type(entry_type), allocatable :: entries(:)
+      character(len=:), allocatable :: path, text
+      integer(int64) :: checksum
+      logical :: is_manifest
+      integer :: i, j
+
+      call read_manifest(directory%place, entries, is_manifest)
+      do i = 1, size(directory%names)
+         path = directory%place//'/'//trim(directory%names(i))
+         call get_file_checksum(path, checksum)
+         if (checksum == -1) cycle
+         do j = 1, size(directory%inputs)
+            if (.not. is_same_file(path, trim(directory%inputs(j)))) cycle
+            ! Results are repeated from their own input.
+            if (directory%names(i) == directory%marker%name) call read_text_file(path, text, error)
+            if (allocated(text)) then
+               if (text == directory%marker%content) cycle
+            end if
+            error = input_error(directory%path//'/'//trim(directory%names(i))//' is an input, which is never replaced; ' &
+               //'allowed: another directory')
+            return
+         end do
+         if (directory_exists(path)) then
+            error = input_error('--output '//directory%path//': '//trim(directory%names(i))//' is a directory; allowed: a ' &
+               //'file of this name')
+         else if (.not. (directory%replace .or. is_listed(directory%place, directory%names(i), entries))) then
+            error = foreign_error(directory%path, directory%names(i))
+         end if
+         if (allocated(error)) return
+      end do
+   end subroutine check_files
+
+   !> Error of a file that thud has not written.
+   pure function foreign_error(path, name) result(error)
+      !> Path of its directory.
+      character(len=*), intent(in) :: path
+      character(len=*), intent(in) :: name
+      type(error_type) :: error
+
+      error = input_error(path//'/'//trim(name)//' is in the way: thud has not written it, or it has changed since; ' &
+         //'allowed: another directory, or --replace (replace=True) to replace it')
+   end function foreign_error
 
    !> Takes the workspace of a directory. Interrupts are kept from then on.
    subroutine take_workspace(directory, error)
@@ -300,7 +371,8 @@ contains
       type(error_type), allocatable, intent(out) :: error
 
       call lock_directory(directory%place, .false., directory%lock)
-      call find_owner(directory%path, directory%marker, owner, error)
+      call find_owner(directory%path, directory%marker, directory%replace, owner, error)
+      if (.not. allocated(error)) call check_files(directory, error)
       if (directory%lock < 0) call check_interrupt(error)
       if (allocated(error) .or. directory%lock >= 0) return
       if (directory_exists(directory%place)) error = making_error(directory%path)
@@ -315,16 +387,18 @@ contains
       logical, intent(out) :: moved
       !> The directory belongs to something else by now, or its files cannot be replaced.
       type(error_type), allocatable, intent(out) :: error
-      character(len=name_length), allocatable :: kept(:)
+      type(entry_type), allocatable :: kept(:)
+      type(entry_type) :: entries(size(directory%names))
+      character(len=name_length), allocatable :: gone(:)
       integer :: owner, status
 
       moved = .false.
       call lock_place(directory, owner, error)
       differs = owner == other_input
       if (allocated(error)) return
-      call add_names(directory%workspace, directory%names, error, directory%sums)
-      call get_kept(directory%place, directory%names, owner == same_input, kept)
-      if (.not. allocated(error)) call add_names(directory%workspace, kept, error)
+      entries = new_entries(directory%names, directory%sums)
+      call get_kept(directory%place, directory%names, owner == same_input, kept, gone)
+      call add_entries(directory%workspace, [entries, kept], error)
       if (allocated(error)) return
       call flush_directory(directory%workspace, status)
       call require_written(directory, status, error)
@@ -333,7 +407,7 @@ contains
          call rename_file(directory%workspace, directory%place, moved)
          if (.not. moved) error = making_error(directory%path)
       else
-         call replace_set(directory%workspace, directory%place, directory%names, kept, &
+         call replace_set(directory%workspace, directory%place, entries, gone, &
             directory%workspace /= directory%place//'/'//inner_workspace, error)
       end if
    end subroutine publish

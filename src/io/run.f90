@@ -82,10 +82,12 @@ contains
    end subroutine add_remark
 
    !> Runs a namelist file and writes its results.
-   subroutine run_case(path, output, case, results, outcome, error)
+   subroutine run_case(path, output, replace, case, results, outcome, error)
       character(len=*), intent(in) :: path
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
+      !> Files that thud has not written are replaced, too.
+      logical, intent(in) :: replace
       type(case_type), target, intent(out) :: case
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
@@ -95,17 +97,19 @@ contains
 
       call load_case(path, case, error)
       if (allocated(error)) return
-      call store_case(path, case, output, results, outcome, error)
+      call store_case(path, case, output, replace, results, outcome, error)
       if (allocated(error)) error%message = path//': '//error%message
    end subroutine run_case
 
    !> Computes a case and writes its results.
-   subroutine store_case(path, case, output, results, outcome, error)
+   subroutine store_case(path, case, output, replace, results, outcome, error)
       !> The file of the case.
       character(len=*), intent(in) :: path
       type(case_type), intent(in), target :: case
       !> Directory for the results; empty for `outputs/<name of the case>`.
       character(len=*), intent(in) :: output
+      !> Files that thud has not written are replaced, too.
+      logical, intent(in) :: replace
       type(results_type), intent(out) :: results
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
@@ -120,7 +124,7 @@ contains
       call get_case_text(case, input%content)
       outcome%directory = output
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)
-      call check_owner(outcome%directory, input, differs, error)
+      call check_owner(outcome%directory, input, replace, differs, error)
       if (.not. allocated(error)) call check_space(case, outcome%directory, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (case%has_impact .and. .not. allocated(error)) call judge_case(case, results%history, results%verdict, error)
@@ -135,7 +139,7 @@ contains
       end if
       if (allocated(error)) return
       call describe(case, results, files, outcome)
-      call write_results(outcome%directory, input, files, differs, error)
+      call write_results(outcome%directory, input, files, [path], replace, differs, error)
       if (allocated(error)) return
       if (differs) call outcome%add_remark(path, replaces//outcome%directory)
       do i = 1, size(results%remark)

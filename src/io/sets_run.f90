@@ -15,6 +15,7 @@ module thud_sets_run
    use thud_run, only: load_case, outcome_type, replaces
    use thud_set_report, only: get_set_header, get_set_rows
    use thud_set_table, only: open_set_table, read_sets, set_table_type
+   use thud_system, only: path_length
    use thud_table, only: get_defaults_line, get_force_title, get_span_row
    use thud_text, only: newline, replaced, to_text
    implicit none (type, external)
@@ -38,13 +39,15 @@ module thud_sets_run
 contains
 
    !> Computes all sets of a table and writes their results.
-   subroutine run_sets(path, table_path, threads, output, outcome, error)
+   subroutine run_sets(path, table_path, threads, output, replace, outcome, error)
       !> Path of the namelist file, which gives what the table does not.
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: table_path
       integer, intent(in) :: threads
       !> Directory for the results; empty for `outputs/<name of the case>_sets`.
       character(len=*), intent(in) :: output
+      !> Files that thud has not written are replaced, too.
+      logical, intent(in) :: replace
       !> Table, verdict and place of the results.
       type(outcome_type), intent(out) :: outcome
       !> The run failed; nothing was written.
@@ -54,6 +57,7 @@ contains
       type(tally_type) :: tally
       type(text_file_type) :: marker
       type(result_directory_type) :: results
+      character(len=path_length) :: inputs(2)
       logical :: differs
 
       call load_case(path, case, error, unchecked=.true.)
@@ -70,9 +74,11 @@ contains
       if (output == '') outcome%directory = 'outputs/'//trim(case%name)//'_sets'
       marker%name = input_file
       call get_case_text(case, marker%content)
-      call check_owner(outcome%directory, marker, differs, error)
+      call check_owner(outcome%directory, marker, replace, differs, error)
       if (allocated(error)) return
-      call open_results(outcome%directory, marker, [result_file], results, error)
+      inputs(1) = path
+      inputs(2) = table_path
+      call open_results(outcome%directory, marker, [result_file], inputs, replace, results, error)
       call write_sets(case, table, threads, results, tally, error)
       call close_results(results, differs, error)
       if (allocated(error)) return

@@ -13,7 +13,7 @@ module thud_measured_modes
    use thud_new_field, only: list_field, logical_field
    use thud_receiver, only: receiver_type
    use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
-   use thud_source_model, only: source_model_type
+   use thud_source_model, only: source_model_type, typical_contact
    use thud_text, only: fixed, to_text
    implicit none (type, external)
    private
@@ -22,6 +22,9 @@ module thud_measured_modes
 
    !> Relative error of the sum of effective masses that printed digits explain.
    real(wp), parameter :: mass_tolerance = 1.0e-3_wp
+
+   !> Checks per shortest period that find the first zero of the force.
+   integer, parameter :: checks_per_period = 16
 
    !> Options of the model: one entry per mode in each list.
    type, extends(source_model_type) :: measured_modes_type
@@ -37,6 +40,7 @@ module thud_measured_modes
       procedure, pass(options) :: check
       procedure, pass(options) :: solve
       procedure, pass(options) :: couples
+      procedure, pass(options) :: get_cost
    end type measured_modes_type
 
    !> Motion and force of one mode in closed form.
@@ -122,8 +126,7 @@ contains
       step = 1/sampling%sample_rate
       history = new_force_history(sampling%sample_rate, get_sample_count(sampling), ['modal_force'])
       history%impact_velocity = v0
-      ! Sixteen checks per shortest period find the first zero.
-      substeps = ceiling(16*maxval(modes%omega)/(2*pi)*step)
+      substeps = ceiling(checks_per_period*maxval(modes%omega)/(2*pi)*step)
       released = .false.
       march: do i = 1, size(history%floor_force)
          call check_interrupt(error)
@@ -175,6 +178,21 @@ contains
 
       yes = .false.
    end function couples
+
+   !> Approximate time of one drop on one core, s.
+   function get_cost(ball, options, sampling, receiver) result(cost)
+      type(ball_type), intent(in) :: ball
+      class(measured_modes_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      !> Not used: the model leaves floors alone.
+      type(receiver_type), intent(in), optional :: receiver
+      !> The time, s.
+      real(wp) :: cost
+      real(wp) :: rate
+
+      rate = max(sampling%sample_rate, checks_per_period*maxval(options%frequency%values(:options%frequency%count)))
+      cost = 1.0e-3_wp + min(sampling%duration, typical_contact)*rate*options%frequency%count*3.0e-8_wp
+   end function get_cost
 
    !> One mode from its measured numbers.
    elemental function new_mode(frequency, damping_ratio, mass) result(mode)

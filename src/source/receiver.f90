@@ -9,7 +9,7 @@ module thud_receiver
    implicit none (type, external)
    private
 
-   public :: add_impulse, advance_receiver, can_strike, get_conductance, get_impulse_response, get_mobility
+   public :: add_impulse, advance_receiver, can_strike, get_conductance, get_impulse_response, get_mobility, get_pole_count
    public :: get_receiver_velocity, is_rigid, new_receiver_motion, new_receiver_step, receiver_motion_type
    public :: receiver_step_type, receiver_type
 
@@ -53,6 +53,15 @@ contains
       if (allocated(receiver%residue)) rigid = rigid .and. .not. any(abs(receiver%residue) > 0.0_wp)
    end function is_rigid
 
+   !> Number of poles.
+   pure function get_pole_count(receiver) result(n_pole)
+      type(receiver_type), intent(in) :: receiver
+      integer :: n_pole
+
+      n_pole = 0
+      if (allocated(receiver%pole)) n_pole = size(receiver%pole)
+   end function get_pole_count
+
    !> Mobility of the point under the source, velocity over force.
    pure function get_mobility(receiver, frequency) result(mobility)
       type(receiver_type), intent(in) :: receiver
@@ -91,8 +100,7 @@ contains
       type(receiver_motion_type) :: motion
       integer :: n
 
-      n = 0
-      if (allocated(receiver%pole)) n = size(receiver%pole)
+      n = get_pole_count(receiver)
       allocate (motion%amplitude(n), source=(0.0_wp, 0.0_wp))
    end function new_receiver_motion
 
@@ -105,8 +113,7 @@ contains
       complex(wp) :: z
       integer :: k, n
 
-      n = 0
-      if (allocated(receiver%pole)) n = size(receiver%pole)
+      n = get_pole_count(receiver)
       step%interval = interval
       allocate (step%decay(n), step%gain(n), step%travel(n))
       do k = 1, n

@@ -9,7 +9,7 @@ module thud_sampling
    implicit none (type, external)
    private
 
-   public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields
+   public :: check_contact_samples, check_sampling, get_rate_limit, get_sample_count, get_sampling_fields, get_step_count
    public :: min_contact_samples, sampling_type
 
    !> Samples of one record; more would fill the memory and no drop needs them.
@@ -98,5 +98,18 @@ contains
 
       n_sample = int(sampling%duration*sampling%sample_rate)
    end function get_sample_count
+
+   !> Integration steps of a record, or of its beginning.
+   pure function get_step_count(sampling, time) result(n_step)
+      type(sampling_type), intent(in) :: sampling
+      !> Length of the beginning, s (default: the whole record).
+      real(wp), intent(in), optional :: time
+      !> The steps, as many as do not fit into an integer.
+      real(wp) :: n_step
+
+      n_step = sampling%duration
+      if (present(time)) n_step = min(n_step, time)
+      n_step = n_step*sampling%sample_rate*real(sampling%substeps, wp)
+   end function get_step_count
 
 end module thud_sampling

@@ -9,13 +9,16 @@ module thud_source_model
    use thud_field, only: field_type
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
-   use thud_receiver, only: receiver_type
-   use thud_sampling, only: sampling_type
+   use thud_receiver, only: get_pole_count, receiver_type
+   use thud_sampling, only: get_step_count, sampling_type
    use thud_theory_limit, only: get_gravity_limit, theory_limit_type
    implicit none (type, external)
    private
 
    public :: source_model_type
+
+   !> Typical time that a source is computed for on a rigid floor, s.
+   real(wp), parameter, public :: typical_contact = 0.025_wp
 
    !> A source model with its options as components.
    type, abstract :: source_model_type
@@ -84,13 +87,23 @@ contains
       extents = 0
    end function get_snapshot_shape
 
-   !> Approximate time of one drop on one core, s.
-   function get_cost(options) result(cost)
+   !> Approximate time of one drop on one core, s; by default that of a model with one or two degrees of freedom.
+   function get_cost(ball, options, sampling, receiver) result(cost)
+      type(ball_type), intent(in) :: ball
+      !> The options, checked.
       class(source_model_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost
 
-      cost = 1.0e-3_wp
+      cost = 3.0e-4_wp
+      if (present(receiver)) then
+         cost = cost + get_step_count(sampling)*(1.4e-6_wp + 4.3e-9_wp*get_pole_count(receiver))
+      else
+         cost = cost + get_step_count(sampling, typical_contact)*2.2e-7_wp
+      end if
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball in this model, Pa; by default 0, for models that do not use the wall.

@@ -223,20 +223,29 @@ ssize_t thud_read(int descriptor, char *bytes, size_t length)
    return count;
 }
 
+// A descriptor of a regular file, or minus the number of the error. To open a pipe could block, and a link leads to a
+// file of somebody else.
+static int open_regular(const char *path, int flags)
+{
+   struct stat found;
+   int descriptor = open(path, flags | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC, 0666);
+
+   if (descriptor < 0) return -errno;
+   if (fstat(descriptor, &found) == 0 && S_ISREG(found.st_mode)) return descriptor;
+   close(descriptor);
+   return -EEXIST;
+}
+
 // A descriptor to write to a new or emptied file, or minus the number of the error.
 int thud_create(const char *path)
 {
-   int descriptor = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-
-   return descriptor < 0 ? -errno : descriptor;
+   return open_regular(path, O_WRONLY | O_CREAT | O_TRUNC);
 }
 
 // The same to write at the end of a file, which is made where it is missing.
 int thud_open_end(const char *path)
 {
-   int descriptor = open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-
-   return descriptor < 0 ? -errno : descriptor;
+   return open_regular(path, O_WRONLY | O_CREAT | O_APPEND);
 }
 
 // CRC-32 of bytes that follow those with the checksum `before`, as in zlib.
@@ -256,6 +265,20 @@ uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t lengt
    return ~rest;
 }
 
+// The checksum of a regular file; -1 where there is nothing of its name, -2 where it is something else or cannot be read.
+int64_t thud_get_file_checksum(const char *path)
+{
+   unsigned char bytes[1 << 16];
+   uint32_t checksum = 0;
+   ssize_t count;
+   int descriptor = open_regular(path, O_RDONLY);
+
+   if (descriptor < 0) return descriptor == -ENOENT || descriptor == -ENOTDIR ? -1 : -2;
+   while ((count = read(descriptor, bytes, sizeof bytes)) > 0) checksum = thud_checksum(checksum, bytes, (size_t)count);
+   close(descriptor);
+   return count < 0 ? -2 : (int64_t)checksum;
+}
+
 // Writes all of a text; -1 after an interrupt that was kept.
 int thud_write(int descriptor, const char *bytes, size_t length)
 {
@@ -269,6 +292,12 @@ int thud_write(int descriptor, const char *bytes, size_t length)
       length -= (size_t)count;
    }
    return 0;
+}
+
+// Whether the number of an error of writing says that nobody reads: the pipe or the descriptor is closed.
+int thud_is_closed(int status)
+{
+   return status == EPIPE || status == EBADF;
 }
 
 // Closes a file; some disks are found to be full only then.
@@ -377,6 +406,14 @@ int thud_exchange(const char *path, const char *target)
 #else
    return ENOTSUP;
 #endif
+}
+
+// 1 where two paths lead to the same file.
+int thud_is_same_file(const char *path, const char *other)
+{
+   struct stat here, there;
+
+   return stat(path, &here) == 0 && stat(other, &there) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino;
 }
 
 // Length of the next name in an open directory, `.` and `..` left out; 0 at the end.

@@ -9,8 +9,9 @@ module thud_system
 
    public :: standard_error, standard_output
    public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
-   public :: end_calls, end_process, exchange_directories, flush_directory, get_file_size, get_free_bytes, get_system_message
-   public :: is_terminal, keep_interrupts, link_file, list_directory, lock_directory, open_descriptor, open_end
+   public :: end_calls, end_process, exchange_directories, flush_directory, get_file_checksum, get_file_size, get_free_bytes
+   public :: get_system_message, is_closed, is_same_file, is_terminal, keep_interrupts, link_file, list_directory
+   public :: lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
    !> Descriptors of the process.
@@ -49,10 +50,12 @@ module thud_system
    procedure(two_path_call), bind(c, name='rename') :: c_rename
    procedure(two_path_call), bind(c, name='link') :: c_link
    procedure(two_path_call), bind(c, name='thud_can_exchange') :: c_can_exchange
+   procedure(two_path_call), bind(c, name='thud_is_same_file') :: c_is_same_file
    procedure(two_path_call), bind(c, name='thud_exchange') :: c_exchange
    procedure(path_call), bind(c, name='thud_flush') :: c_flush
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
+   procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
 
    interface
       !> Ends the process at once; nothing must be left to be written.
@@ -178,6 +181,13 @@ module thud_system
          integer(c_int64_t) :: bytes
       end function c_get_file_size
 
+      function c_get_file_checksum(path) bind(c, name='thud_get_file_checksum') result(checksum)
+         import :: c_char, c_int64_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int64_t) :: checksum
+      end function c_get_file_checksum
+
       function c_get_free_bytes(path) bind(c, name='thud_get_free_bytes') result(bytes)
          import :: c_char, c_double
          implicit none (type, external)
@@ -282,6 +292,15 @@ contains
 
       status = int(c_write(int(descriptor, c_int), text, len(text, c_size_t)))
    end subroutine write_text
+
+   !> Whether a text was not written because nobody reads it: the pipe or the descriptor is closed.
+   function is_closed(status) result(closed)
+      !> That of `write_text`.
+      integer, intent(in) :: status
+      logical :: closed
+
+      closed = c_is_closed(int(status, c_int)) /= 0
+   end function is_closed
 
    !> Brings all files of a directory to the disk.
    subroutine flush_directory(path, status)
@@ -419,6 +438,26 @@ contains
 
       bytes = int(c_get_file_size(path//c_null_char), int64)
    end subroutine get_file_size
+
+   !> Checksum of a file, CRC-32 as in zlib.
+   subroutine get_file_checksum(path, checksum)
+      character(len=*), intent(in) :: path
+      !> The checksum; -1 where there is nothing of that name, -2 where it is no regular file or cannot be read.
+      integer(int64), intent(out) :: checksum
+
+      checksum = int(c_get_file_checksum(path//c_null_char), int64)
+   end subroutine get_file_checksum
+
+   !> Whether two paths lead to the same file, by links too.
+   function is_same_file(path, other) result(yes)
+      character(len=*), intent(in) :: path
+      !> Path of another one.
+      character(len=*), intent(in) :: other
+      !> They do.
+      logical :: yes
+
+      yes = c_is_same_file(path//c_null_char, other//c_null_char) == 1
+   end function is_same_file
 
    !> Free space on the disk of a directory, or of the next one above that is there.
    function get_free_bytes(path) result(bytes)

@@ -12,20 +12,31 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from http.client import HTTPConnection
 from itertools import chain
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-START = "import sys; from thud_driver import main; sys.exit(main())"
+START = "import sys; from thud_driver import main; {}; sys.exit(main())"
 Served = tuple[str, "subprocess.Popen[str]"]
 
 
 @contextmanager
-def serve(*arguments: str) -> Iterator[Served]:
-    """Yield the address of a server, and its process."""
-    command = [sys.executable, "-c", START, "explore", "--no-browser", *arguments]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+def serve(*arguments: str, before: str = "pass", screen: IO[str] | None = None) -> Iterator[Served]:
+    """Yield the address of a server, and its process.
+
+    Parameters
+    ----------
+    *arguments
+        Of the command.
+    before
+        Python that runs before it.
+    screen
+        File of the standard error; by default that of this process.
+    """
+    start = START.format(before)
+    command = [sys.executable, "-c", start, "explore", "--no-browser", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=screen, text=True) as process:
         assert process.stdout is not None
         address = re.search(r"http\S+", process.stdout.readline())
         assert address

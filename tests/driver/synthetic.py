@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from thud.recordings.contact import Contact, Estimate, even_edges
+from thud.recordings.estimates import Drop
+from thud.recordings.noise import Background, Noise
+
 # Exponents of the power spectra of noise.
 COLOURS = {"white": 0, "pink": 1, "brown": 2}
 # Below this, Hz, the spectra of coloured noise are even.
@@ -114,3 +118,52 @@ def make_recording(  # noqa: PLR0913 - each is one fault
         recording += amplitude * part * np.sin(2 * np.pi * k * frequency * time + phase)
     recording += coloured_noise(n, rate, peak * 10 ** (-noise_db / 20), colour, rng)
     return recording, clean
+
+
+def make_drop(  # noqa: PLR0913 - what a recording may be
+    deviation: float = 0.0,
+    rate: float = 25600.0,
+    *,
+    before: float = 0.1,
+    after: float = 0.1,
+    seed: int = 0,
+    density: float | None = None,
+) -> Drop:
+    """Return a half-sine with white noise, known by its density, whose offset was removed."""
+    time = (np.arange(round((before + 0.02 + after) * rate)) - round(before * rate)) / rate
+    noise = np.random.default_rng(seed).normal(scale=deviation, size=len(time))
+    quiet = (time < 0) | (time > 0.02)
+    if deviation:
+        noise -= noise[quiet].mean()
+    gate = (round(before * rate) - 4, round((before + 0.02) * rate) + 5)
+    draws = np.array([[max(density or 2 * deviation**2 / rate, 1e-30), 0, 0, 0, 0]])
+    # The offset of white noise, from all the quiet.
+    n_cell = len(even_edges(*gate, rate)) - 1
+    offset = np.full((n_cell, n_cell), draws[0, 0] / 2 * rate / quiet.sum())
+    touch, release = Estimate(0, 0), Estimate(0.02, 0)
+    force = half_sine(rate, before, len(time)) + noise
+    return Drop(
+        name=f"drop {seed + 1}",
+        begin=float(time[0]),
+        force=force,
+        sample_rate=rate,
+        onset=before,
+        gate=gate,
+        contact_time=release,
+        restitution=Estimate.unknown(),
+        restitution_shared={},
+        restitution_by="",
+        restitutions={},
+        peak_force=Estimate(1500, 0),
+        impulse=Estimate.unknown(),
+        effective_mass=Estimate.unknown(),
+        noise=Noise(deviation, "before and after", float(draws[0, 0])),
+        bounces=(),
+        steps=(),
+        remarks=(),
+        contact=Contact(
+            touch, release, touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)),
+            gate, offset, (before, after),
+            Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
+        ),
+    )  # fmt: skip

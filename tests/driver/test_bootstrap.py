@@ -78,11 +78,14 @@ def test_directory_of_links_follows_the_checkout(tmp_path: Path) -> None:
     checkout = tmp_path / ODD
     checkout.mkdir()
     cache = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    (checkout / "src").mkdir()
+    (checkout / "src/main").write_text("kept")
     for entry in ("first", ".second"):
         (checkout / entry).write_text(entry)
         done = in_checkout(checkout, "leave_odd_path && pwd -P && echo kept >build/log", **cache)
         work = tmp_path / "cache/thud" / done.stdout.strip().rpartition("/")[2]
         assert (work / entry).read_text() == entry
+        assert (work / "src/main").samefile(checkout / "src/main")
         (checkout / entry).unlink()
     assert (checkout / "build/log").read_text() == "kept\n"
     assert not os.path.lexists(work / "first")

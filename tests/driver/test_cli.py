@@ -6,17 +6,17 @@ import os
 import re
 import subprocess
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import INPUTS, MINIMAL, naming
+from conftest import INPUTS, MINIMAL, REPOSITORY, naming
 
 import thud
 from thud import cli
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     CaseFile = Callable[..., Path]
 
@@ -123,7 +123,7 @@ def test_figures_of_the_paper(tmp_path: Path) -> None:
         *("modal_families", "momentum_flux", "tyre_levels"),
     )
     drawn = sorted(path.name for path in (tmp_path / "drawn").iterdir())
-    assert drawn == [f"{name}.{ending}" for name in names for ending in ("png", "svg")]
+    assert drawn == [".thud", *(f"{name}.{ending}" for name in names for ending in ("png", "svg"))]
 
 
 def test_figures_that_cannot_be_saved_are_told(
@@ -174,28 +174,73 @@ SPEAKING = (
 )
 
 
-@pytest.mark.parametrize(
-    ("screen", "unbuffered"),
-    [("> /dev/full", ""), ("> /dev/full", "1"), (">&-", ""), ("| head -c 0", "")],
-)
+def speak(arguments: str, screen: str, unbuffered: str, folder: Path) -> tuple[int, str]:
+    """Return exit code and errors of a command with a screen as the shell redirects it."""
+    command = f"{{ {sys.executable} -m thud {arguments} 2> errors; echo $? > code; }} {screen}"
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    subprocess.run(["/bin/sh", "-c", command], cwd=folder, env=environment, check=False)
+    return int((folder / "code").read_text()), (folder / "errors").read_text()
+
+
+@pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("arguments", SPEAKING)
-def test_screen_that_takes_nothing_is_told_in_one_sentence(
-    arguments: str, screen: str, unbuffered: str, case_file: CaseFile, tmp_path: Path
+def test_full_screen_is_told_in_one_sentence(
+    arguments: str, unbuffered: str, case_file: CaseFile, tmp_path: Path
 ) -> None:
     case_file(MINIMAL)
     case_file(MINIMAL, "other.nml")
-    command = f"{{ {sys.executable} -m thud {arguments} 2> errors; echo $? > code; }} {screen}"
-    subprocess.run(
-        ["/bin/sh", "-c", command],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
-        check=False,
-    )
-    assert (tmp_path / "code").read_text() == "1\n"
-    errors = (tmp_path / "errors").read_text()
+    code, errors = speak(arguments, "> /dev/full", unbuffered, tmp_path)
+    assert code == 1
     assert errors.count("standard output") == 1
     assert "Traceback" not in errors
     assert "ignored" not in errors
+
+
+@pytest.mark.parametrize("screen", [">&-", "| true", "| head -n 1"])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", SPEAKING)
+def test_screen_that_nobody_reads_is_no_failure(
+    arguments: str, unbuffered: str, screen: str, case_file: CaseFile, tmp_path: Path
+) -> None:
+    case_file(MINIMAL)
+    case_file(MINIMAL.replace("&ball", "&case name = 'other' / &ball"), "other.nml")
+    assert speak(arguments, screen, unbuffered, tmp_path) == (0, "")
+    if arguments.startswith("run"):
+        written = {path.parent.name for path in (tmp_path / "outputs").rglob("force.csv")}
+        assert written == {"case", "other"}
+
+
+@pytest.mark.parametrize("command", ["thud", "thud-driver"])
+def test_measurement_and_run_that_nobody_reads_have_their_results(
+    command: str, case_file: CaseFile, executable: str, tmp_path: Path
+) -> None:
+    case = case_file(MINIMAL)
+    drop = REPOSITORY / "inputs/recordings/drop_1.wav"
+    calls = [f"{executable} {case} -o out"]
+    if command == "thud-driver":
+        measure = f"measure {drop} --calibration '5000 N/FS' --workers 1 --no-figures -o out"
+        calls = [f"{sys.executable} -m thud {measure}"]
+    for screen in (">&-", "| true"):
+        shell = f"{{ {calls[0]} 2> errors; echo $? > code; }} {screen}"
+        subprocess.run(["/bin/sh", "-c", shell], cwd=tmp_path, check=False)
+        assert (tmp_path / "code").read_text() == "0\n", (tmp_path / "errors").read_text()
+        assert "standard output" not in (tmp_path / "errors").read_text()
+        assert (tmp_path / "out/levels.csv").exists()
+
+
+@pytest.mark.parametrize("start", [["thud-driver"], [sys.executable, "-P", "-m", "thud"]])
+def test_files_named_as_modules_of_python_are_not_imported(
+    start: list[str], case_file: CaseFile, executable: str, tmp_path: Path
+) -> None:
+    case = case_file(MINIMAL)
+    for name in ("types", "numpy", "signal", "f90nml"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit(9)")
+    if start == ["thud-driver"]:
+        start = [str(Path(executable).with_name("thud-driver"))]
+    command = [*start, "run", "-q", "--no-figures", str(case)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert (tmp_path / "outputs/case/force.csv").exists()
 
 
 @pytest.mark.parametrize("screen", ["> /dev/full", ">&-"])
@@ -210,12 +255,8 @@ def test_errors_that_nobody_can_read_change_no_exit_code(
             ["/bin/sh", "-c", command], cwd=tmp_path, stdout=subprocess.PIPE, text=True, check=False
         )
         assert done.returncode == code
-        assert (
-            subprocess.run(
-                ["/bin/sh", "-c", f"{command} >&-"], cwd=tmp_path, check=False
-            ).returncode
-            == 1
-        )
+        quiet = subprocess.run(["/bin/sh", "-c", f"{command} >&-"], cwd=tmp_path, check=False)
+        assert quiet.returncode == code
         # Errors do not end up among the results.
         assert done.stdout.count("thud-driver") == 0
         assert bool(done.stdout) == (code == 0)

@@ -12,6 +12,8 @@ from conftest import MINIMAL, REPOSITORY, naming
 
 import thud
 from thud import cli
+from thud.comparison import _cell, _digits
+from thud.criteria import Criterion
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -184,3 +186,44 @@ def test_case_that_fails_is_named() -> None:
     low = thud.Case(sampling=thud.Sampling(duration=0.01))
     with pytest.raises(thud.InputError, match=naming("short", "&sampling: duration")):
         thud.compare({"short": low})
+
+
+@pytest.mark.parametrize(
+    ("value", "conforms", "unit", "decimals", "cell"),
+    [
+        (0.021, True, 1e-3, 2, "21.00"), (37.9, False, 1.0, 1, "37.9 low"),
+        (40.1, False, 1.0, 1, "40.1 high"), (38.0, False, 1.0, 1, "38.0 open"),
+        (40.0, False, 1.0, 1, "40.0 open"), (np.nan, False, 1.0, 1, "not known"),
+        (-0.0001, True, 1.0, 2, "0.00"),
+    ],
+)  # fmt: skip
+def test_cell_tells_how_a_criterion_is_missed(
+    value: float, unit: float, decimals: int, cell: str, *, conforms: bool
+) -> None:
+    criterion = Criterion("octave_31_5", "dB", value, 38.0, 40.0, conforms=conforms)
+    assert _cell(criterion, unit, decimals) == cell
+
+
+def test_small_forces_have_three_digits() -> None:
+    assert [_digits(force) for force in (0.12345, 0.9999, 1.0, 1574.26)] == [
+        "0.123", "1", "1.0", "1574.3",
+    ]  # fmt: skip
+
+
+def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
+    low = thud.Case(drop=thud.Drop(0.9), model=thud.HollowSphere())
+    with pytest.raises(thud.InputError, match="&drop: height or gravity differs"):
+        thud.compare([thud.solve(), low])
+    # The same speed by another height.
+    same = thud.Case(drop=thud.Drop(0.5, 2 * 9.81), model=thud.HollowSphere(), name="heavy")
+    impact = thud.solve()
+    found = thud.compare([impact, same, same])
+    assert list(found.impacts) == [impact.case.name, "heavy", "heavy (2)"]
+    assert set(found.run_times) == {"heavy", "heavy (2)"}
+    assert all(seconds > 0 for seconds in found.run_times.values())
+    assert found.impacts[impact.case.name] is impact
+    rows = {row[0]: row[1:] for row in found.rows()}
+    assert rows["computed in, ms"][0] == ""
+    expected = f"{1e3 * found.run_times['heavy']:.1f}"
+    assert rows["computed in, ms"][1] == expected
+    assert rows["peak force, N"][0] == _digits(impact.peak())

@@ -36,6 +36,20 @@ def test_curve_has_points_table_and_figure() -> None:
     assert [text.get_text() for text in named.legends[0].get_texts()] == ["modal ball"]
 
 
+def test_arguments_are_keys_of_the_case() -> None:
+    ball, model = thud.Ball(youngs_modulus=2e6), thud.ModalBall(rings=24)
+    case = thud.compress(ball, model, max_deflection=0.01, points=7, gas="adiabatic").case
+    assert (case.ball, case.model) == (ball, model)
+    assert case.compression == thud.Compression(0.01, 7, "adiabatic")
+    default = thud.compress()
+    assert default.case == thud.Case(model=thud.HollowSphere(), compression=thud.Compression())
+    # About ten rows, from the first point on.
+    rows = thud.compress(points=41, max_deflection=0.02).rows()[1:]
+    assert [float(row[0]) for row in rows] == pytest.approx(np.arange(0, 20.1, 2))
+    few = thud.compress(points=5, max_deflection=0.02)
+    assert [float(row[1]) for row in few.rows()[1:]] == pytest.approx(few.force, abs=0.006)
+
+
 def test_gas_that_leaves_gives_no_force() -> None:
     ball = thud.Ball(youngs_modulus=1.0)
     forces = {

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from conftest import naming
+from scipy.interpolate import PchipInterpolator
+from scipy.stats import t
 
 import thud
+from thud.compression_fit import _doubts, _ratio
 
 TRUE = thud.Ball(youngs_modulus=1.83e6)
 START = thud.Ball(youngs_modulus=3e6)
@@ -77,6 +80,8 @@ def test_curve_that_begins_under_load_is_doubted(
         ([0, 1e-3, 1e-3, 2e-3, 3e-3], range(5), naming("deflection", "point 3")),
         ([0, 1e-3, 2e-3, 3e-3, np.nan], range(5), naming("deflection", "finite")),
         ([0, 1e-3, 2e-3, 3e-3, 4e-3], [4, 3, 2, 1, 0], naming("force", "deflection")),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [1, 1, 1, 1, 1], naming("force", "deflection")),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [-2, -1, 0, 0, 0], naming("force", "deflection")),
         ([0, 1e-3, 2e-3, 3e-3, 0.2], range(5), naming("max_deflection", "0.178 m")),
         ([0, 1e-12, 2e-12, 3e-12, 4e-12], range(5), naming("model", "force")),
         ("curve", range(5), naming("deflection")),
@@ -94,3 +99,73 @@ def test_modulus_of_a_spring_that_has_none_is_refused(
     spring = thud.HuntCrossley(stiffness=2e5)
     with pytest.raises(thud.NumericalError, match=naming("youngs_modulus")):
         thud.fit_compression(*measured, START, spring)
+
+
+def test_covariance_is_that_of_the_linearised_curve(
+    measured: tuple[np.ndarray, np.ndarray],
+) -> None:
+    """Noise squared over the normal matrix of both derivatives, by differences of the model."""
+    deflection, force = measured
+    noise = np.random.default_rng(2).normal(scale=2.0, size=len(force))
+    fit = thud.fit_compression(deflection, force + noise, START, MODEL, confidence=0.9)
+    deviation = np.sqrt(fit.residuals @ fit.residuals / (len(force) - 2))
+    assert fit.noise == pytest.approx(deviation)
+
+    def model(modulus: float, touch: float) -> np.ndarray:
+        ball = thud.Ball(youngs_modulus=modulus)
+        curve = thud.compress(ball, MODEL, max_deflection=0.033, points=161)
+        return np.asarray(PchipInterpolator(curve.deflection, curve.force)(
+            np.maximum(deflection - touch, 0)))  # fmt: skip
+
+    best = np.array([fit.youngs_modulus, fit.touch])
+    assert model(*best) - force - noise == pytest.approx(fit.residuals, abs=0.5)
+    steps = np.diag([1e3, 1e-6])
+    slopes = np.stack([(model(*(best + s)) - model(*(best - s))) / (2 * s.sum()) for s in steps])
+    expected = deviation**2 * np.linalg.inv(slopes @ slopes.T)
+    np.testing.assert_allclose(fit.covariance, expected, rtol=0.02)
+    width = t.ppf(0.95, len(force) - 2) * np.sqrt(np.diag(fit.covariance))
+    np.testing.assert_allclose(fit.interval, np.stack([best - width, best + width], axis=1))
+    assert fit.confidence == 0.9
+    rows = fit.rows()[1:]
+    for row, scale, value, ends in zip(rows, (1e-6, 1e3), best, fit.interval, strict=True):
+        assert [float(cell) for cell in row[2:]] == pytest.approx(
+            [scale * value, scale * ends[0], scale * ends[1]], rel=1e-4
+        )
+
+
+def test_search_starts_with_the_work_of_the_measured_curve() -> None:
+    curve = thud.compress(START, MODEL, max_deflection=0.03, points=31)
+    depth = np.linspace(0, 0.02, 41)
+    force = np.interp(depth, curve.deflection, curve.force)
+    for factor in (0.4, 1.0, 3.0):
+        assert _ratio(curve, depth + 0.1, factor * force) == pytest.approx(factor)
+    # Where the work is next to nothing, a hundredth of the last force times the way.
+    last = np.append(np.zeros(40), 100.0)
+    work = np.trapezoid(force, depth)
+    assert _ratio(curve, depth, last - 2 * (depth < 0.01)) == pytest.approx(
+        0.01 * 100 * 0.02 / work
+    )
+
+
+@pytest.mark.parametrize(
+    ("place", "doubted"),
+    [(-0.04, True), (-0.04 + 2e-6, False), (0.0, False), (0.9 - 2e-6, False), (0.9, True)],
+)
+def test_touch_at_the_limit_of_the_search_is_doubted(place: float, *, doubted: bool) -> None:
+    bounds = ([-np.inf, -0.04], [np.inf, 0.9])
+    signs = np.random.default_rng(1).normal(size=60)
+    assert len(_doubts(signs, place, bounds)) == int(doubted)
+    assert len(_doubts(abs(signs), place, bounds)) == int(doubted) + 1
+
+
+@pytest.mark.parametrize("count", [4, 5])
+def test_fewest_points_leave_something_to_two_parameters(
+    measured: tuple[np.ndarray, np.ndarray], count: int
+) -> None:
+    some = np.linspace(3, 43, count).astype(int)
+    if count < 5:
+        with pytest.raises(thud.InputError, match="at least 5"):
+            thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)
+    else:
+        fit = thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)
+        assert fit.youngs_modulus == pytest.approx(TRUE.youngs_modulus, rel=0.01)

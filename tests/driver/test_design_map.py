@@ -188,6 +188,7 @@ def test_command_writes_figure_and_table(
     study.write_text("parameters = {mass={values=[2, 3]}, height={values=[1, 2]}}")
     assert cli.main(["design", "-q", str(study), "-o", str(tmp_path)]) == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == [
+        ".thud",
         "design.nc",
         "design.png",
         "design.svg",

@@ -218,7 +218,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
         thud.sweep({**other, "name": "b"}, tmp_path)
     assert (tmp_path / "b.nc").read_bytes() == before
     (tmp_path / "c.nc").write_text("no dataset")
-    with pytest.raises(thud.InputError, match=naming("c.nc")):
+    with pytest.raises(thud.InputError, match=naming("c.nc", "--replace")):
         thud.sweep({**other, "name": "c"}, tmp_path)
     (tmp_path / "d.partial").mkdir()
     (tmp_path / "d.partial/study").write_text('{"thud": "0.0.1", "sets in a block": "9"}')
@@ -230,7 +230,6 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
         thud.sweep({**other, "name": "d"}, tmp_path)
     assert len(list((tmp_path / "d.partial").iterdir())) == 2
     (tmp_path / "e.partial").mkdir()
-    (tmp_path / "e.partial/study").write_text("of a study that has not finished a set")
     # Kills leave half a file.
     (tmp_path / "e.partial/.study.part").write_text("")
     (tmp_path / ".e.nc.part").write_text("")
@@ -356,15 +355,27 @@ def test_interrupt_of_a_removal_leaves_no_half_directory(
     assert [path.name for path in tmp_path.iterdir()] == ["heights.zarr"]
 
 
-def test_replace_does_not_remove_what_is_of_something_else(tmp_path: Path) -> None:
+def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) -> None:
     (tmp_path / "python.nc").write_text("a paper")
-    with pytest.raises(thud.InputError, match=naming("python.nc")):
-        thud.sweep(HEIGHTS, tmp_path, replace=True)
+    with pytest.raises(thud.InputError, match=naming("python.nc", "--replace")):
+        thud.sweep(HEIGHTS, tmp_path)
+    assert (tmp_path / "python.nc").read_text() == "a paper"
+    assert thud.sweep(HEIGHTS, tmp_path, replace=True).sizes["height"] == 2
     (tmp_path / "fit.json").write_text("[]")
     study = {"target": {"levels": [39, 31, 23, 17, 12]}, "parameters": {"mass": {}}}
-    with pytest.raises(thud.InputError, match=naming("fit.json")):
-        fit.KIND.run(study, tmp_path, replace=True)
+    with pytest.raises(thud.InputError, match=naming("fit.json", "--replace")):
+        fit.KIND.run(study, tmp_path)
     assert (tmp_path / "fit.json").read_text() == "[]"
+
+
+@pytest.mark.parametrize("name", ["python.partial", "python.zarr", "python.nc"])
+def test_directories_of_something_else_stay(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "paper.txt").write_text("mine")
+    for replace in (False, True):
+        with pytest.raises(thud.InputError, match=f"{name}.* is in the way"):
+            thud.sweep(HEIGHTS, tmp_path, replace=replace)
+    assert (tmp_path / name / "paper.txt").read_text() == "mine"
 
 
 def test_unfinished_blocks_of_another_size_are_computed_again(tmp_path: Path) -> None:

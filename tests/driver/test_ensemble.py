@@ -6,7 +6,8 @@ import dataclasses
 import re
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import thud
+from thud import ensemble
 from thud.outcomes import FURTHER
 
 if TYPE_CHECKING:
@@ -371,3 +373,108 @@ def test_levels_of_long_contacts_are_those_of_single_drops() -> None:
             np.testing.assert_allclose(levels, single.levels(force=force), rtol=0, atol=1e-6)
             np.testing.assert_array_equal(alone.levels[force, "octave"][0], levels)
     assert max(many.contact_time) > 0.15
+
+
+def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    parameters = random_sets(50, 4)
+    whole = thud.solve_many(parameters, bands="third", forces=True)
+    sizes = []
+    compute = ensemble._compute  # noqa: SLF001
+
+    def count(*arguments: Any, **options: Any) -> dict[str, Any]:  # noqa: ANN401
+        sizes.append(len(arguments[2]))
+        return compute(*arguments, **options)
+
+    monkeypatch.setattr(ensemble, "_compute", count)
+    for most, expected in ((16, [16, 16, 16, 2]), (50, [50]), (25, [25, 25])):
+        sizes.clear()
+        monkeypatch.setattr(ensemble, "_MAX_CALL", most)
+        parts = thud.solve_many(parameters, bands="third", forces=True)
+        assert_same_bits(whole, parts)
+        np.testing.assert_array_equal(parts.floor_force, whole.floor_force)
+        assert sizes == expected
+    # A call takes about a second: one set at least.
+    monkeypatch.setattr(ensemble, "_CALL_TIME", 0.0)
+    sizes.clear()
+    thud.solve_many({"height": [1.0, 1.1]})
+    assert sizes == [1, 1]
+
+
+def test_levels_and_forces_are_kept_by_their_names() -> None:
+    found = thud.solve_many({"height": [0.8, 1.0]}, bands="third", forces=True)
+    assert list(found.levels) == [
+        (force, bands) for bands in ("octave", "third") for force in ("elastic", "floor")
+    ]
+    for i, height in enumerate((0.8, 1.0)):
+        impact = thud.solve(drop=thud.Drop(height))
+        for (force, bands), levels in found.levels.items():
+            assert levels[i] == pytest.approx(impact.levels(bands, force=force), abs=1e-6)
+        for force in ("elastic", "floor"):
+            kept = getattr(found, f"{force}_force")[i]
+            assert kept == pytest.approx(impact.force(force), abs=1e-6)  # type: ignore[arg-type]
+            met = getattr(found, f"{force}_conforms")[i]
+            assert met == impact.conformity(force=force).conforms  # type: ignore[arg-type]
+    assert list(thud.solve_many({"height": 1.0}).levels) == [
+        ("elastic", "octave"),
+        ("floor", "octave"),
+    ]
+    assert found.sample_rate == 44100
+
+
+@pytest.mark.parametrize("bands", ["octave", "third", "both"])
+def test_numbers_below_a_floor_stand_in_their_columns(bands: Any) -> None:  # noqa: ANN401
+    case = thud.Case(
+        model=thud.HollowSphere(), floor=thud.Plate(thickness=0.1), room=thud.Room(),
+        levels=thud.Levels(bands=bands),
+    )  # fmt: skip
+    found = thud.solve_many({"height": [0.9]}, case)
+    impact = thud.solve_case(replace(case, drop=thud.Drop(0.9)))
+    assert impact.on_floor is not None
+    kinds = ["octave", "third"] if bands == "both" else [bands]
+    assert list(found.contact_levels) == kinds
+    for kind, levels in found.contact_levels.items():
+        expected = impact.on_floor.levels(kind, force="floor")  # type: ignore[arg-type]
+        assert levels[0] == pytest.approx(expected, abs=1e-6)
+    assert found.floor_work[0] == pytest.approx(impact.on_floor.floor_work)
+    below = thud.predict_level(impact)
+    assert found.room_level[0] == pytest.approx(below.level)
+    assert found.room_rating[0] == pytest.approx(below.rating.a_weighted)
+    assert found.standardised_rating[0] == pytest.approx(below.standardised_rating.a_weighted)
+    without = thud.solve_many({"height": [0.9]}, replace(case, room=None))
+    assert without.floor_work.tolist() == found.floor_work.tolist()
+    assert without.room_level is None
+
+
+def test_keywords_replace_those_of_the_case() -> None:
+    case = thud.Case(
+        model=thud.HollowSphere(momentum_flux="none"), sampling=thud.Sampling(48000.0, 0.04, 9),
+        limits=thud.Limits("tyre"), levels=thud.Levels(bands="third"),
+    )  # fmt: skip
+    plain = thud.solve_many({"height": [1.0]}, case, forces=True)
+    assert plain.case == case
+    assert plain.floor_force is not None
+    assert plain.floor_force.shape == (1, 1920)
+    words = {"sample_rate": 44100.0, "duration": 0.05, "substeps": 7, "source": "rubber_ball"}
+    found = thud.solve_many({"height": [1.0]}, case, bands="octave", **words).case  # type: ignore[arg-type]
+    assert found.sampling == thud.Sampling(44100.0, 0.05, 7)
+    assert (found.limits.source, found.levels.bands) == ("rubber_ball", "octave")
+    assert found.model == case.model
+    # The options of the case are those of its model only.
+    assert thud.solve_many({}, case, model="hollow_sphere").case.model == case.model
+    assert thud.solve_many({}, case, model="modal_ball").case.model == thud.ModalBall()
+    assert thud.solve_many({}).case.model == thud.HollowSphere()
+    with pytest.raises(thud.InputError, match="'source' is given twice"):
+        thud.solve_many({"source": ["tyre"]}, source="tyre")
+    for threads in (0, 1025):
+        with pytest.raises(thud.InputError, match="threads"):
+            thud.solve_many({}, threads=threads)
+    assert thud.solve_many({}, threads=1024).status.tolist() == [0]
+
+
+def test_choices_are_those_of_their_words() -> None:
+    words = np.array(["none", "retarding", "momentum_balance", "none"])
+    found = thud.solve_many({"momentum_flux": words})
+    for word, peak in zip(words, found.peak_force, strict=True):
+        assert peak == pytest.approx(thud.solve(momentum_flux=str(word)).peak_force, rel=1e-9)
+    with pytest.raises(thud.InputError, match="'some'"):
+        thud.solve_many({"momentum_flux": ["none", "some"]})

@@ -32,7 +32,7 @@ from thud.explorer.answer import new_case
 from thud.explorer.form import form
 
 if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable, Iterator
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator
 
 TOKEN = "secret"  # noqa: S105 - of the test
 HEAD = {server.TOKEN: TOKEN}
@@ -139,9 +139,21 @@ def test_slow_case_reports_and_answers(client: TestClient) -> None:
     assert np.shape(answer["motion"]["outer"])[1:] == (49, 2)
 
 
-def test_many_steps_are_slow(client: TestClient) -> None:
-    response = client.post("/solve", json=SHELL | {"sampling": {"substeps": 1000}})
-    assert response.text.startswith('{"done": 0.0}\n')
+@pytest.mark.parametrize(
+    "values",
+    [
+        SHELL | {"sampling": {"substeps": 1000}},
+        {"model": {"name": "modal_ball"}, "sampling": {"substeps": 200}},
+        SHELL | {"floor": {"name": "plate"}, "sampling": {"substeps": 100}},
+        SHELL | {"floor": {"name": "plate"}, "plate": {"length": 40, "width": 40}},
+    ],
+    ids=["steps", "modal steps", "steps of a floor", "modes of a floor"],
+)
+def test_many_steps_and_modes_are_slow(client: TestClient, values: dict[str, Any]) -> None:
+    assert client.post("/solve", json=values).text.startswith('{"done": 0.0}\n')
+
+
+def test_too_many_samples_are_refused(client: TestClient) -> None:
     response = client.post("/solve", json=SHELL | {"sampling": {"sample_rate": 1e7}})
     assert response.status_code == 400
     assert re.search("samples|steps", response.text)
@@ -257,7 +269,7 @@ def test_recordings_and_works_leave_no_files(
         ({"floor": {"name": 3}}, "floor"),
         ({"ball": {"mass": 1e300}}, "mass"),
         ({"ball": {"mass": {"a": 1}}}, "mass"),
-        ({"sampling": {"substeps": 10**400}}, "large"),
+        ({"sampling": {"substeps": 10**400}}, "substeps"),
     ],
 )
 def test_bad_values_get_a_sentence(client: TestClient, values: object, words: str) -> None:
@@ -267,17 +279,72 @@ def test_bad_values_get_a_sentence(client: TestClient, values: object, words: st
     assert "\n" not in response.text
 
 
-def test_only_the_page_with_its_token_is_answered(client: TestClient) -> None:
+# Routes that show the page itself, without a token; all others are to refuse.
+OPEN = {"/": "/", "/page/{name}": "/page/explorer.js"}
+# Tokens that are not that of the server: none, empty, parts of it, longer, of other letters.
+STRANGE_TOKENS = [None, "", "é", "guess", TOKEN[:1], TOKEN[:-1], TOKEN[1:], TOKEN + "x"]
+STRANGE_ORIGINS = [
+    "http://elsewhere.example", "null", "", "https://127.0.0.1", "http://127.0.0.1:1",
+    "http://127.0.0.1.rebound.example", "http://localhost", "http://127.0.0.1 ",
+]  # fmt: skip
+STRANGE_HOSTS = [
+    "rebound.example", "rebound.example:80", "127.0.0.1.rebound.example", "rebound.127.0.0.1",
+    "127.0.0.1@rebound.example", "localhost.rebound.example", "127.1", "2130706433", "",
+]  # fmt: skip
+
+
+def requests_of(client: TestClient) -> list[tuple[str, str, str]]:
+    """Return the path of each route of the application, a method, and an address."""
+    found = []
+    for route in client.app.routes:  # type: ignore[attr-defined]
+        address = OPEN.get(route.path, re.sub(r"\{.*?\}", "case.nml", route.path))
+        found += [(route.path, method, address) for method in route.methods]
+    assert {"/about", "/solve", "/measure", "/download/{what}"} < {path for path, *_ in found}
+    return found
+
+
+def status_of(client: TestClient, method: str, address: str, headers: dict[str, str]) -> int:
+    """Return the status of a request with these headers only."""
+    bare = TestClient(client.app, base_url="http://127.0.0.1")
+    content = json.dumps(SHELL) if method == "POST" else None
+    encoded = {name: value.encode() for name, value in headers.items()}
+    return bare.request(method, address, content=content, headers=encoded).status_code
+
+
+@pytest.mark.parametrize("token", STRANGE_TOKENS)
+def test_every_route_refuses_other_tokens(client: TestClient, token: str | None) -> None:
+    headers = {} if token is None else {server.TOKEN: token}
+    for path, method, address in requests_of(client):
+        expected = 200 if path in OPEN else 403
+        assert status_of(client, method, address, headers) == expected, (method, path)
+
+
+@pytest.mark.parametrize("origin", STRANGE_ORIGINS)
+def test_every_route_refuses_other_origins(client: TestClient, origin: str) -> None:
+    for path, method, address in requests_of(client):
+        expected = 200 if path in OPEN else 403
+        assert status_of(client, method, address, {**HEAD, "Origin": origin}) == expected, path
+    assert status_of(client, "GET", "/about", {**HEAD, "Origin": "http://127.0.0.1"}) == 200
+
+
+@pytest.mark.parametrize("host", STRANGE_HOSTS)
+def test_every_route_refuses_other_hosts(client: TestClient, host: str) -> None:
+    own = {"Origin": f"http://{host}"}
+    for path, method, address in requests_of(client):
+        for origin in ({}, own):
+            status = status_of(client, method, address, {**HEAD, **origin, "Host": host})
+            assert status == 400, (method, path)
+
+
+def test_page_holds_no_token(client: TestClient) -> None:
     assert client.get("/about").status_code == 200
-    assert client.get("/about", headers={server.TOKEN: "guess"}).status_code == 403
-    for origin in ("http://elsewhere.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"):
-        assert client.get("/about", headers={"Origin": origin}).status_code == 403
-    for path in ("/about", "/", "/page/explorer.js"):
-        for host in ("rebound.example", "rebound.example:80", "127.0.0.1.rebound.example", ""):
-            assert client.get(path, headers={"Host": host}).status_code == 400
-    page = client.get("/", headers={server.TOKEN: ""})
-    assert page.status_code == 200
-    assert TOKEN not in page.text
+    for path in ("/", *(f"/page/{name}" for name in server.FILES)):
+        assert TOKEN not in client.get(path).text
+
+
+def test_empty_token_is_refused_at_the_start() -> None:
+    with pytest.raises(thud.InputError, match="token"):
+        server.new_application({}, token="", hosts=("127.0.0.1",))
 
 
 def test_no_path_reaches_the_file_system(client: TestClient) -> None:
@@ -286,10 +353,29 @@ def test_no_path_reaches_the_file_system(client: TestClient) -> None:
     assert client.post("/download/..%2fcase.nml", json=SHELL).status_code == 404
 
 
-def test_long_bodies_are_refused(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert client.post("/solve", content=b" " * (server.MAX_CASE + 1)).status_code == 413
-    monkeypatch.setattr(server, "MAX_RECORDING", 1000)
-    assert client.post("/measure?name=a.wav", content=b"\0" * 1001).status_code == 413
+@pytest.mark.parametrize("path", ["/solve", "/download/case.nml", "/measure?name=a.wav"])
+@pytest.mark.parametrize("parts", [1, 10, 1000])
+def test_bodies_may_be_as_long_as_allowed_and_no_longer(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, path: str, parts: int
+) -> None:
+    # The limit holds for all parts together.
+    limit = 2000
+    monkeypatch.setattr(server, "MAX_CASE", limit)
+    monkeypatch.setattr(server, "MAX_RECORDING", limit)
+    content = json.dumps(SHELL).encode().ljust(limit)
+
+    def send(body: bytes) -> int:
+        length = -(-len(body) // parts)
+        pieces = (body[at : at + length] for at in range(0, len(body), length))
+        return client.post(path, content=pieces).status_code
+
+    assert send(content) == 200
+    assert send(content + b" ") == 413
+
+
+def test_limits_of_bodies_are_those_of_the_documentation() -> None:
+    assert server.MAX_CASE == 0.1e6
+    assert server.MAX_RECORDING == 200e6
 
 
 def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None:
@@ -475,6 +561,35 @@ def test_page_that_leaves_while_it_sends_is_no_traceback(client: TestClient) -> 
         return {"type": "http.disconnect"}
 
     assert call(client, leave)[0]["status"] == 400
+
+
+@pytest.mark.parametrize("path", ["/solve", "/download/report.html"])
+def test_page_that_leaves_while_it_waits_ends_its_work(path: str) -> None:
+    application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",), width=1)
+    ended = []
+
+    async def work(*_: object) -> AsyncGenerator[dict[str, Any], None]:
+        try:
+            yield {"done": 0.0}
+            await asyncio.sleep(60)
+        finally:
+            ended.append(path)
+
+    application.state.quick.run = application.state.slow.run = work
+
+    async def leave() -> None:
+        messages = iter([{"type": "http.request", "body": json.dumps(SHELL).encode()}])
+
+        async def receive() -> dict[str, Any]:
+            return next(messages, {"type": "http.disconnect"})
+
+        async def send(_: object) -> None:
+            pass
+
+        await asyncio.wait_for(application(scope_of(path), receive, send), 20)
+
+    asyncio.run(leave())
+    assert ended == [path]
 
 
 def test_body_that_rests_is_ended(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,8 +15,10 @@ import psutil
 
 from thud.explorer import jobs as module
 from thud.explorer.jobs import Jobs
+from thud.explorer.server import LONGEST
 
 if TYPE_CHECKING:
+    from collections.abc import AsyncGenerator
     from multiprocessing.connection import Connection
 
     import pytest
@@ -45,7 +47,7 @@ def test_process_that_was_stopped_ends_with_its_page() -> None:
 
     async def stop_and_leave() -> None:
         async with anyio.create_task_group() as group:
-            group.start_soon(listen, Jobs(1))
+            group.start_soon(listen, Jobs(1, LONGEST))
             while not workers():  # noqa: ASYNC110 - another process is no event
                 await anyio.sleep(0.05)
             (pid,) = workers()
@@ -73,9 +75,8 @@ async def reports_of(jobs: Jobs) -> list[dict[str, Any]]:
 
 
 def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "LONGEST", 0.5)
     monkeypatch.setattr(module, "_work", send_half)
-    last = anyio.run(reports_of, Jobs(1))[-1]
+    last = anyio.run(reports_of, Jobs(1, 0.5))[-1]
     assert list(last) == ["error"]
     assert "0.5 s" in last["error"]
     assert not workers()
@@ -93,7 +94,7 @@ def test_lost_server_of_forks_is_a_sentence_and_begins_again(
             assert (await reports_of(jobs))[-1]["error"]
         assert "answer" in (await reports_of(jobs))[-1]
 
-    anyio.run(lose, Jobs(1))
+    anyio.run(lose, Jobs(1, LONGEST))
 
 
 def test_reports_are_ended_by_another_task() -> None:
@@ -108,4 +109,63 @@ def test_reports_are_ended_by_another_task() -> None:
         with anyio.fail_after(60):
             assert "answer" in (await reports_of(jobs))[-1]
 
-    anyio.run(end_elsewhere, Jobs(1))
+    anyio.run(end_elsewhere, Jobs(1, LONGEST))
+
+
+def test_kept_process_works_again_until_it_is_late() -> None:
+    async def work(jobs: Jobs) -> None:
+        await reports_of(jobs)
+        (first,) = workers()
+        await reports_of(jobs)
+        assert workers() == [first]
+        # Nobody reads that it has ended.
+        os.kill(first, signal.SIGKILL)
+        while workers():  # noqa: ASYNC110 - another process is no event
+            await anyio.sleep(0.05)
+        assert "answer" in (await reports_of(jobs))[-1]
+        (second,) = workers()
+        os.kill(second, signal.SIGSTOP)
+        assert (await reports_of(jobs))[-1] is late
+        assert not workers()
+        assert "answer" in (await reports_of(jobs))[-1]
+        jobs.close()
+        assert not workers()
+
+    late = {"answer": None}
+    anyio.run(work, Jobs(1, 5.0, late=late, kept=True))
+
+
+def test_works_have_places_and_those_that_wait_end() -> None:
+    async def crowd(jobs: Jobs) -> None:
+        reports = [jobs.run("case", LONG) for _ in range(4)]
+        async with anyio.create_task_group() as group:
+
+            async def wait(some: AsyncGenerator[dict[str, Any], None]) -> None:
+                async for _ in some:
+                    pass
+
+            for some in reports:
+                group.start_soon(wait, some)
+            with anyio.fail_after(60):
+                while len(workers()) < 2:  # noqa: ASYNC110 - another process is no event
+                    await anyio.sleep(0.05)
+            await anyio.sleep(0.5)
+            assert len(workers()) == 2
+            group.cancel_scope.cancel()
+        assert not workers()
+        with anyio.fail_after(60):
+            assert "answer" in (await reports_of(jobs))[-1]
+
+    anyio.run(crowd, Jobs(2, LONGEST))
+
+
+def test_answer_that_nobody_reads_keeps_no_place() -> None:
+    async def rest(jobs: Jobs) -> None:
+        reports = jobs.run("case", {})
+        with anyio.fail_after(60):
+            while "answer" not in await anext(reports):
+                pass
+            assert "answer" in (await reports_of(jobs))[-1]
+        await reports.aclose()
+
+    anyio.run(rest, Jobs(1, LONGEST))

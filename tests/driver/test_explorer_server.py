@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import signal
 import socket
+import subprocess
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from http.client import HTTPConnection
 from typing import TYPE_CHECKING
 
@@ -15,15 +17,16 @@ from explorer_server import Served, answer_of, drag, place_of, serve
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 SHELL = {"model": {"name": "hollow_sphere"}}
 SLOW = {"model": {"name": "finite_element"}, "mesh": {"polar_elements": 600}}
 
 
 @pytest.fixture
-def server() -> Iterator[Served]:
-    """Return the address of a server, and its process."""
-    with serve() as found:
+def server(request: pytest.FixtureRequest) -> Iterator[Served]:
+    """Return the address of a server, and its process; a parameter is what runs before it."""
+    with serve(before=getattr(request, "param", "pass")) as found:
         yield found
 
 
@@ -38,6 +41,14 @@ def alive(process: psutil.Process) -> bool:
         return bool(process.status() != psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:
         return False
+
+
+def await_end(processes: set[psutil.Process]) -> None:
+    """Wait until processes have ended."""
+    end = time.monotonic() + 20
+    while any(map(alive, processes)):
+        assert time.monotonic() < end
+        time.sleep(0.05)
 
 
 def test_ten_users_drag_without_an_error(server: Served) -> None:
@@ -56,16 +67,23 @@ def test_idle_and_slow_connections_hinder_nobody(server: Served) -> None:
         one.close()
 
 
+# Busy machines are slow.
+PATIENT = "from thud.explorer import server; server.LONGEST_QUICK = 60.0"
+
+
+@pytest.mark.parametrize("server", [PATIENT], indirect=True)
 def test_works_end_with_their_user_and_their_server(server: Served) -> None:
     host, port, token = place_of(server[0])
     with closing(HTTPConnection(host, port, timeout=60)) as connection:
-        # Starts the process that forks the others.
+        # Starts the process that forks the others, and the one of quick works.
         assert answer_of(connection, token, {**SHELL, "sampling": {"substeps": 1000}})
     before = processes_of(server)
 
     def begin() -> HTTPConnection:
         connection = HTTPConnection(host, port, timeout=60)
         connection.request("POST", "/solve", json.dumps(SLOW), {"X-Thud-Token": token})
+        # The first report is there before the work begins.
+        assert connection.getresponse().readline()
         return connection
 
     def await_works(count: int) -> set[psutil.Process]:
@@ -81,11 +99,90 @@ def test_works_end_with_their_user_and_their_server(server: Served) -> None:
     works = await_works(1)
     server[1].kill()
     server[1].wait(20)
-    end = time.monotonic() + 20
-    while any(map(alive, works)):
-        assert time.monotonic() < end
-        time.sleep(0.05)
+    await_end(works)
     other.close()
+
+
+def abandon(server: Served, values: object, count: int) -> None:
+    """Ask for works and leave."""
+    host, port, token = place_of(server[0])
+    body = json.dumps(values).encode()
+    head = f"POST /solve HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: {len(body)}\r\n"
+    for _ in range(count):
+        with socket.create_connection((host, port)) as connection:
+            connection.sendall(f"{head}X-Thud-Token: {token}\r\n\r\n".encode() + body)
+
+
+# Estimated at 0.09 s, and not far above.
+MODAL = {"model": {"name": "modal_ball"}, "sampling": {"substeps": 8}}
+
+
+def test_abandoned_works_hinder_neither_a_user_nor_the_end(server: Served) -> None:
+    host, port, token = place_of(server[0])
+    for values in (SLOW, MODAL, SHELL):
+        abandon(server, values, 60)
+    with closing(HTTPConnection(host, port, timeout=60)) as connection:
+        assert answer_of(connection, token, SHELL)
+    for values in (SLOW, MODAL, SHELL):
+        abandon(server, values, 60)
+    works = processes_of(server)
+    server[1].send_signal(signal.SIGTERM)
+    assert server[1].wait(20) == 128 + signal.SIGTERM
+    await_end(works)
+
+
+HANGING = "import asyncio, uvicorn; uvicorn.Server.shutdown = lambda *_, **__: asyncio.sleep(600)"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_second_signal_ends_a_server_that_hangs(number: signal.Signals, tmp_path: Path) -> None:
+    before = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}; {HANGING}"
+    with serve(before=before) as server:
+        host, port, token = place_of(server[0])
+        with closing(HTTPConnection(host, port, timeout=60)) as connection:
+            assert answer_of(connection, token, SHELL)
+        abandon(server, SLOW, 60)
+        works = processes_of(server)
+        server[1].send_signal(number)
+        with pytest.raises(subprocess.TimeoutExpired):
+            server[1].wait(1)
+        server[1].send_signal(number)
+        assert server[1].wait(20) == 128 + number
+    await_end(works)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("files", [200, 1000])
+def test_unfinished_heads_hinder_nobody_and_fill_no_log(files: int, tmp_path: Path) -> None:
+    limit = f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))"
+    kinds = (b"", b"POST /so", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")
+    with (tmp_path / "screen").open("w+") as screen, serve(before=limit, screen=screen) as server:
+        host, port, token = place_of(server[0])
+        heads = []
+        for i in range(3 * files // 2):
+            heads.append(socket.create_connection((host, port), 60))
+            heads[-1].sendall(kinds[i % 3])
+        with closing(HTTPConnection(host, port, timeout=60)) as connection:
+            assert answer_of(connection, token, SHELL)
+        for one in heads:
+            one.close()
+        screen.seek(0)
+        assert len(screen.readlines()) < 5
+
+
+def test_heads_have_a_time() -> None:
+    before = "from thud.explorer import connections; connections.HEAD_TIME = 0.5"
+    with serve(before=before) as server:
+        host, port, _ = place_of(server[0])
+        for text in (b"", b"GET", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nGET"):
+            with socket.create_connection((host, port), 20) as connection:
+                connection.sendall(text)
+                # A byte now and then makes it no longer.
+                with suppress(ConnectionError):
+                    for _ in range(100):
+                        time.sleep(0.05)
+                        connection.sendall(b"x")
+                    pytest.fail("the connection stays")
 
 
 def test_version_6_of_this_machine_is_served() -> None:

@@ -38,6 +38,7 @@ def export(*words: str) -> int:
     parser = ArgumentParser()
     for names, settings in EXPORT.arguments:
         parser.add_argument(*names, **settings)
+    parser.set_defaults(name="export")
     return EXPORT.function(parser.parse_args(words))
 
 
@@ -54,8 +55,8 @@ def half_sine(rate: float, start: float = 0.0) -> BlockedForce:
 def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_path: Path) -> None:
     if kind == "uff":
         pytest.importorskip("pyuff", reason="the extra recordings is not installed")
-    ending, write = EXPORTS[kind]
-    path = write(FORCE, tmp_path / f"force{ending}")[0]
+    ending, _ = EXPORTS[kind]
+    path = export_force.export(kind, FORCE, tmp_path / f"force{ending}")[0]
     calibration = 2048.0 if kind == "wav" else None
     (signal,) = open_signals(path, calibration=calibration)
     # A universal file holds six digits of the time step.
@@ -68,10 +69,11 @@ def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_
 def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
     thud.write_case(IMPACT.case, tmp_path / "case.nml")
     checksum = hashlib.sha256((tmp_path / "case.nml").read_bytes()).hexdigest()
-    for kind, (ending, write) in EXPORTS.items():
+    for kind, (ending, _) in EXPORTS.items():
         if kind == "uff":
             pytest.importorskip("pyuff", reason="the extra recordings is not installed")
-        text = b"".join(p.read_bytes() for p in write(FORCE, tmp_path / f"force{ending}"))
+        paths = export_force.export(kind, FORCE, tmp_path / f"force{ending}")
+        text = b"".join(path.read_bytes() for path in paths)
         if kind == "mat":
             from scipy.io import loadmat  # noqa: PLC0415 - for this format only
 
@@ -166,10 +168,10 @@ def test_force_is_that_which_the_case_judges() -> None:
 
 def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
     force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", remarks=("a\r\nb",))
-    for ending, write in EXPORTS.values():
+    for kind, (ending, _) in EXPORTS.items():
         if ending == ".uff":
             pytest.importorskip("pyuff", reason="the extra recordings is not installed")
-        assert write(force, tmp_path / f"force{ending}")
+        assert export_force.export(kind, force, tmp_path / f"force{ending}")
     (signal,) = open_signals(tmp_path / "force.csv")
     assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
 
@@ -205,11 +207,30 @@ def test_command_writes_what_is_asked_for(
     case = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
     assert export(case, "--csv", "--wav", "-o", str(tmp_path / "a")) == 0
     names = ["rubber_ball_100cm.csv", "rubber_ball_100cm.wav", "rubber_ball_100cm.wav.txt"]
-    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == names
+    assert sorted(path.name for path in (tmp_path / "a").iterdir()) == [".thud", *names]
     assert capsys.readouterr().out.count("rubber_ball_100cm") == 3
     assert export(str(recording), "--spectrum", "--drop", "2", "-q", "-o", str(tmp_path / "b")) == 0
-    assert [path.name for path in (tmp_path / "b").iterdir()] == ["two_drop_2_spectrum.csv"]
+    assert (tmp_path / "b/two_drop_2_spectrum.csv").exists()
     assert not capsys.readouterr().out
+
+
+def test_recording_is_not_replaced_by_its_force(tmp_path: Path) -> None:
+    path = tmp_path / "drop.csv"
+    path.write_bytes((REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes())
+    before = path.read_bytes()
+    (tmp_path / "link.csv").symlink_to(path)
+    force = blocked_force(thud.read_recording(path))
+    for name in ("drop.csv", "link.csv"):
+        with pytest.raises(thud.InputError, match="is the recording of the force"):
+            export_force.export_csv(force, tmp_path / name)
+    assert path.read_bytes() == before
+    # A path that its user names is replaced, the text beside it only where thud has written it.
+    export_force.export_wav(force, tmp_path / "a.wav")
+    export_force.export_wav(force, tmp_path / "a.wav")
+    (tmp_path / "b.wav.txt").write_text("mine")
+    with pytest.raises(thud.InputError, match=r"b\.wav\.txt is in the way"):
+        export_force.export_wav(force, tmp_path / "b.wav")
+    assert (tmp_path / "b.wav.txt").read_text() == "mine"
 
 
 @pytest.mark.parametrize(

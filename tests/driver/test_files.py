@@ -94,3 +94,17 @@ def test_link_of_the_temporary_name_is_not_followed(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=naming("file.part")):
         replace_file(tmp_path / "file", b"new")
     assert (tmp_path / "other").read_bytes() == b"kept"
+    (tmp_path / ".file.part").unlink()
+    (tmp_path / ".file.part").hardlink_to(tmp_path / "other")
+    with pytest.raises(OSError, match=r"\.file\.part is a link"):
+        replace_file(tmp_path / "file", b"new")
+    assert (tmp_path / "other").read_bytes() == b"kept"
+
+
+def test_pipes_are_neither_opened_nor_replaced(tmp_path: Path) -> None:
+    for name in ("file", ".file.part"):
+        os.mkfifo(tmp_path / name)
+        with pytest.raises(OSError, match="file"):
+            replace_file(tmp_path / "file", b"new")
+        assert (tmp_path / name).is_fifo()
+        (tmp_path / name).unlink()

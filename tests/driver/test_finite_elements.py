@@ -283,3 +283,37 @@ def test_record_too_short_for_any_contact_is_told_before_it_is_computed() -> Non
     ball = thud.Ball(wall_thickness=4e-7)
     with pytest.raises(thud.InputError, match=naming("&sampling: duration", "0.05 s")):
         thud.solve(ball, model="finite_element", radial_elements=4, polar_elements=10)
+
+
+def test_modes_have_the_shapes_of_their_nodes() -> None:
+    count, radial, polar = 3, 2, 16
+    ball = thud.Ball(poisson_ratio=0.45)
+    found = thud.free_modes(ball, count, radial_elements=radial, polar_elements=polar)
+    assert found.ball == ball
+    assert len(found.frequency) == len(found.harmonic) == len(found.participation) == count
+    # Nine nodes an element, from the lowest point to the highest and from within outwards.
+    assert found.start.shape == (2 * polar + 1, 2 * radial + 1, 2)
+    assert found.shape.shape == (count, *found.start.shape)
+    radius = np.linalg.norm(found.start, axis=-1)
+    assert radius[:, 0] == pytest.approx(0.057, rel=1e-3)
+    assert radius[:, -1] == pytest.approx(0.089, rel=1e-3)
+    assert found.start[0, -1] == pytest.approx([0, -0.089], abs=1e-9)
+    assert found.start[-1, -1] == pytest.approx([0, 0.089], abs=1e-9)
+    size = np.linalg.norm(found.shape, axis=-1)
+    assert size.max(axis=(1, 2)) == pytest.approx(np.ones(count))
+    for shape in found.shape:
+        # No twist, no motion off the axis at the poles, and the lowest point moves upwards.
+        assert shape[[0, -1], :, 0] == pytest.approx(0, abs=1e-9)
+        assert shape[0, -1, 1] > 0
+    assert (np.diff(found.frequency) > 0).all()
+    assert abs(found.rigid_frequency) < 1e-3 * found.frequency[0]
+    rows = found.rows()[1:]
+    assert [float(row[0]) for row in rows] == pytest.approx(found.frequency, abs=0.006)
+    assert [int(row[1]) for row in rows] == found.harmonic.tolist()
+    assert [float(row[2]) for row in rows] == pytest.approx(found.participation, abs=6e-4)
+
+
+@pytest.mark.parametrize("frequency", [[], [0.0], [10.0, -1.0], [[10.0]], "a", [np.nan]])
+def test_loss_factors_are_of_positive_frequencies(frequency: object) -> None:
+    with pytest.raises(thud.InputError, match="frequency"):
+        thud.loss_factors(thud.FiniteElement(), frequency)  # type: ignore[arg-type]

@@ -13,8 +13,8 @@ from scipy import stats
 
 import thud
 from thud.studies.fitting import misfit
-from thud.studies.fitting.inference import infer
-from thud.studies.fitting.ranges import with_values
+from thud.studies.fitting.inference import infer, worst_directions
+from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges, with_values
 
 RATE = 44100.0
 TRUTH = thud.Ball(youngs_modulus=1.8e6)
@@ -157,6 +157,86 @@ def test_directions_without_data_of_a_linear_problem() -> None:
     # The third column is that of the first, the fourth is nothing.
     known = infer(np.column_stack([one, other, 3 * one, 0 * one]), np.zeros((20, 4)) + np.nan, 1.0)
     assert len(known.null) == 2
+
+
+def test_worst_directions_are_axes_of_the_ellipsoid() -> None:
+    turn, _ = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))
+    covariance = np.full((4, 4), np.nan)
+    covariance[np.ix_([0, 2, 3], [0, 2, 3])] = turn @ np.diag([4.0, 1.0, 0.25]) @ turn.T
+    found = worst_directions(covariance, 0.9)
+    assert [size for size, _ in found] == pytest.approx([2.0, 1.0])
+    for (_, direction), axis in zip(found, turn.T, strict=False):
+        assert abs(direction[[0, 2, 3]] @ axis) == pytest.approx(1)
+        assert direction[1] == 0
+
+
+def test_parameters_are_lost_by_size_and_by_error_of_the_derivatives() -> None:
+    base = np.linalg.qr(np.random.default_rng(3).normal(size=(30, 2)))[0]
+
+    def lost(jacobian: np.ndarray, change: np.ndarray, size: float = 1.0) -> int:
+        return len(infer(jacobian, jacobian + change, size).null)
+
+    # Less than 1e-9 of the target, or half of it error: no effect.
+    none = np.zeros_like(base)
+    for length, expected in ((0.99e-9, 1), (1.01e-9, 0)):
+        assert lost(base * [1, 7 * length], none, 7.0) == expected
+    # A column that is half error has no effect; one with a little less makes all doubtful.
+    for share, expected in ((0.49, 2), (0.51, 1)):
+        assert lost(base, np.column_stack([none[:, 0], share * base[:, 0]])) == expected
+    # Nearly equal columns: their smallest singular value below three of its own errors.
+    angle = 0.1
+    near = np.column_stack([base[:, 0], np.cos(angle) * base[:, 0] + np.sin(angle) * base[:, 1]])
+    small, large = np.sqrt(1 - np.cos(angle)), np.sqrt(1 + np.cos(angle))
+    for factor, expected in ((0.99, 0), (1.01, 1)):
+        error = factor * small / large / 3
+        change = np.column_stack([none[:, 0], error * base[:, 1]])
+        assert lost(near, change) == expected
+
+
+def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
+    def range_of(**given: object) -> Range:
+        case = thud.Case(drop=thud.Drop(2.0))
+        return get_ranges(case, bound_parameters(case, given))[0]  # type: ignore[arg-type]
+
+    plain = range_of(height=None)
+    assert (plain.start, plain.scale, plain.spread) == (2.0, 2.0, (1.0, 4.0))
+    cut = range_of(height=thud.Parameter(start=2.0, low=1.5, high=2.0))
+    # A start at a limit lies a percent of itself inside.
+    assert (cut.low, cut.high, cut.spread) == (1.5, 2.0, (1.5, 2.0))
+    assert cut.start == pytest.approx(2.0 - 0.02)
+    narrow = range_of(height=thud.Parameter(start=2.0, low=1.99, high=2.0))
+    assert narrow.start == pytest.approx(2.0 - 0.01 / 4)
+
+
+@pytest.mark.parametrize("at", [-0.002, 0.1, 0.14])
+def test_search_starts_where_record_and_impact_correlate(at: float) -> None:
+    impact = thud.solve(TRUTH, duration=0.03)
+    time = np.arange(int(0.2 * RATE)) / RATE
+    force = np.interp(time - at, impact.time, impact.floor_force, left=0, right=0)
+    target = thud.ForceTarget((time + 3.0, force), window=(3.0, 3.2)).misfit()
+    (start,) = target.own_start(impact)
+    # Sixteen places for each of 250 frequencies; a pulse that is cut is found to a millisecond.
+    assert start == pytest.approx(3 + at, abs=0.2 / 250 / 16 if at > 0 else 1e-3)
+
+
+def test_derivatives_by_time_and_gain_are_those_of_the_residual() -> None:
+    impact = thud.solve(TRUTH, duration=0.03)
+    time = np.arange(int(0.1 * RATE)) / RATE
+    force = np.interp(time - 0.02, impact.time, impact.floor_force, left=0, right=0)
+    target = thud.ForceTarget((time, 1.1 * force), noise=2.0, gain=0.05).misfit()
+    place = np.array([0.0201, 1.08])
+    steps = np.diag([1e-7, 1e-5])
+    slopes = [
+        (target.residual(impact, place + step) - target.residual(impact, place - step)) / step.max()
+        for step in steps
+    ]  # fmt: skip
+    found = target.own_derivatives(impact, place)
+    np.testing.assert_allclose(found, np.transpose(slopes) / 2, rtol=1e-4, atol=1e-3)
+    # What is known of the gain is the last residual.
+    assert target.residual(impact, place)[-1] == pytest.approx((1.08 - 1) / 0.05)
+    assert target.target_vector()[-1] == pytest.approx(1 / 0.05)
+    # At the truth the samples are left, which lines between those of the impact make.
+    assert np.abs(target.residual(impact, np.array([0.02, 1.1]))[:-1]).max() < 0.1
 
 
 def test_noise_is_estimated_from_the_residuals() -> None:

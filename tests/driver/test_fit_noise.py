@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,8 +17,19 @@ from scipy import stats
 from scipy.linalg import toeplitz
 
 import thud
-from thud.recordings.noise import noise_covariances
-from thud.studies.fitting.record_noise import find_pulse, grid_covariance, to_grid
+from thud.recordings.noise import Background, covariances, fit_background, noise_covariances
+from thud.studies.fitting import force_misfit, record_noise, residual_tests, search
+from thud.studies.fitting.record_noise import (
+    Quiet,
+    Weights,
+    cell_waves,
+    find_pulse,
+    grid_covariance,
+    hum_harmonics,
+    new_weights,
+    to_grid,
+    wave_size,
+)
 from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
@@ -56,6 +69,237 @@ def test_covariance_on_the_grid_is_that_of_samples(kind: int) -> None:
     dense = to_grid(to_grid(toeplitz(row), 41).T, 41)
     found = grid_covariance(row, 41)
     np.testing.assert_allclose(found, dense, atol=1e-12 * np.abs(dense).max())
+
+
+def test_waves_of_cells_are_means() -> None:
+    cells = np.array([-0.03, -0.01, 0.02]), np.array([-0.025, 0.004, 0.021])
+    found = cell_waves(cells, [50.0, 70.0])
+    for row, begin, end in zip(found, *cells, strict=True):
+        phase = 2 * np.pi * np.outer(np.linspace(begin, end, 20_001), [50.0, 70.0])
+        expected = [1, *np.cos(phase).mean(axis=0), *np.sin(phase).mean(axis=0)]
+        np.testing.assert_allclose(row, expected, atol=1e-3)
+
+
+def test_amplitude_of_a_wave_has_the_uncertainty_of_its_parts() -> None:
+    value, covariance = np.array([3.0, -4.0]), np.array([[0.04, 0.01], [0.01, 0.09]])
+    size, error = wave_size(value, covariance)
+    draws = np.random.default_rng(1).multivariate_normal(value, covariance, 100_000)
+    assert size == 5
+    # The standard error of a deviation; its curvature adds less than 1 %.
+    assert error == pytest.approx(np.hypot(*draws.T).std(), rel=0.01)
+
+
+def test_harmonics_of_hum_lie_below_the_band_edge() -> None:
+    assert hum_harmonics(50.0, 1250.0) == (50, 100, 150, 200, 250)
+    # 0.95 times 1250 Hz is 1187.5 Hz.
+    assert hum_harmonics(300.0, 1250.0) == (300, 600, 900)
+    assert hum_harmonics(395.8, 1250.0) == (395.8, 2 * 395.8, 3 * 395.8)
+    assert hum_harmonics(396.0, 1250.0) == (396, 792)
+    assert hum_harmonics(0.0, 1250.0) == ()
+
+
+def test_weights_are_those_of_generalised_least_squares() -> None:
+    rng = np.random.default_rng(4)
+    n = 12
+    root, other, nuisance = (rng.normal(size=(n, k)) for k in (n, 3, 2))
+    predicted = other @ other.T
+    covariance = root @ root.T + predicted
+    weights = Weights(covariance, nuisance, predicted)
+    inverse = np.linalg.inv(covariance)
+    information = np.linalg.inv(nuisance.T @ inverse @ nuisance)
+    projected = inverse - inverse @ nuisance @ information @ nuisance.T @ inverse
+    np.testing.assert_allclose(weights.matrix.T @ weights.matrix, projected, atol=1e-9)
+    rest = rng.normal(size=n)
+    value, spread = weights.estimates(rest)
+    best = information @ nuisance.T @ inverse @ rest
+    np.testing.assert_allclose(value, best)
+    np.testing.assert_allclose(spread, information)
+    left = rest - nuisance @ best
+    np.testing.assert_allclose(
+        weights.background(rest), nuisance @ best + predicted @ inverse @ left
+    )
+    # The mean of what np.var(ddof=1) gives of noise that is not predicted.
+    noise = covariance - predicted
+    mean = np.eye(n) - 1 / n
+    assert weights.deviation() == pytest.approx(np.sqrt(np.trace(mean @ noise) / (n - 1)))
+
+
+@pytest.mark.parametrize("given", [None, 2.0])
+@pytest.mark.parametrize("mains", [False, True])
+def test_weights_of_a_record_are_those_of_its_samples(
+    given: float | None,
+    mains: bool,  # noqa: FBT001
+) -> None:
+    n, count, rate = 301, 41, 3000.0
+    quiet = Quiet(np.zeros(n), rate, (120, 170), 400.0)
+    draws = np.array([[2e-3, 0.4, 30.0, 1.5, 2.5], [4e-3, 0.2, 10.0, 0.5, 1.5]])
+    background = Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 900.0)
+    found = new_weights(
+        quiet, count, background=background, noise=given, offset=True, tones=[70.0], mains=mains
+    )
+    time = (np.arange(n) - 145) / rate
+    cells = time - 0.5 / rate, time + 0.5 / rate
+    white, pink, brown, fifty, sixty = draws.mean(axis=0)[:, None, None] * covariances(cells)
+    predicted = (fifty + sixty) * mains + (0.1 * 900) ** 2 * np.outer(time, time)
+    noise = white + pink + brown if given is None else given**2 * np.eye(n)
+    waves = np.stack([np.ones(n), np.cos(140 * np.pi * time), np.sin(140 * np.pi * time)], 1)
+
+    def grid(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+        return to_grid(to_grid(matrix, count).T, count)
+
+    np.testing.assert_allclose(found.predicted, grid(predicted), rtol=1e-6, atol=1e-6)
+    # The offset takes a constant of any size.
+    expected = Weights(grid(noise + 1e4 + predicted), to_grid(waves, count), grid(predicted))
+    one, other = (w.matrix.T @ w.matrix for w in (found, expected))
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(other).max())
+
+
+def quiet_of(seed: int, tone: float = 0.0, size: float = 0.0) -> Quiet:
+    """Return 0.1 s of white noise on both sides of a pulse, with a tone, Hz and N."""
+    n = int(0.24 * RATE)
+    time = np.arange(n) / RATE
+    force = np.random.default_rng(seed).normal(scale=5, size=n)
+    force += size * np.sin(2 * np.pi * tone * time + seed)
+    first, stop = int(0.11 * RATE), int(0.13 * RATE)
+    force[first:stop] += 1500 * np.sin(np.pi * np.arange(stop - first) / (stop - first))
+    return Quiet(force, RATE, (first, stop), 500.0)
+
+
+def test_quiet_counts_up_to_a_tenth_of_a_second() -> None:
+    quiet = quiet_of(1)
+    # 0.11 s on each side, of which 0.1 s count; two values for each hertz of the band and second.
+    assert quiet.seconds == pytest.approx(0.2)
+    assert quiet.freedom == 2 * 500 * 0.2 - 1
+    assert quiet.known
+    assert quiet.middle == pytest.approx(0.12, abs=1 / RATE)
+    assert quiet.deviation() == pytest.approx(5, rel=4 / np.sqrt(2 * 0.22 * RATE))
+    short = Quiet(quiet.force, RATE, (int(0.0105 * RATE), len(quiet.force)), 500.0)
+    assert short.freedom == int(2 * 500 * int(0.0105 * RATE) / RATE) - 1
+    assert not short.known
+
+
+def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
+    background = quiet_of(2).background()
+    other = replace(background, draws=2 * background.draws)
+    time = (background.quiet[0] + background.quiet[1]) / 2
+    trend = background.peak**2 * (1 + 0.01 * np.outer(time, time))
+    values = [
+        record_noise._log_likelihood(one)  # noqa: SLF001
+        - stats.multivariate_normal.logpdf(
+            one.mean, cov=np.tensordot(one.variances, covariances(one.quiet), 1) + trend
+        )
+        for one in (background, other)
+    ]
+    assert values[0] == pytest.approx(values[1], abs=1e-5)
+
+
+def test_noise_that_waves_have_taken_is_given_back() -> None:
+    """Waves of t tones take 2 t of n degrees of freedom."""
+    quiet = quiet_of(3)
+    plain, tones = quiet.background(), (150.0, 333.0, 470.0, 611.0)
+    cells, mean = quiet._means  # noqa: SLF001
+    waves = cell_waves(cells, tones)
+    left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
+    fitted = fit_background(cells, left, plain.peak)
+    n = len(mean)
+    ratio = quiet.background(tones).variances / fitted.variances
+    np.testing.assert_allclose(ratio, [n / (n - 8)] * 3 + [1, 1])
+    # Eight tones that are not there take 8 of n, within the scatter of as many squares.
+    assert quiet.background(tones).variances[0] == pytest.approx(
+        plain.variances[0], rel=4 / np.sqrt(n)
+    )
+
+
+def test_hum_of_the_mains_has_its_own_standard_error() -> None:
+    pulls = []
+    for seed in range(6):
+        quiet = quiet_of(seed, 60.0, 4.0)
+        mains, size, error = quiet.mains(quiet.background())
+        assert mains == 60
+        pulls.append((size - 4) / error)
+        # White noise of 5 N: the variance of an amplitude is 2/n times that of samples.
+        assert error == pytest.approx(5 * np.sqrt(2 / (0.2 * RATE)), rel=0.25)
+    assert np.square(pulls).sum() < stats.chi2.ppf(1 - 1e-3, 6)
+
+
+def test_strongest_tone_has_the_gain_of_its_likelihood() -> None:
+    quiet = quiet_of(5, 333.0, 3.0)
+    cells, mean = quiet._means  # noqa: SLF001
+    whiten = record_noise._trendless(cells)  # noqa: SLF001
+    np.testing.assert_allclose(whiten @ whiten, whiten, atol=1e-12)
+    middle = (cells[0] + cells[1]) / 2
+    np.testing.assert_allclose(whiten @ (7 + 3 * middle), 0, atol=1e-12)
+    tone, gain = record_noise._strongest(  # noqa: SLF001
+        cells, whiten @ mean, whiten, np.arange(100, 600, 1.0)
+    )
+    assert tone == pytest.approx(333, abs=1.0)
+
+    def left(f: float) -> float:
+        basis, _ = np.linalg.qr(whiten @ cell_waves(cells, [f])[:, 1:])
+        rest = whiten @ mean - basis @ (basis.T @ whiten @ mean)
+        return float(rest @ rest)
+
+    fine = np.linspace(331, 335, 401)
+    best = min(map(left, fine))
+    # Normal residuals of an estimated variance: n/2 times the logarithm of the ratio of squares.
+    whole = float(mean @ whiten @ mean)
+    assert gain == pytest.approx(len(mean) / 2 * np.log(whole / best), rel=1e-3)
+
+
+def test_white_residuals_fail_each_test_as_often_as_it_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(residual_tests, "UNLIKELY", 0.1)
+    rng, time = np.random.default_rng(7), np.arange(101) * 4e-4
+    told = [" ".join(residual_doubts(rng.normal(size=101), time)) for _ in range(500)]
+    # The bound of Bonferroni is not reached by 1 - 0.1/2, and runs are whole numbers.
+    low, high = stats.binom.ppf([1e-4, 1 - 1e-4], 500, [0.085, 0.115])
+    for words in ("coloured", "largest", "change their sign"):
+        assert low <= sum(words in one for one in told) <= high
+
+
+def test_runs_are_those_of_wald_and_wolfowitz() -> None:
+    n, m = 140, 90
+    mean = 1 + 2 * n * m / (n + m)
+    deviation = np.sqrt((mean - 1) * (mean - 2) / (n + m - 1))
+    for runs in range(40, 170):
+        # As many runs of either sign, ones but for the last.
+        positive, negative = (runs + 1) // 2, runs // 2
+        lengths = np.ones(runs, dtype=int)
+        lengths[(positive - 1) * 2] += n - positive
+        lengths[(negative - 1) * 2 + 1] += m - negative
+        signs = np.repeat(np.where(np.arange(runs) % 2, -1.0, 1.0), lengths)
+        told = residual_tests.runs_doubt(signs)
+        assert bool(told) == (2 * stats.norm.sf(abs(runs - mean) / deviation) <= UNLIKELY)
+        if told:
+            assert f" {runs - 1} times where {mean - 1:.0f} " in told
+
+
+@pytest.mark.parametrize("place", ["contact", "change", "size", "size of quiet"])
+def test_noise_is_doubted_as_often_as_the_tests_say(
+    place: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (force_misfit, search):
+        monkeypatch.setattr(module, "UNLIKELY", 0.1)
+    rng, told, tries = np.random.default_rng(9), 0, 800
+    inside = np.arange(40) >= 28
+    for _ in range(tries):
+        values = rng.normal(size=40)
+        if place == "contact":
+            # Three parameters take three of the twelve during contact.
+            basis, _ = np.linalg.qr(rng.normal(size=(12, 3)))
+            values[inside] -= basis @ (basis.T @ values[inside])
+            found = force_misfit._contact_doubt(values, inside, 3, 2.0)  # noqa: SLF001
+        elif place == "change":
+            found = force_misfit._change_doubt(values, ~inside, inside)  # noqa: SLF001
+        else:
+            freedom = 25 if place == "size of quiet" else None
+            known = SimpleNamespace(known_noise=True, noise_freedom=freedom)
+            scale = np.sqrt(rng.chisquare(25) / 25) if freedom else 1.0
+            found = search._size_doubt(known, values / scale, 40.0)  # type: ignore[arg-type] # noqa: SLF001
+        told += bool(found)
+    low, high = stats.binom.ppf([1e-4, 1 - 1e-4], tries, 0.1)
+    assert low <= told <= high
 
 
 def test_white_noise_stays_white_on_the_grid() -> None:
@@ -182,6 +426,8 @@ def test_white_residuals_pass_and_others_do_not() -> None:
     assert re.search(naming("residual", "40 ms", 6), residual_doubts(spiked, time)[0])
     assert any(re.search(naming("sign", 0), one) for one in residual_doubts(np.abs(white), time))
     assert not residual_doubts(slow[:10], time[:10])
+    # A constant is no frequency: it is told by its runs alone.
+    assert not any("coloured" in one for one in residual_doubts(white + 3, time))
 
 
 @pytest.mark.parametrize(

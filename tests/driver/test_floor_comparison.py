@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,15 +13,19 @@ import pytest
 from conftest import REPOSITORY, naming
 
 import thud
+from thud._api import call, floor_api
+from thud.case import case_text
 from thud.cli import main
 from thud.floors.rating import CLASS_LIMITS
-from thud.floors.tapping import CURVE, THIRDS
+from thud.floors.tapping import THIRDS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 # ISO 12354, 220 mm floor of 5 m x 4 m: thirds 50 to 630 Hz.
 PUBLISHED = [57.3, 58.2, 59.2, 60.2, 61.1, 62.1, 62.5, 62.7, 63.0, 63.3, 63.6, 64.0]
+# ISO 717-2: reference values of the thirds 100 to 3150 Hz, dB.
+REFERENCE = np.array([62.0, 62, 62, 62, 62, 62, 61, 60, 59, 58, 57, 54, 51, 48, 45, 42])
 CASES = {
     name: thud.Case(name=name, floor=thud.Plate(thickness=thickness), room=thud.Room())
     for name, thickness in (("thin", 0.14), ("thick", 0.22))
@@ -54,13 +60,57 @@ def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
 
 def test_rating_of_the_tapping_machine_is_the_shifted_curve() -> None:
     """Excesses of 2 dB in all sixteen thirds are 32 dB, the maximum: the curve stays."""
-    level = np.concatenate([np.zeros(3), CURVE + 2.0])
+    level = np.concatenate([np.zeros(3), REFERENCE + 2.0])
     assert thud.TappingLevel(THIRDS, level).weighted == 60
     level[3] += 0.1
     assert thud.TappingLevel(THIRDS, level).weighted == 61
     flat = thud.TappingLevel(THIRDS, np.full(19, 60.0))
     # 10 lg 15 = 11.8 dB above one third.
     assert flat.adaptation == round(60 + 10 * np.log10(15)) - 15 - flat.weighted
+
+
+def test_rating_of_the_tapping_machine_is_the_least_shift_that_is_allowed() -> None:
+    draw = np.random.default_rng(8)
+    for middle in (-20.0, 20.0, 60.0, 90.0):
+        level = middle + draw.uniform(-15, 15, 19)
+        found = thud.TappingLevel(THIRDS, level)
+        # In tenths of a decibel, as ISO 717-2 rounds; thirds below 100 Hz do not count.
+        tenths = np.round(10 * level[3:])
+        shifts = [
+            n for n in range(-150, 150)
+            if np.maximum(tenths - 10 * (REFERENCE + n), 0).sum() <= 320
+        ]  # fmt: skip
+        assert found.weighted == 60 + min(shifts)
+        energy = sum(10 ** (one / 10) for one in level[3:18])
+        assert found.adaptation == math.floor(10 * math.log10(energy) + 0.5) - 15 - found.weighted
+
+
+def test_tapping_level_is_the_formula_of_iso_12354_2() -> None:
+    floor, room = thud.Plate(thickness=0.16, density=2400.0), thud.Room(volume=30.0)
+    known = call(floor_api.get_radiator, case_text(thud.Case(floor=floor, room=room)), THIRDS)
+    found = thud.tapping_level(floor, room)
+    for i, frequency in enumerate((50, 63, 80, 100, 125, 160, 200, 250, 315, 400, 500, 630)):
+        time = 2.2 / (frequency * known["loss_factor"][i])
+        expected = 155 - 30 * math.log10(0.16 * 2400) + 10 * math.log10(time)
+        expected += 10 * math.log10(known["radiation_factor"][i] * frequency / 1000)
+        assert found.frequency[i] == frequency
+        assert found.level[i] == pytest.approx(expected, abs=1e-9)
+    higher = [800, 1000, 1250, 1600, 2000, 2500, 3150]
+    assert found.frequency[12:].tolist() == higher
+    assert thud.tapping_level(floor).level.tolist() == (
+        thud.tapping_level(floor, thud.Room()).level.tolist()
+    )
+
+
+@pytest.mark.parametrize("ratio", [1 / 1.27, 1 / 1.25, 1.25, 1.27])
+def test_tapping_level_is_of_floors_near_concrete(ratio: float) -> None:
+    """The constant of the formula moves by 10 lg of the ratio, 1 dB at 1.26."""
+    floor = thud.Plate(wave_speed=3500.0 * ratio, density=2300.0)
+    if 1 / 1.26 < ratio < 1.26:
+        assert np.isfinite(thud.tapping_level(floor).level).all()
+    else:
+        with pytest.raises(thud.InputError, match="wave_speed/density"):
+            thud.tapping_level(floor)
 
 
 def test_tapping_machine_refuses_what_is_no_concrete_plate() -> None:
@@ -82,6 +132,35 @@ def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparis
         f"{thick.octave_level[0]:.1f}",
     )
     assert re.search(naming("thin", "modes", "Hz"), found.remarks[0])
+
+
+def test_floors_without_a_tapping_level_leave_its_cell_empty(found: thud.FloorComparison) -> None:
+    impact = thud.solve()
+    light = thud.Plate(thickness=0.1, density=500.0)
+    predictions = {
+        "thick": found.predictions["thick"],
+        "light": thud.predict_level(impact, light, thud.Room()),
+        "joists": thud.predict_level(impact, thud.JoistFloor(), thud.Room()),
+    }
+    page = thud.compare_floors(predictions)
+    assert list(page.predictions.values()) == list(predictions.values())
+    tapping = thud.tapping_level(thud.Plate(thickness=0.22))
+    *_, energy, last = page.rows()
+    assert last[1:] == (f"{tapping.weighted} ({tapping.adaptation})", "", "")
+    assert float(energy[1]) == pytest.approx(1e3 * predictions["thick"].energy.sum(), rel=5e-3)
+
+
+@pytest.mark.parametrize("missing", ["model", "floor", "room"])
+def test_case_without_a_level_in_a_room_is_refused(missing: str) -> None:
+    case = replace(CASES["thin"], **{missing: None})
+    with pytest.raises(thud.InputError, match=r"^a: "):
+        thud.compare_floors({"a": case})
+
+
+def test_case_that_fails_is_named() -> None:
+    case = replace(CASES["thin"], sampling=thud.Sampling(duration=0.01))
+    with pytest.raises(thud.InputError, match=r"^short: &sampling: duration"):
+        thud.compare_floors({"short": case})
 
 
 def test_page_draws_chain_and_classes(found: thud.FloorComparison) -> None:
@@ -108,7 +187,8 @@ def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[st
         thud.write_case(case, path)
     output = tmp_path / "page"
     assert main(["floor", *map(str, paths), "--output", str(output)]) == 0
-    assert {path.name for path in output.iterdir()} == {"floors.png", "floors.svg", "floors.html"}
+    names = {".thud", "floors.png", "floors.svg", "floors.html"}
+    assert {path.name for path in output.iterdir()} == names
     assert "thick" in capsys.readouterr().out
     assert main(["floor", str(paths[0]), str(paths[0]), "-o", str(output)]) == 1
     assert str(paths[0]) in capsys.readouterr().err

@@ -189,3 +189,32 @@ def test_mobility_at_no_frequency_is_refused(frequency: float) -> None:
 def test_point_may_be_an_array() -> None:
     near = thud.mobility(thud.Plate(), [31.5], np.array([1.0, 1.0]))  # type: ignore[arg-type]
     assert near == thud.mobility(thud.Plate(), [31.5], (1.0, 1.0))
+
+
+def test_levels_of_both_forces_are_those_of_the_records(moved: thud.FloorImpact) -> None:
+    contact, blocked = moved.floor_force, moved.blocked_force
+    for bands in ("octave", "third"):
+        for method in ("exact", "fft"):
+            first, second = (
+                thud.force_exposure_levels(force, moved.sample_rate, bands, method)  # type: ignore[arg-type]
+                for force in (contact, blocked)
+            )
+            assert (moved.blocked_levels(bands, method) == second).all()  # type: ignore[arg-type]
+            assert moved.difference(bands, method) == pytest.approx(first - second)  # type: ignore[arg-type]
+    energy = moved.injected_energy()
+    rows = moved.rows()[1:]
+    columns = (moved.blocked_levels(), moved.levels(force="floor"), moved.difference())
+    for place, values in enumerate(columns, start=1):
+        assert [row[place] for row in rows] == [f"{value:.2f}" for value in values]
+    assert [row[4] for row in rows] == [f"{value:.3g}" for value in energy.by_motion]
+    assert f"{20 * np.log10(contact.max() / blocked.max()):+.2f} dB" in repr(moved)
+
+
+def test_each_point_of_a_floor_has_its_own_velocity() -> None:
+    floor = thud.Plate(thickness=0.05, point_x=(0.5, 1.1), point_y=(0.7, 0.9))
+    moved = thud.solve(floor=floor).on_floor
+    assert moved is not None
+    assert moved.point_velocity.shape == (2, len(moved.time))
+    for velocity, point in zip(moved.point_velocity, ((0.5, 0.7), (1.1, 0.9)), strict=True):
+        assert (velocity == moved.velocity_at(*point)).all()
+    assert not np.array_equal(*moved.point_velocity)

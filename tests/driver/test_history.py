@@ -231,10 +231,15 @@ def test_table_of_many_reports_is_not_wide() -> None:
 def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     chart = folder / "chart"
     options = argparse.Namespace(
-        reports=[str(folder)], output=str(chart), different_balls=False, quiet=False
+        name="history",
+        reports=[str(folder)],
+        output=str(chart),
+        replace=False,
+        different_balls=False,
+        quiet=False,
     )
     assert run_history(options) == 0
-    assert sorted(path.name for path in chart.iterdir()) == ["history.png", "history.svg"]
+    assert sorted(path.name for path in chart.glob("*.*g")) == ["history.png", "history.svg"]
     printed = capsys.readouterr().out
     assert printed.startswith("ball 7\n")
     assert re.search(r"63 Hz, dB: .*\+0\.3", printed)

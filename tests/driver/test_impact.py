@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import naming
 
 import thud
+from thud.contact_time import contact_span
+from thud.levels import peak_count
 
 
 def test_arrays_share_one_clock() -> None:
@@ -127,3 +130,65 @@ def test_numerical_failures_are_told() -> None:
 def test_unknown_force_is_told() -> None:
     with pytest.raises(thud.InputError, match=naming("'total'", "'elastic'", "'floor'")):
         thud.solve().levels(force="total")
+
+
+def test_each_question_is_answered_for_the_force_that_is_asked() -> None:
+    case = thud.Case(
+        model=thud.HollowSphere(), levels=thud.Levels(force="elastic", method="fft"),
+        limits=thud.Limits("tyre"), ball=thud.Ball(mass=2.4), drop=thud.Drop(0.9),
+    )  # fmt: skip
+    impact = replace(thud.solve_case(case), peak_elastic_force=1.0, peak_force=2.0)
+    rate = impact.sample_rate
+    peaks = {"elastic": 1.0, "floor": 2.0}
+    forces = {"elastic": impact.elastic_force, "floor": impact.floor_force}
+    for asked, judged in ((None, "elastic"), ("elastic", "elastic"), ("floor", "floor")):
+        assert impact.judged(asked) == judged  # type: ignore[arg-type]
+        assert impact.force(asked) is forces[judged]  # type: ignore[arg-type]
+        assert impact.peak(asked) == peaks[judged]  # type: ignore[arg-type]
+        for method in (None, "exact", "fft"):
+            levels = thud.force_exposure_levels(forces[judged], rate, "third", method or "fft")  # type: ignore[arg-type]
+            assert (impact.levels("third", method, asked) == levels).all()  # type: ignore[arg-type]
+        for source in (None, "rubber_ball", "tyre"):
+            expected = thud.judge(
+                impact.levels(force=asked), impact.contact_time, impact.restitution,  # type: ignore[arg-type]
+                peak_count(forces[judged], rate), 2.4, 0.9, source or "tyre",  # type: ignore[arg-type]
+            )  # fmt: skip
+            assert impact.conformity(source, asked) == expected  # type: ignore[arg-type]
+
+
+def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
+    ball, drop = thud.Ball(mass=2.4), thud.Drop(0.9)
+    impact = thud.solve(ball, drop, sample_rate=48000.0, duration=0.04, substeps=9)
+    assert impact.case.sampling == thud.Sampling(48000.0, 0.04, 9)
+    assert (impact.case.ball, impact.case.drop) == (ball, drop)
+    assert len(impact.time) == 0.04 * 48000
+    default = thud.solve()
+    assert default.case == thud.Case(model=thud.HollowSphere())
+    # Free modes and compression of a case have functions of their own.
+    more = replace(default.case, modes=thud.Modes(), compression=thud.Compression())
+    found = thud.solve_case(more)
+    assert found.case == more
+    assert (found.floor_force == default.floor_force).all()
+    with pytest.raises(thud.InputError, match="&model is missing"):
+        thud.solve_case(replace(more, model=None))
+
+
+def test_measured_contact_time_is_that_of_the_record_around_the_contact() -> None:
+    impact = thud.solve()
+    # Up to the first sample after release.
+    force = np.append(np.trim_zeros(impact.floor_force, "b"), 0.0)
+    begin, end = contact_span(force, impact.sample_rate)
+    assert impact.measured_contact_time == pytest.approx(end - begin, abs=1e-12)
+    # Later touch, and a second contact, make no difference.
+    shift = 500
+    moved = np.concatenate([np.zeros(shift), impact.floor_force, impact.floor_force])
+    later = replace(impact, floor_force=moved, touch_time=shift / impact.sample_rate)
+    assert later.measured_contact_time == pytest.approx(impact.measured_contact_time, abs=1e-9)
+
+
+def test_part_that_a_model_has_not_is_told() -> None:
+    impact = thud.solve()
+    for name in ("shell_force", "gas_force", "flux_force"):
+        assert getattr(impact, name) is impact.parts[name]
+    with pytest.raises(AttributeError, match="has no gas_force"):
+        _ = thud.solve(model="hunt_crossley", contact_time=0.02).gas_force

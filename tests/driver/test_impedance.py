@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from conftest import naming
 
 import thud
+from thud.floors.impedance import RESISTANCES, _tangent
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,6 +79,52 @@ def test_tangent_of_a_linear_source_is_its_mass_and_spring(linear: thud.BallImpe
     low, high = linear.tangent([0.01, 1e4])
     assert low == pytest.approx(2j * np.pi * 0.01 * MASS, rel=1e-5)
     assert high == pytest.approx(STIFFNESS / (2j * np.pi * 1e4), rel=1e-4)
+
+
+def test_tangent_has_the_damping_of_a_damped_source(linear: thud.BallImpedance) -> None:
+    """M d'' + c d' + k d = 0 from d = 0: the force k d + c d' is that of the tangent throughout."""
+    mass, damping, stiffness, rate = 1.7, 55.0, 4e4, 44100.0
+    decay = damping / (2 * mass)
+    omega = np.sqrt(stiffness / mass - decay**2)
+    time = np.arange(int(np.pi / omega * rate)) / rate
+    swing = np.exp(-decay * time)
+    deflection = swing * np.sin(omega * time) / omega
+    velocity = swing * (np.cos(omega * time) - decay / omega * np.sin(omega * time))
+    source = replace(
+        thud.solve(), time=time, deflection=deflection, velocity=velocity, impact_velocity=1.0,
+        floor_force=stiffness * deflection + damping * velocity, sample_rate=rate,
+    )  # fmt: skip
+    # The acceleration is a central difference.
+    assert _tangent(source) == pytest.approx((mass, stiffness, damping), rel=1e-4)
+    found = replace(linear, tangent_mass=mass, tangent_stiffness=stiffness, tangent_damping=damping)
+    assert found.tangent_loss_factor == pytest.approx(damping / np.sqrt(stiffness * mass))
+    s = 2j * np.pi * np.array([5.0, 24.0, 90.0])
+    # Mass, and spring beside damper, in a chain: their mobilities add up.
+    chain = 1 / (1 / (s * mass) + s / (stiffness + s * damping))
+    assert found.tangent([5.0, 24.0, 90.0]) == pytest.approx(chain)
+
+
+def test_limit_of_changes_with_one_over_the_resistance_is_exact(
+    linear: thud.BallImpedance,
+) -> None:
+    slope = np.array([-900.0, 2500.0, -7000.0, -0.2, 15000.0])
+    found = replace(linear, change=slope / linear.resistance[:, None])
+    for decibels in (0.5, 1.0, 2.0):
+        expected = np.where(abs(slope) / 1e3 >= decibels, abs(slope) / decibels, np.nan)
+        assert found.limit(decibels) == pytest.approx(expected, nan_ok=True)
+    # Of several crossings the last one counts.
+    found = replace(found, change=np.array([[2.0], [0.1], [0.4]]) * np.ones(5))
+    with pytest.raises(thud.InputError, match=r"decibels = 0.3 is not allowed; allowed: above 0.4"):
+        found.limit(0.3)
+    assert ((found.limit(1.0) > 1e3) & (found.limit(1.0) < 1e4)).all()
+    for decibels in (np.inf, np.nan, -1.0):
+        with pytest.raises(thud.InputError, match="decibels = "):
+            found.limit(decibels)
+
+
+def test_default_floors_reach_from_light_to_heavy() -> None:
+    assert RESISTANCES[[0, -1]] == pytest.approx([10**2.75, 1e6])
+    assert len(RESISTANCES) == 14
 
 
 def test_tangent_mass_of_the_shell_is_that_outside_its_cap() -> None:

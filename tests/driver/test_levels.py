@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from conftest import naming
 
 import thud
-from thud.levels import BANDWIDTHS, SOURCES, octave_limits, peak_count
+from thud.criteria import Conformity, Criterion
+from thud.levels import (
+    BANDWIDTHS,
+    RECORDED_BAND,
+    SOURCES,
+    octave_limits,
+    peak_count,
+    record_force,
+)
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
 
@@ -149,3 +159,80 @@ def test_criteria_are_single_numbers(value: object) -> None:
 def test_nominal_tyre_conforms() -> None:
     assert thud.judge([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
     assert not thud.judge([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
+
+
+def criteria_of(source: str, **changes: float) -> thud.Conformity:
+    """Return the verdict on a source in the middle of all its limits but for some changes."""
+    names = ["contact_time", "restitution", "peak_count", "mass", "drop_height"]
+    bare = thud.judge(np.zeros(5), 0, 0, 0, 0, 0, source).criteria  # type: ignore[arg-type]
+    value = {one.name: (one.lower + one.upper) / 2 for one in bare} | changes
+    levels = [value[one.name] for one in bare[:5]]
+    rest = [value[name] for name in names]
+    rest[2] = int(rest[2])
+    return thud.judge(levels, *rest, source)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("source", SOURCES)
+def test_each_criterion_has_its_own_value_and_limits(source: str) -> None:
+    verdict = criteria_of(source)
+    assert verdict.conforms
+    assert verdict.source == source
+    for place, one in enumerate(verdict.criteria):
+        step = 1.0 if one.name == "peak_count" else 1e-9
+        for end, beyond in ((one.lower, one.lower - step), (one.upper, one.upper + step)):
+            for value in (end, beyond):
+                if value < 0:
+                    continue
+                found = criteria_of(source, **{one.name: value})
+                assert found.criteria[place].value == pytest.approx(value, abs=1e-12)
+                # Limits are allowed values.
+                expected = [other is not one or value == end for other in verdict.criteria]
+                assert [other.conforms for other in found.criteria] == expected
+
+
+def test_limits_of_octaves_are_those_of_the_verdict() -> None:
+    # JIS A 1418-2, table of the rubber ball.
+    lower, upper = octave_limits("rubber_ball")
+    assert lower.tolist() == [38, 29.5, 21.5, 15, 10.5]
+    assert upper.tolist() == [40, 32.5, 24.5, 19, 14.5]
+
+
+def test_verdict_is_open_where_all_that_is_known_conforms() -> None:
+    good = Criterion("octave_31_5", "dB", 39.0, 38.0, 40.0, conforms=True)
+    low = replace(good, value=37.5, conforms=False)
+    high = replace(good, value=40.5, conforms=False)
+    unknown = replace(good, value=math.nan, conforms=False)
+    for criteria, verdict, conforms in (
+        ((good, good), "conforms", True), ((good, low), "does not conform", False),
+        ((good, unknown), "cannot be decided", False),
+        ((low, unknown), "does not conform", False),
+    ):  # fmt: skip
+        found = Conformity("rubber_ball", criteria)
+        assert (found.verdict, found.conforms, bool(found)) == (verdict, conforms, conforms)
+        assert found.rows()[-1][-1] == verdict
+        assert len(found.rows()) == 2 + len(criteria)
+        assert ("not known" in repr(found)) == (unknown in criteria)
+    cells = {one: one.rows()[1] for one in (good, low, high)}
+    assert cells[good] == ("octave 31.5", "39 dB", "38 to 40", "conforms")
+    assert [cells[one][3] for one in (low, high)] == ["is too low", "is too high"]
+    assert unknown.rows()[1][1] == ""
+
+
+def test_recorded_force_has_what_lies_below_1250_hz() -> None:
+    rate, count = 44100.0, 4410
+    time = np.arange(count) / rate
+    window = np.hanning(count)
+    slow, fast = (window * np.sin(2 * np.pi * f * time) for f in (1100.0, 1400.0))
+    found = record_force(slow + fast, rate)
+    assert found == pytest.approx(slow, abs=1e-3)
+    assert RECORDED_BAND == 1250
+
+
+def test_most_peaks_are_those_of_a_whole_number_of_four_bytes() -> None:
+    levels = [39, 31, 23, 17, 12.5]
+    assert not thud.judge(levels, 0.02, 0.8, 2**31 - 1, 2.5, 1.0)
+    assert thud.judge(levels, 0.02, 0.8, np.int64(1), 2.5, 1.0)
+    with pytest.raises(thud.InputError, match="peaks = "):
+        thud.judge(levels, 0.02, 0.8, 2**31, 2.5, 1.0)
+    with pytest.raises(thud.InputError, match="sample_rate = inf"):
+        peak_count(PULSE, np.inf)

@@ -19,6 +19,7 @@ from conftest import REPOSITORY, naming
 import thud
 from thud import cli
 from thud.errors import ReportWarning
+from thud.files import Results
 from thud.recordings import results
 from thud.report.rows import HEAD
 from thud.report.write import PDF
@@ -50,11 +51,11 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 def names(folder: Path) -> set[str]:
     """Return the names of the files, with or without the PDF that an extra makes."""
-    return {path.name for path in folder.iterdir()} - {PDF}
+    return {path.name for path in folder.iterdir()} - {PDF, ".thud"}
 
 
 def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Path) -> None:
-    results.save(noisy, tmp_path)
+    results.save(noisy, Results(tmp_path))
     head, *screen = results.table(noisy)
     table = rows_of(tmp_path / "criteria.csv")
     data = json.loads((tmp_path / "report.json").read_text())
@@ -94,7 +95,7 @@ def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Pat
 def test_levels_and_criteria_disagreed_on_uncertainty(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
-    results.save(noisy, tmp_path, figures=False)
+    results.save(noisy, Results(tmp_path), figures=False)
     rows = rows_of(tmp_path / "levels.csv")
     data = json.loads((tmp_path / "report.json").read_text())
     criteria = rows_of(tmp_path / "criteria.csv")[:5]
@@ -110,7 +111,7 @@ def test_levels_and_criteria_disagreed_on_uncertainty(
 def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
-    results.save(noisy, tmp_path, figures=False)
+    results.save(noisy, Results(tmp_path), figures=False)
     decisions = noisy.conformity().decisions
     for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
         assert bool(row["uncertainty"]) == bool(one.quantity.contributions), one.name
@@ -133,20 +134,23 @@ def test_report_of_another_recording_lay_beside_new_numbers(
         (tmp_path / name / "drop.csv").write_bytes(content)
     remark = "outputs/drop"
     out = tmp_path / "outputs/drop"
-    # Without a report of thud beside it, nobody knows whose page this is.
+    # thud has not written this page.
     out.mkdir(parents=True)
     (out / "report.html").write_text("mine")
     assert cli.main(["measure", "a/drop.csv", "-q", "--no-figures"]) == 0
     assert names(out) == FILES | {"report.html"}
+    assert cli.main(["measure", "a/drop.csv", "-q"]) == 1
+    assert "outputs/drop/report.html is in the way" in capsys.readouterr().err
+    (out / "report.html").unlink()
     for _ in range(2):
         assert cli.main(["measure", "a/drop.csv", "-q"]) == 0
         assert names(out) == FILES | PICTURES
         assert remark not in capsys.readouterr().err
-    (out / PDF).write_bytes(b"signed")
+    (out / PDF).write_bytes(b"signed by hand")
     assert cli.main(["measure", "b/drop.csv", "-q", "--no-figures"]) == 0
     assert remark in capsys.readouterr().err
     assert names(out) == FILES
-    assert not (out / PDF).exists()
+    assert (out / PDF).read_bytes() == b"signed by hand"
     (origin,) = thud.read_recording("b/drop.csv").origins
     (file,) = json.loads((out / "report.json").read_text())["files"]
     assert file["sha256"] == origin.checksum
@@ -161,7 +165,7 @@ def test_page_that_failed_left_half_of_the_results(
     (tmp_path / "levels.csv").write_text("earlier")
     monkeypatch.setattr(results, "page_contents", fail)
     with pytest.raises(MemoryError):
-        results.save(noisy, tmp_path)
+        results.save(noisy, Results(tmp_path))
     assert names(tmp_path) == {"levels.csv"}
     assert (tmp_path / "levels.csv").read_text() == "earlier"
 
@@ -172,7 +176,7 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     drops = tuple(replace(drop, remarks=("long " * 20000,)) for drop in recording.drops)
     config = replace(recording.config, laboratory="Ωmega\udcff\0")
     recording = replace(recording, drops=drops, config=config)
-    results.save(recording, tmp_path, figures=False)
+    results.save(recording, Results(tmp_path), figures=False)
     with xr.open_dataset(tmp_path / "recording.nc") as found:
         assert found.sizes == {"drop": 3, "octave": 5, "third": 15, "file": 3}
         units = {"contact_time": "s", "restitution": "1", "peak_force": "N", "impulse": "N s"}
@@ -197,12 +201,12 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
 def test_without_xarray_a_remark_tells_what_is_left_out(
     noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    results.save(noisy, tmp_path, figures=False)
+    results.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES
     monkeypatch.setitem(sys.modules, "xarray", None)
     monkeypatch.delitem(sys.modules, "thud.report.dataset")
     with pytest.warns(ReportWarning, match=naming("recording.nc", "xarray", "pip install")):
-        results.save(noisy, tmp_path, figures=False)
+        results.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES - {"recording.nc"}
 
 

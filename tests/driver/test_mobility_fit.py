@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -100,6 +102,12 @@ def test_universal_files_say_what_they_hold(tmp_path: Path, response: int, power
 
 def test_opposite_directions_change_the_sign(tmp_path: Path) -> None:
     path = write_universal(tmp_path / "point.uff", 11, -MOBILITY, rsp_dir=3)
+    found = thud.fit_mobility(path, order=8)
+    np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
+
+
+def test_direction_that_is_not_stated_keeps_the_sign(tmp_path: Path) -> None:
+    path = write_universal(tmp_path / "point.uff", 11, MOBILITY, rsp_dir=0)
     found = thud.fit_mobility(path, order=8)
     np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
 
@@ -295,3 +303,120 @@ def test_tables_that_are_none_are_refused(table: Any, words: str) -> None:  # no
 def test_orders_that_are_none_are_refused(order: Any) -> None:  # noqa: ANN401
     with pytest.raises(thud.InputError, match=naming("order", repr(order), 1, 64)):
         thud.fit_mobility((FREQUENCY, MOBILITY), order=order)
+
+
+def scaled_fit(exact: thud.MobilityFit, factor: np.ndarray) -> thud.MobilityFit:
+    """Return a fit whose measurement is the floor times a factor."""
+    return replace(exact, measured=factor * exact.mobility(exact.frequency))
+
+
+def test_errors_are_relative_to_the_measurement(exact: thud.MobilityFit) -> None:
+    factor = np.where(FREQUENCY < 250, 1.25, 0.8 * np.exp(0.3j))
+    found = scaled_fit(exact, factor)
+    errors = abs(1 / factor - 1)
+    assert found.error == pytest.approx(np.sqrt((errors**2).mean()))
+    bands = found.band_errors()
+    # The measurement reaches from 10 to 1000 Hz: all octaves.
+    assert list(bands) == [31.5, 63, 125, 250, 500]
+    for band in (31.5, 63, 125):
+        assert bands[band] == pytest.approx((0.2, 10 * np.log10(0.8)))
+    assert bands[500][0] == pytest.approx(errors[-1])
+
+
+def test_octaves_that_are_not_covered_have_no_error(exact: thud.MobilityFit) -> None:
+    bands = thud.get_bands()
+    inside = (bands.lower[1] <= FREQUENCY) & (bands.upper[3] > FREQUENCY)
+    for keep, expected in (
+        (inside, [125]),
+        (np.append(inside[1:], False), [63, 125]),
+        (np.append(False, inside[:-1]), [125, 250]),
+    ):
+        found = replace(exact, frequency=FREQUENCY[keep], measured=exact.measured[keep])
+        assert list(found.band_errors()) == expected
+
+
+def test_real_parts_that_are_not_positive_have_no_level(exact: thud.MobilityFit) -> None:
+    assert all(
+        np.isnan(level) for _, level in scaled_fit(exact, -np.ones(300)).band_errors().values()
+    )
+
+
+@pytest.mark.parametrize(
+    ("factor", "free_error", "count"),
+    [
+        # More than 10 % off; worse than 1.5 times the free fit; neither; exact.
+        (1 / 1.101, 0.09, 1),
+        (1 / 1.099, 0.09, 0),
+        (1 / 1.05, 0.033, 1),
+        (1 / 1.05, 0.034, 0),
+        (1.0 + 1e-9, 0.0, 0),
+        (1.0 + 2e-8, 0.0, 1),
+    ],
+)
+def test_fits_that_miss_are_remarked(
+    exact: thud.MobilityFit, factor: float, free_error: float, count: int
+) -> None:
+    found = replace(scaled_fit(exact, np.full(300, factor)), free_error=free_error)
+    assert len(found.remarks) == count
+
+
+def test_number_of_poles_has_the_least_information_criterion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """That of n = 2 lines and k = 2 poles + 1 coefficients is n lg error**2 + k lg n."""
+    errors = {2: 0.5, 4: 0.2, 6: 0.1, 8: 0.0995, 10: 0.099, 12: 0.08}
+    tried = []
+
+    def fit(name: str, f: np.ndarray, values: np.ndarray, order: int) -> Any:  # noqa: ANN401
+        del name, f, values
+        tried.append(order)
+        return SimpleNamespace(order=order, error=errors.get(order, 0.0799))
+
+    monkeypatch.setattr(mobility_fit, "_fit", fit)
+    for n_line in (20, 40, 100, 400):
+        tried.clear()
+        found = mobility_fit._chosen("a", np.arange(1.0, n_line + 1), np.ones(n_line, complex))  # noqa: SLF001
+        count = 2 * n_line
+        criteria = {
+            k: count * np.log(errors.get(k, 0.0799) ** 2) + (2 * k + 1) * np.log(count)
+            for k in tried
+        }
+        assert found.order == min(criteria, key=criteria.__getitem__)  # type: ignore[attr-defined]
+        # Three values for each coefficient; and five numbers in a row without a gain end it.
+        assert all(3 * (2 * k + 1) <= count for k in tried)
+        ended = len(tried) - 1 - tried.index(found.order) == 5  # type: ignore[attr-defined]
+        most = max(k for k in (*range(2, 17, 2), *range(20, 33, 4), 40, 48, 56, 64)
+                   if 3 * (2 * k + 1) <= count)  # fmt: skip
+        assert ended or tried[-1] == most
+
+
+def test_exact_fit_ends_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+
+    def fit(name: str, f: np.ndarray, values: np.ndarray, order: int) -> Any:  # noqa: ANN401
+        del name, f, values
+        tried.append(order)
+        return SimpleNamespace(order=order, error=1e-8 if order == 4 else 1.1e-8)
+
+    monkeypatch.setattr(mobility_fit, "_fit", fit)
+    found = mobility_fit._chosen("a", np.arange(1.0, 401), np.ones(400, complex))  # noqa: SLF001
+    assert tried == [2, 4]
+    assert found.order == 4  # type: ignore[attr-defined]
+    # Few lines have few poles, and one at least.
+    tried.clear()
+    assert mobility_fit._chosen("a", np.arange(1.0, 3), np.ones(2, complex)).order == 1  # type: ignore[attr-defined]  # noqa: SLF001
+
+
+def test_reaction_of_the_force_has_the_sign_of_its_direction(tmp_path: Path) -> None:
+    path = write_universal(tmp_path / "a.uff", 11, MOBILITY, orddenom_spec_data_type=9)
+    assert thud.fit_mobility(path, order=8).mobility([100.0]) == pytest.approx(
+        thud.fit_mobility((FREQUENCY, MOBILITY), order=8).mobility([100.0]), rel=1e-4
+    )
+
+
+def test_line_at_0_hz_is_left_out_and_two_are_enough(exact: thud.MobilityFit) -> None:
+    found = thud.fit_mobility((np.append(0, FREQUENCY), np.append(0, MOBILITY)), order=8)
+    assert len(found.frequency) == 300
+    assert found.mobility([100.0]) == pytest.approx(exact.mobility([100.0]))
+    two = thud.fit_mobility(([20.0, 40.0], [1e-4, 1e-4]))
+    assert two.frequency.tolist() == [20, 40]

@@ -11,6 +11,7 @@ import pytest
 from conftest import naming
 
 import thud
+from thud.floors import modal_room as module
 from thud.floors.modal_room import SAMPLE_RATE, fast_levels, plate_frequencies
 from thud.plot.plate_modes import plate_modes
 
@@ -136,6 +137,20 @@ def test_levels_are_those_of_an_integration_in_time(
     )
 
 
+@pytest.mark.parametrize(("loss", "reverberation_time"), [(0.9, 0.05), (0.004, 0.2), (0.05, 3.0)])
+def test_record_is_long_enough_for_floor_room_and_detector(
+    impact: thud.Impact, loss: float, reverberation_time: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Twice the decay changes levels by no more than what wraps around: 60 dB below."""
+    floor = replace(FLOOR, loss_factor=loss, edges="absorption")
+    room = replace(ROOM, reverberation_time=reverberation_time)
+    places = {"balls": [BALL], "microphones": [MICROPHONE]}
+    level = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
+    monkeypatch.setattr(module, "WAITED", 2 * module.WAITED)
+    longer = thud.modal_room(impact, floor, room, **places).level  # type: ignore[arg-type]
+    assert level == pytest.approx(longer, abs=2 * 20 * np.log10(1 + 10 ** (-60 / 20)))
+
+
 def test_detector_shows_tones_and_their_bursts(oracle: Callable[..., None]) -> None:
     """IEC 61672-1: a burst of 200 ms reads 1.0 dB less than the tone, one of 500 ms 0.1 dB."""
     time = np.arange(int(3 * SAMPLE_RATE)) / SAMPLE_RATE
@@ -186,6 +201,97 @@ def test_what_has_no_modal_answer_is_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.modal_room(impact, **{"floor": FLOOR, "room": ROOM} | settings)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("slowest", [0.5, 6.9, 200.0])
+def test_record_lasts_until_the_slowest_mode_has_decayed(slowest: float) -> None:
+    """By 60 dB, and half a second more: too short a record passed."""
+    left = 10 * np.log10(np.exp(-slowest * (module._duration(slowest) - 0.5)))  # noqa: SLF001
+    assert left == pytest.approx(-60.0)
+
+
+@pytest.mark.parametrize(
+    ("room", "loss"), [(thud.Room(volume=40.0, reverberation_time=3.0), 0.05), (ROOM, 0.001)]
+)
+def test_record_is_that_of_the_slowest_mode_of_plate_or_room(
+    impact: thud.Impact, monkeypatch: pytest.MonkeyPatch, room: thud.Room, loss: float
+) -> None:
+    asked: list[float] = []
+    usual = module._spectrum  # noqa: SLF001
+
+    def keep(source: thud.Impact, duration: float) -> object:
+        asked.append(duration)
+        return usual(source, duration)
+
+    monkeypatch.setattr(module, "_spectrum", keep)
+    floor = replace(FLOOR, loss_factor=loss, edges="absorption", edge_absorption=0.0)
+    found = thud.modal_room(impact, floor, room, balls=1, microphones=1)
+    # The room's energy falls by 60 dB in T, that of the plate at 2 pi f eta or faster.
+    lowest = found.floor_frequency[0]
+    of_plate = 6 * np.log(10) / (2 * np.pi * lowest * loss)
+    if loss > 0.01:
+        assert asked[0] == pytest.approx(0.5 + 3.0)
+    else:
+        assert 0.5 + 0.4 < asked[0] <= 0.5 + of_plate
+
+
+def test_spectrum_is_the_fourier_integral_of_the_force(impact: thud.Impact) -> None:
+    omega, spectrum = module._spectrum(impact, 1.7003)  # noqa: SLF001
+    assert omega[0] == 0
+    # Lines from 0 to half of the sampling rate, of a record that is no shorter than asked for.
+    assert omega[-1] == pytest.approx(np.pi * SAMPLE_RATE)
+    assert 2 * np.pi / omega[1] == pytest.approx(1.7003, abs=2 / SAMPLE_RATE)
+    assert 2 * np.pi / omega[1] >= 1.7003
+    force = impact.force("floor")
+    for i in (0, 3, 40, 300):
+        integral = np.exp(-1j * omega[i] * impact.time) @ force / impact.sample_rate
+        # Lines move by less than 1e-5 of the angle in 20 ms.
+        assert spectrum[i] == pytest.approx(integral, rel=1e-3)
+    long = module._spectrum(impact, 1e-3)[0]  # noqa: SLF001
+    assert 2 * np.pi / long[1] >= len(force) / impact.sample_rate
+
+
+def test_positions_of_small_rooms_keep_a_quarter_of_the_side() -> None:
+    draw = np.random.default_rng(0)
+    sides = (1.2, 3.0, 2.0)
+    places = module._positions("a", 1000, sides, draw)  # noqa: SLF001
+    border = np.array([0.3, 0.5, 0.5])
+    assert (places >= border).all()
+    assert (places <= np.array(sides) - border).all()
+    # A thousand positions come near to every border.
+    assert places.min(axis=0) == pytest.approx(border, abs=0.03)
+    assert places.max(axis=0) == pytest.approx(np.array(sides) - border, abs=0.03)
+    corners = [[0.0, 0.0, 0.0], [1.2, 3.0, 2.0]]
+    assert module._positions("a", corners, sides, draw).tolist() == corners  # noqa: SLF001
+    for count in (0, 1001):
+        with pytest.raises(thud.InputError, match="a = "):
+            module._positions("a", count, sides, draw)  # noqa: SLF001
+    for places in (np.zeros((0, 3)), np.zeros((1001, 3)), np.zeros((1, 2))):
+        with pytest.raises(thud.InputError, match="a have the shape"):
+            module._positions("a", places, sides, draw)  # noqa: SLF001
+
+
+def test_each_mode_of_the_room_decays_as_the_nearest_third(found: thud.ModalRoom) -> None:
+    times = np.linspace(0.4, 1.5, 12)
+    prediction = replace(found.prediction, reverberation_time=times)
+    # Between 63 and 80 Hz the border is their geometric mean.
+    asked = np.array([0.0, 20.0, 50.0, 70.9, 71.1, 400.0, 2000.0])
+    expected = times[[0, 0, 0, 1, 2, 9, 11]]
+    assert module._times(prediction, asked).tolist() == expected.tolist()  # noqa: SLF001
+
+
+def test_numbers_of_all_positions_are_shown(found: thud.ModalRoom) -> None:
+    draw = np.random.default_rng(1)
+    level = draw.normal(60, 5, (3, 4, 9))
+    many = replace(found, level=level)
+    assert many.mean == pytest.approx(10 * np.log10((10 ** (level / 10)).sum(axis=(0, 1)) / 12))
+    assert many.spread == pytest.approx(
+        np.sqrt(((level - level.mean(axis=(0, 1))) ** 2).sum(axis=(0, 1)) / 12)
+    )
+    assert many.statistical[1, 3:] == pytest.approx(found.prediction.spread[:6])
+    assert many.frequency.tolist() == thud.get_bands("third").nominal[:9].tolist()
+    for column, values in ((3, level.min(axis=(0, 1))), (4, level.max(axis=(0, 1)))):
+        assert [row[column] for row in many.rows()[1:]] == [f"{value:.1f}" for value in values]
 
 
 def test_figures_show_positions_and_shapes(found: thud.ModalRoom) -> None:

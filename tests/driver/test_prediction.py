@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +13,7 @@ from conftest import REPOSITORY, naming, recorded
 
 import thud
 from thud.cli import main
+from thud.floors.prediction import _force_change
 
 if TYPE_CHECKING:
     import subprocess
@@ -253,3 +255,74 @@ def test_floor_radiates_no_more_than_it_loses(impact: thud.Impact) -> None:
     share = thud.predict_level(impact, light, thud.Room()).radiated_share
     assert (share > 0.4).any()
     assert (share <= 0.5).all()
+
+
+def test_share_that_is_radiated_is_that_of_one_side() -> None:
+    """It is rho c sigma/(m'' omega eta), with two sides and the inner losses where eta is less."""
+    impact, room = thud.solve(), thud.Room(air_density=1.19, sound_speed=340.0)
+    light = thud.Plate(thickness=0.1, density=45, wave_speed=4600, loss_factor=0.02)
+    least = []
+    for floor in (thud.Plate(thickness=0.2), light):
+        found = thud.predict_level(impact, floor, room)
+        omega = 2 * np.pi * found.frequency
+        lost = 1.19 * 340 * found.radiation_factor / (floor.thickness * floor.density * omega)
+        least.append(floor.loss_factor + 2 * lost > found.loss_factor)
+        whole = np.where(least[-1], floor.loss_factor + 2 * lost, found.loss_factor)
+        assert found.radiated_share == pytest.approx(lost / whole)
+    assert not least[0].any()
+    assert least[1].any()
+
+
+def test_few_modes_of_floor_or_room_are_remarked(impact: thud.Impact) -> None:
+    found = thud.predict_level(impact, thud.Plate(), thud.Room())
+    many = np.full(12, found.few_modes)
+    for change in ({"floor_modes": many - 1e-9}, {"room_modes": many - 1e-9}):
+        one = replace(found, **{"floor_modes": many, "room_modes": many} | change)
+        assert one.has_few_modes.all()
+        assert len(one.remarks) == 1
+        assert f"{one.spread.max():.1f} to {one.spread.min():.1f} dB" in one.remarks[0]
+    enough = replace(found, floor_modes=many, room_modes=many)
+    assert not enough.has_few_modes.any()
+    assert enough.remarks == ()
+    # The force that is used is the right one, or the change is no greater than 0.1 dB.
+    for force, change, count in (
+        ("blocked", -0.1, 0), ("blocked", -0.11, 1), ("blocked", 0.11, 1), ("contact", -3.0, 0)
+    ):  # fmt: skip
+        one = replace(enough, force=force, force_change=change)  # type: ignore[arg-type]
+        assert len(one.remarks) == count
+    assert replace(enough, floor_remarks=("a", "b")).remarks == ("a", "b")
+
+
+def test_single_numbers_are_those_of_the_levels(impact: thud.Impact) -> None:
+    room = thud.Room(volume=70.0, reverberation_time=0.8)
+    found = thud.predict_level(impact, thud.Plate(), room)
+    assert found.rating == thud.rating(found.level, "third")
+    assert found.octave_rating == thud.rating(found.octave_level)
+    assert found.standardised == pytest.approx(thud.standardised_level(found.level, 0.8, 70.0))
+    assert found.standardised_rating == thud.rating(found.standardised, "third")
+    measured = thud.RoomLevels(
+        "more", "third", thud.get_bands("third").nominal, np.linspace(80, 40, 15)[None]
+    )
+    assert found.difference(measured) == pytest.approx(np.linspace(80, 40, 15)[3:] - found.level)
+
+
+@pytest.mark.parametrize("resistance", [300.0, 600.0, 1e4])
+def test_force_on_a_resistance_is_that_of_a_linear_source(resistance: float) -> None:
+    """M F'' + (k M/Z) F' + k F = 0 from F = 0: the maximum of its closed form, on both sides."""
+    mass, contact = 2.5, 0.02
+    stiffness = mass * (np.pi / contact) ** 2
+    roots = np.roots([1, stiffness / resistance, stiffness / mass]).astype(complex)
+    time = np.linspace(0, 0.03, 300001)
+    slope = stiffness / (roots[0] - roots[1])
+    force = (slope * (np.exp(roots[0] * time) - np.exp(roots[1] * time))).real
+    expected = 20 * np.log10(force.max() / np.sqrt(stiffness * mass))
+    assert _force_change(mass, contact, resistance) == pytest.approx(expected, abs=1e-6)
+
+
+def test_force_that_just_does_not_swing_has_the_limit_of_both_sides() -> None:
+    # b**2 = k/M where Z = sqrt(k M)/2: the peak is 1/e.
+    stiffness = 2.5 * (np.pi / 0.02) ** 2
+    critical = np.sqrt(stiffness * 2.5) / 2
+    for factor in (1 - 1e-9, 1.0, 1 + 1e-9):
+        found = _force_change(2.5, 0.02, critical * factor)
+        assert found == pytest.approx(-20 / np.log(10), abs=1e-3)

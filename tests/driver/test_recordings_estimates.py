@@ -5,22 +5,29 @@ from __future__ import annotations
 import re
 import tracemalloc
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from conftest import naming
 from scipy.stats import chi2
-from synthetic import band_limited, coloured_noise, half_sine, make_recording
+from synthetic import band_limited, coloured_noise, half_sine, make_drop, make_recording
 
 import thud
 from thud.contact_time import contact_span
 from thud.levels import record_force
+from thud.recordings.config import Config
+from thud.recordings.contact import Estimate
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
+from thud.recordings.faults import repair
 from thud.recordings.levels import measure_levels
-from thud.recordings.quantities import average_mass
+from thud.recordings.quantities import average_mass, average_restitution, drop_quantities
 from thud.recordings.restitution import Fall
 from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 BANDS = thud.get_bands()
 ORACLE = np.array([38.3125, 30.6046, 19.2578, 8.9323, -0.4390])
@@ -238,6 +245,183 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
     assert found.quantities["drop_height"].uncertainty == 0.002
 
 
+def propagated(function: Callable[..., float], *estimates: Estimate) -> Estimate:
+    """Return a value and its uncertainty (JCGM 100, 5.1.2), slopes by differences."""
+    values = [one.value for one in estimates]
+    total = 0.0
+    for i, one in enumerate(estimates):
+        step = 1e-6 * values[i]
+        ends = [function(*values[:i], values[i] + s * step, *values[i + 1 :]) for s in (1, -1)]
+        total += ((ends[0] - ends[1]) / (2 * step) * one.uncertainty) ** 2
+    return Estimate(function(*values), np.sqrt(total))
+
+
+IMPULSE, CONTACT = Estimate(22.0, 0.05), Estimate(0.02, 2e-4)
+FLIGHTS = Estimate(0.7, 2e-3), Estimate(0.5, 1e-3)
+FALL = Fall(1.2, 2.4, 0.01, 0.02, 0.003, 9.8)
+LANDING = np.sqrt(2 * 9.8 * 1.2)
+
+
+def by_impulse(impulse: float, contact: float, mass: float = 2.4, height: float = 1.2) -> float:
+    """Return (J - m g t_c)/(m v0) - 1, of the momentum before and after."""
+    speed = np.sqrt(2 * 9.8 * height)
+    return (impulse - mass * 9.8 * contact) / (mass * speed) - 1
+
+
+def by_flight(flight: float, height: float = 1.2) -> float:
+    """Return v/v0 of a ball that flies for a time: it comes back with the velocity g T/2."""
+    return 9.8 * flight / 2 / np.sqrt(2 * 9.8 * height)
+
+
+def same(found: Estimate, expected: Estimate) -> None:
+    assert (found.value, found.uncertainty) == pytest.approx(
+        (expected.value, expected.uncertainty), rel=1e-6
+    )
+
+
+def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None:
+    ways, told = FALL.restitutions(IMPULSE, CONTACT, FLIGHTS)
+    assert not told
+    same(ways["impulse"], propagated(by_impulse, IMPULSE, CONTACT))
+    same(ways["bounces"], propagated(by_flight, FLIGHTS[0]))
+    shared = FALL.shared(ways, IMPULSE)
+    # Of the force, the mass and the height alone, with their signs.
+    gain = by_impulse(22.0 * (1 + 1e-6), 0.02) - by_impulse(22.0 * (1 - 1e-6), 0.02)
+    slopes = {
+        "calibration": 0.01 * gain / 2e-6,
+        "mass": 0.02 * (by_impulse(22, 0.02, 2.4 + 1e-6) - by_impulse(22, 0.02, 2.4 - 1e-6)) / 2e-6,
+        "drop height": 0.003
+        * (by_impulse(22, 0.02, height=1.2 + 1e-6) - by_impulse(22, 0.02, height=1.2 - 1e-6))
+        / 2e-6,
+    }
+    # With the height the weight of g t_c/v0 changes too, by less than its two percent.
+    for name, slope in slopes.items():
+        assert shared["impulse"][name] == pytest.approx(
+            slope, rel=1e-6 if name != "drop height" else 0.02
+        )
+    slope = 0.003 * (by_flight(0.7, 1.2 + 1e-6) - by_flight(0.7, 1.2 - 1e-6)) / 2e-6
+    assert shared["bounces"] == {"drop height": pytest.approx(slope)}
+    assert Fall(None, 2.4).restitutions(IMPULSE, CONTACT, FLIGHTS[:1]) == ({}, ())
+    ways, (told,) = Fall().restitutions(IMPULSE, CONTACT, FLIGHTS)
+    assert not ways
+    assert f"{0.5 / 0.7:.3f}" in told
+
+
+def test_mean_of_two_ways_weighs_their_whole_uncertainty() -> None:
+    ways, _ = FALL.restitutions(IMPULSE, CONTACT, FLIGHTS)
+    shared = FALL.shared(ways, IMPULSE)
+    whole = {w: ways[w].uncertainty ** 2 + np.sum(np.square([*shared[w].values()])) for w in ways}
+    weights = {w: 1 / whole[w] / sum(1 / one for one in whole.values()) for w in ways}
+    mean, parts = FALL.mean(ways, IMPULSE)
+    assert mean.value == pytest.approx(sum(weights[w] * ways[w].value for w in ways))
+    assert mean.uncertainty == pytest.approx(
+        np.hypot(*(weights[w] * ways[w].uncertainty for w in ways))
+    )
+    for name in ("calibration", "mass", "drop height"):
+        expected = sum(weights[w] * shared[w].get(name, 0.0) for w in ways)
+        assert parts[name] == pytest.approx(expected)
+    assert np.isnan(FALL.mean({}, IMPULSE)[0].value)
+
+
+def test_effective_mass_has_the_uncertainty_of_its_parts() -> None:
+    back = Estimate(0.72, 0.004)
+    found = FALL.effective_mass(IMPULSE, CONTACT, back)
+    same(
+        found,
+        propagated(
+            lambda impulse, contact, e: impulse / (LANDING * (1 + e) + 9.8 * contact),
+            IMPULSE, CONTACT, back,
+        ),
+    )  # fmt: skip
+    assert np.isnan(FALL.effective_mass(IMPULSE, CONTACT, None).value)
+
+
+def fallen(impulse: float, flight: float) -> Drop:
+    """Return a drop with both ways to its restitution."""
+    force = Estimate(impulse, 0.05)
+    ways, _ = FALL.restitutions(force, CONTACT, [Estimate(flight, 2e-3)])
+    mean, shared = FALL.mean(ways, force)
+    mass = FALL.effective_mass(force, CONTACT, ways["bounces"])
+    return replace(
+        make_drop(), impulse=force, restitutions=ways, restitution=mean, effective_mass=mass,
+        restitution_shared=shared,
+    )  # fmt: skip
+
+
+def test_mean_restitution_has_what_all_drops_share_and_what_differs_between_the_ways() -> None:
+    found = [
+        fallen(impulse, flight) for impulse, flight in ((22.0, 0.7), (22.2, 0.71), (21.9, 0.7))
+    ]
+    mean, difference = average_restitution(found, FALL)
+    assert mean.value == pytest.approx(np.mean([drop.restitution.value for drop in found]))
+    values = [
+        drop.restitutions["impulse"].value - drop.restitutions["bounces"].value for drop in found
+    ]
+    assert difference.value == pytest.approx(np.mean(values))
+    named = {part.name: part.uncertainty for part in difference.contributions}
+    assert named["repeatability"] == pytest.approx(np.std(values, ddof=1) / np.sqrt(3))
+    noise = [np.hypot(*(way.uncertainty for way in drop.restitutions.values())) for drop in found]
+    assert named["noise"] == pytest.approx(np.hypot.reduce(noise) / 3)
+    for name in ("calibration", "mass", "drop height"):
+        shared = [FALL.shared(drop.restitutions, drop.impulse) for drop in found]
+        expected = np.mean([s["impulse"][name] - s["bounces"].get(name, 0.0) for s in shared])
+        assert named[name] == pytest.approx(abs(expected))
+        expected = abs(np.mean([drop.restitution_shared[name] for drop in found]))
+        parts = {part.name: part.uncertainty for part in mean.contributions}
+        assert parts[name] == pytest.approx(expected)
+    # A rectangle from one way to the other where they differ beyond doubt.
+    exact = replace(FALL, calibration=0.0, mass_uncertainty=0.0, height_uncertainty=0.0)
+    wrong, apart = average_restitution(found, exact)
+    assert abs(apart.value) > apart.expanded
+    parts = {part.name: part.uncertainty for part in wrong.contributions}
+    assert parts["impulse against bounces"] == pytest.approx(abs(apart.value) / np.sqrt(3))
+
+
+def test_mean_mass_has_calibration_and_height() -> None:
+    found = [fallen(22.0, 0.7), fallen(22.2, 0.71)]
+    mass = average_mass(found, FALL)
+    named = {part.name: part.uncertainty for part in mass.contributions}
+    assert mass.value == pytest.approx(np.mean([drop.effective_mass.value for drop in found]))
+    assert named["calibration"] == pytest.approx(0.01 * mass.value)
+
+    def at(height: float) -> float:
+        # v0 e = g T/2 does not change with the height.
+        speed = np.sqrt(2 * 9.8 * height)
+        return float(np.mean([
+            drop.impulse.value
+            / (speed + LANDING * drop.restitutions["bounces"].value + 9.8 * CONTACT.value)
+            for drop in found
+        ]))  # fmt: skip
+
+    slope = (at(1.2 + 1e-5) - at(1.2 - 1e-5)) / 2e-5
+    assert named["drop height"] == pytest.approx(0.003 * abs(slope), rel=1e-3)
+    assert np.isnan(average_mass(found, replace(FALL, height=None)).value)
+
+
+def test_edges_of_all_drops_share_the_smallest_uncertainty() -> None:
+    times = [Estimate(0.02, 5e-5), Estimate(0.0201, 3e-5)]
+    found = [replace(make_drop(), contact_time=time) for time in times]
+    for ones, expected in ((found, 3e-5), (found[:1], None)):
+        quantity = drop_quantities(ones, Config(), None)["contact_time"]
+        named = {part.name: part.uncertainty for part in quantity.contributions}
+        assert named.get("edges of the pulse") == expected
+
+
+def test_peaks_are_not_counted_in_noise() -> None:
+    """A peak of a tenth of the peak force counts from six deviations of the noise on."""
+    drop = make_drop(rate=25600.0)
+    time = np.arange(len(drop.force)) / drop.sample_rate - 0.1
+    double = drop.force.max() * np.abs(np.sin(100 * np.pi * time)) * (drop.force > 0)
+    band = 1250 - 1 / drop.contact_time.value
+    for force, factor, expected in (
+        (drop.force, 1e3, 1.0), (double, 0.99, 2.0), (double, 1.01, np.nan)
+    ):  # fmt: skip
+        white = (factor * 0.1 * 1500 / 6) ** 2 / band
+        noisy = replace(drop, force=force, noise=replace(drop.noise, white=white))
+        counted = drop_quantities([noisy], Config(), None)["peaks"].value
+        assert counted == pytest.approx(expected, nan_ok=True)
+
+
 def test_noise_behind_a_drop_was_taken_for_its_bounce() -> None:
     """A hump of noise gave a restitution of 0.03 with an uncertainty of 0.001."""
     force, _ = make_recording(
@@ -320,6 +504,28 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     lost[5200:5300] = 0
     with pytest.raises(thud.InputError, match=naming("dropout", "ms")):
         drops(lost, 48e3)
+
+
+@pytest.mark.parametrize("offset", [-3000.0, 0.0, 3000.0])
+def test_held_samples_jump_by_a_part_of_the_peak_above_the_quiet(offset: float) -> None:
+    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=80, offset=offset)
+    (window,) = find_windows(Signal.from_array(force, 48e3, "file.wav"))
+    first = window.start + window.contact[0] + 200
+    rise = np.diff(force[first : first + 60]).mean()
+    # 4 % of 1500 N.
+    for factor, expected in ((0.85, False), (1.15, True)):
+        count = round(factor * 0.04 * 1500 / rise)
+        held = force.copy()
+        held[first : first + count] = force[first]
+        (window,) = find_windows(Signal.from_array(held, 48e3, "file.wav"))
+        filled, steps, remarks = repair(window)
+        assert bool(remarks) == bool(steps) == expected
+        found = filled[first - window.start :][:count]
+        truth = force[first : first + count] if expected else np.full(count, force[first])
+        # A line between the ends of the flank, and the noise.
+        np.testing.assert_allclose(found, truth, atol=1.5)
+        if expected:
+            assert f"dropouts of {1e3 * count / 48e3:.3g} ms" in remarks[0]
 
 
 @pytest.mark.parametrize("part", [slice(4900, None), slice(None, 5600)])

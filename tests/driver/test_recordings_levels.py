@@ -10,19 +10,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from conftest import naming
+from scipy import stats
+from scipy.optimize import brentq
 from scipy.signal import lsim, lti
 from scipy.stats import binom
+from scipy.stats import t as student
+from synthetic import make_drop
 
 import thud
 from thud.levels import RECORDED_BAND
 from thud.recordings.band_noise import band_noise
-from thud.recordings.contact import Contact, Estimate, cells_between, even_edges
-from thud.recordings.estimates import Drop
-from thud.recordings.levels import METHODS, average_levels, compare_methods, measure_levels
+from thud.recordings.contact import Estimate, cells_between, even_edges
+from thud.recordings.levels import (
+    METHODS,
+    LevelEstimate,
+    average_levels,
+    compare_methods,
+    measure_levels,
+)
 from thud.recordings.low_pass import attenuation, low_pass_force
-from thud.recordings.noise import Background, Noise
+from thud.recordings.noise import Background
 from thud.recordings.outliers import find_outliers
 from thud.recordings.plate import Plate, check_plate, correct_plate
+from thud.recordings.quantities import find_deviant
 from thud.recordings.verdict import (
     Contribution,
     Quantity,
@@ -43,54 +53,6 @@ NAMES = [f"drop {i + 1}" for i in range(20)]
 def half_sine(time: np.ndarray, contact: float = 0.02) -> np.ndarray:
     inside = (time >= 0) & (time <= contact)
     return np.where(inside, 1500 * np.sin(np.pi * time / contact), 0.0)
-
-
-def make_drop(  # noqa: PLR0913 - what a recording may be
-    deviation: float = 0.0,
-    rate: float = 25600.0,
-    *,
-    before: float = 0.1,
-    after: float = 0.1,
-    seed: int = 0,
-    density: float | None = None,
-) -> Drop:
-    """Return a half-sine with white noise, known by its density, whose offset was removed."""
-    time = (np.arange(round((before + 0.02 + after) * rate)) - round(before * rate)) / rate
-    noise = np.random.default_rng(seed).normal(scale=deviation, size=len(time))
-    quiet = (time < 0) | (time > 0.02)
-    if deviation:
-        noise -= noise[quiet].mean()
-    gate = (round(before * rate) - 4, round((before + 0.02) * rate) + 5)
-    draws = np.array([[max(density or 2 * deviation**2 / rate, 1e-30), 0, 0, 0, 0]])
-    # The offset of white noise, from all the quiet.
-    n_cell = len(even_edges(*gate, rate)) - 1
-    offset = np.full((n_cell, n_cell), draws[0, 0] / 2 * rate / quiet.sum())
-    touch, release, force = Estimate(0, 0), Estimate(0.02, 0), half_sine(time) + noise
-    return Drop(
-        name=f"drop {seed + 1}",
-        begin=float(time[0]),
-        force=force,
-        sample_rate=rate,
-        onset=before,
-        gate=gate,
-        contact_time=release,
-        restitution=Estimate.unknown(),
-        restitution_shared={},
-        restitution_by="",
-        restitutions={},
-        peak_force=Estimate(1500, 0),
-        impulse=Estimate.unknown(),
-        effective_mass=Estimate.unknown(),
-        noise=Noise(deviation, "before and after", float(draws[0, 0])),
-        bounces=(),
-        steps=(),
-        remarks=(),
-        contact=Contact(
-            touch, release, touch, release, 1500.0, (0, len(time)), force, np.zeros(len(time)),
-            gate, offset, (before, after),
-            Background((np.zeros(1), np.ones(1)), np.zeros(1), draws, 1500.0), rate,
-        ),
-    )  # fmt: skip
 
 
 def closed_form(rate: float) -> np.ndarray:
@@ -218,7 +180,7 @@ def test_many_drops_at_once_are_those_one_by_one() -> None:
     together = measure_levels(drops, "third")
     for drop, found in zip(drops, together, strict=True):
         (alone,) = measure_levels([drop], "third")
-        np.testing.assert_array_equal(found.level, alone.level)
+        np.testing.assert_allclose(found.level, alone.level, rtol=0, atol=1e-12)
         np.testing.assert_allclose(found.background, alone.background, rtol=0, atol=1e-9)
         np.testing.assert_allclose(found.uncertainty, alone.uncertainty, rtol=1e-9)
 
@@ -354,15 +316,80 @@ def test_drops_that_differ_are_marked_and_kept() -> None:
     assert average_levels(same).outliers == ()
 
 
+def grubbs(count: int, significance: float) -> float:
+    """Return the largest score of normal values that chance explains (Grubbs 1969), two-sided."""
+    t = student.isf(significance / (2 * count), count - 2)
+    return (count - 1) / math.sqrt(count) * math.sqrt(t**2 / (count - 2 + t**2))
+
+
 def test_grubbs_critical_values_are_the_published_ones() -> None:
-    # Grubbs 1969, two-sided 5 %: 1.155, 1.715, 2.290, 2.709 for 3, 5, 10, 20 values.
-    for count, critical in ((3, 1.1547), (5, 1.7150), (10, 2.2900), (20, 2.7082)):
+    # Grubbs 1969, two-sided 5 %.
+    for count, critical in ((5, 1.7150), (10, 2.2900), (20, 2.7082)):
         values = np.zeros(count)
         values[0], values[1:] = 100.0, np.linspace(-1e-3, 1e-3, count - 1)
-        (found,) = find_outliers(values, NAMES, "level") or [None]
-        if count > 3:
-            assert found is not None
-            assert found.critical == pytest.approx(critical, abs=1e-3)
+        (found,) = find_outliers(values, NAMES, "level")
+        assert found.critical == pytest.approx(critical, abs=1e-3)
+        assert found.critical == pytest.approx(grubbs(count, 0.05))
+        assert found.score == pytest.approx((100 - values.mean()) / values.std(ddof=1))
+        assert (found.name, found.value) == ("drop 1", 100.0)
+
+
+def test_outliers_begin_at_the_critical_value_and_beyond_their_own_uncertainty() -> None:
+    others = np.linspace(-1, 1, 8)
+
+    def marked(last: float, **options: Any) -> bool:  # noqa: ANN401
+        return bool(find_outliers([*others, last], NAMES, "level", **options))
+
+    def score(last: float) -> float:
+        values = np.append(others, last)
+        return float((last - values.mean()) / values.std(ddof=1))
+
+    edge = brentq(lambda last: score(last) - grubbs(9, 0.05), 1, 10)
+    assert (marked(edge - 1e-6), marked(edge + 1e-6)) == (False, True)
+    # 1.96 standard uncertainties of the value itself explain as much.
+    distance = 10 - np.append(others, 10.0).mean()
+    for factor, expected in ((1 - 1e-6, True), (1 + 1e-6, False)):
+        own = [0.0] * 8 + [factor * distance / 1.96]
+        assert marked(10.0, uncertainty=own) == expected
+    # Of ten values two are looked for, of nine one.
+    two = [*np.linspace(-1, 1, 8), 30.0, 30.0]
+    assert len(find_outliers(two, NAMES, "level")) == 2
+    assert not find_outliers(two[1:], NAMES, "level")
+
+
+@pytest.mark.parametrize("bands", ["octave", "third"])
+def test_outliers_of_many_bands_share_the_probability(bands: Any) -> None:  # noqa: ANN401
+    """Bonferroni: any band of drops that differ by chance is marked with 5 % together."""
+    drops = [replace(drop, force=scale * drop.force) for drop, scale in zip(
+        [make_drop(0.01, seed=i) for i in range(6)], [1.0, 1.01, 0.99, 1.005, 0.995, 1.3],
+        strict=True)]  # fmt: skip
+    average = average_levels(measure_levels(drops, bands))
+    count = len(thud.get_bands(bands).nominal)
+    assert len(average.outliers) == count
+    for found in average.outliers:
+        assert found.critical == pytest.approx(grubbs(6, 0.05 / count))
+
+
+def test_drops_that_differ_share_the_probability_among_three_quantities() -> None:
+    drops = [
+        replace(
+            make_drop(), name=f"drop {i}", contact_time=Estimate(0.02 + 1e-5 * (i % 3), 0.0),
+            restitution=Estimate(0.8 + 1e-3 * (i % 2), 0.0), peak_force=Estimate(1500.0 + i, 0.0),
+        )
+        for i in range(6)
+    ]  # fmt: skip
+    assert find_deviant(drops) == ()
+    for change, value, unit in (
+        ("contact_time", 0.03, 1e-3), ("restitution", 0.5, 1.0), ("peak_force", 3000.0, 1.0),
+    ):  # fmt: skip
+        (found,) = find_deviant(
+            [*drops, replace(drops[0], name="odd", **{change: Estimate(value, 0)})]
+        )
+        assert (found.name, found.value) == ("odd", pytest.approx(value / unit))
+        assert found.critical == pytest.approx(grubbs(7, 0.05 / 3))
+        # A drop that is uncertain enough does not differ.
+        doubtful = replace(drops[0], name="odd", **{change: Estimate(value, value)})
+        assert find_deviant([*drops, doubtful]) == ()
 
 
 @pytest.mark.parametrize("count", [3, 5, 9, 15])
@@ -407,6 +434,26 @@ def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     assert after.max() < 1e-3
     assert np.abs(corrected - half_sine(time)).max() < 0.01 * 1500
     assert f"{plate.resonance:.4g} Hz" in sentence
+
+
+def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
+    """k/(k - m w2 + i w c), with the mass that is added."""
+    plate = Plate(1600.0, 30.0, mass=10.0, added_mass=4.0)
+    stiffness = 10 * (2 * np.pi * 1600) ** 2
+    damping = 10 * 2 * np.pi * 1600 / 30
+    omega = 2 * np.pi * np.array([10.0, 900.0, 1352.0, 4000.0])
+    expected = stiffness / (stiffness - 14 * omega**2 + 1j * omega * damping)
+    np.testing.assert_allclose(plate.response(omega / 2 / np.pi), expected)
+    # Kept up to twice the resonance, nothing from four times on, cos2 of the octave between.
+    f = plate.resonance * np.array([0.1, 1.99, 2 * 2 ** (1 / 3), 2 * np.sqrt(2), 4, 9])
+    np.testing.assert_allclose(plate.passed(f), [1, 1, 0.75, 0.5, 0, 0], atol=1e-12)
+    uncertain = replace(plate, frequency_uncertainty=1e-6)
+    edge = thud.get_bands().upper
+    step = replace(plate, frequency=1600 * (1 + 1e-6), quality=1e9)
+    change = np.abs(step.response(edge) / replace(plate, quality=1e9).response(edge))
+    np.testing.assert_allclose(
+        uncertain.level_uncertainty(), np.abs(20 * np.log10(change)), rtol=1e-4
+    )
 
 
 def test_constant_force_passes_the_correction() -> None:
@@ -501,6 +548,78 @@ def test_budget_after_the_gum() -> None:
     assert math.isnan(average_estimates([]).value)
 
 
+def level_estimate(level: float, background: float, noise: float, method: float) -> LevelEstimate:
+    """Return an estimate with one band."""
+    parts = {"noise": np.array([noise]), "method": np.array([method])}
+    one = np.array([level])
+    return LevelEstimate(
+        "drop", "octave", "fft", one - 0.01, one, one, np.array([background]), np.array([""]),
+        parts, (),
+    )  # fmt: skip
+
+
+def test_average_of_levels_is_that_of_energies_with_its_budget() -> None:
+    levels, backgrounds = [39.0, 39.4, 38.7], [20.0, 26.0, 10.0]
+    noise, method = [0.1, 0.2, 0.3], [0.05, 0.02, 0.01]
+    estimates = [
+        replace(level_estimate(*values), bands="octave")
+        for values in zip(levels, backgrounds, noise, method, strict=True)
+    ]
+    # One band stands for all five.
+    estimates = [
+        replace(e, **{
+            name: np.repeat(getattr(e, name), 5)
+            for name in ("level", "uncertainty", "measured", "background", "flag")
+        }, contributions={name: np.repeat(part, 5) for name, part in e.contributions.items()})
+        for e in estimates
+    ]  # fmt: skip
+    found = average_levels(estimates)
+    energies = 10 ** (np.array(levels) / 10)
+    below = np.mean(10 ** (np.array(backgrounds) / 10))
+    energy = energies.mean() - below
+    np.testing.assert_allclose(found.level, 10 * np.log10(energy))
+    np.testing.assert_allclose(found.background, 10 * np.log10(below))
+    np.testing.assert_allclose(found.spread, np.std(levels, ddof=1))
+    decibel = 10 / math.log(10)
+    repeated = decibel * energies.std(ddof=1) / math.sqrt(3) / energy
+    np.testing.assert_allclose(found.contributions["repeatability"], repeated)
+    weights = energies / energies.sum()
+    np.testing.assert_allclose(
+        found.contributions["noise"], np.sqrt(((weights * noise) ** 2).sum()), rtol=1e-12
+    )
+    # What is wrong with the method is wrong alike.
+    np.testing.assert_allclose(found.contributions["method"], weights @ method)
+    np.testing.assert_allclose(found.uncertainty, math.hypot(repeated, weights @ method))
+    (one, *_) = level_quantities(found, calibration=0.02)
+    freedom = {part.name: (part.freedom, part.counted) for part in one.contributions}
+    assert freedom == {
+        "repeatability": (2, True), "noise": (math.inf, False), "method": (math.inf, True),
+        "calibration": (math.inf, True),
+    }  # fmt: skip
+    alone = average_levels(estimates[:1])
+    assert np.isnan(alone.spread).all()
+    np.testing.assert_allclose(alone.uncertainty, math.hypot(noise[0], method[0]))
+    (one, *_) = level_quantities(alone)
+    assert all(part.counted and part.freedom == math.inf for part in one.contributions)
+
+
+def test_mean_of_estimates_has_its_budget() -> None:
+    known = [Estimate(v, u) for v, u in ((1.0, 0.1), (2.0, 0.2), (4.0, 0.2))]
+    found = average_estimates([*known, Estimate.unknown()], Contribution("height", 0.5))
+    parts = {part.name: part for part in found.contributions}
+    assert found.value == pytest.approx(7 / 3)
+    assert parts["repeatability"].uncertainty == pytest.approx(stats.sem([1.0, 2.0, 4.0]))
+    assert parts["repeatability"].freedom == 2
+    # The mean of three independent errors; their scatter holds it already.
+    assert parts["noise"].uncertainty == pytest.approx(0.1)
+    assert not parts["noise"].counted
+    expected = math.hypot(parts["repeatability"].uncertainty, 0.5)
+    assert found.uncertainty == pytest.approx(expected)
+    assert found.expanded == pytest.approx(
+        expected * student.ppf(0.975, 2 * (expected / parts["repeatability"].uncertainty) ** 4)
+    )
+
+
 def test_level_budget_has_calibration_and_plate() -> None:
     average = average_levels(measure_levels([make_drop(1.0, seed=i) for i in range(3)]))
     plate = np.full(5, 0.02)
@@ -590,6 +709,12 @@ def test_probability_of_conformity_counts_both_limits() -> None:
     decisions = [decide([q, *NOMINAL[1:]]).decisions[0] for q in (half, wide)]
     assert decisions[0].probability == pytest.approx(0.5)
     assert decisions[1].probability == pytest.approx(0.6827, abs=1e-4)
+    # Of four drops, Student's t; what is not known or an upper bound has no probability.
+    few = Quantity(39.5, (Contribution("repeatability", 0.4, 3),))
+    expected = student.cdf(0.5 / 0.4, 3) - student.cdf(-1.5 / 0.4, 3)
+    assert decide([few, *NOMINAL[1:]]).decisions[0].probability == pytest.approx(expected)
+    bound = replace(few, upper_bound=True)
+    assert math.isnan(decide([bound, *NOMINAL[1:]]).decisions[0].probability)
 
 
 @pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])

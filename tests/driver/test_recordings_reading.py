@@ -797,7 +797,7 @@ def test_arrays_are_signals() -> None:
     assert (signal.name, signal.n_sample, signal.full_scale) == ("model", 3, None)
     assert signal.checksum == Signal.from_array([0, 1, 2], 8000).checksum
     for force, rate in (([[1.0]], 8000), ([np.nan], 8000), ([1.0], 0), ([1.0], np.inf), (["a"], 1)):
-        with pytest.raises(InputError, match="recording|sample_rate"):
+        with pytest.raises(InputError, match=r"recording|sample_rate"):
             Signal.from_array(force, rate)
 
 

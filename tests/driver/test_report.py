@@ -23,6 +23,7 @@ from test_figure_look import assert_clean
 
 import thud
 from thud.errors import ReportWarning
+from thud.files import Results
 from thud.levels import record_force
 from thud.plot.recording import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
@@ -373,8 +374,7 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     folder = tmp_path / "report"
-    folder.mkdir()
-    (folder / "report.pdf").write_bytes(b"of an earlier report")
+    Results(folder, "measure").write({"report.pdf": b"of an earlier report"})
     if library is None:
         monkeypatch.setitem(sys.modules, "weasyprint", None)
     else:
@@ -386,7 +386,7 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     with pytest.warns(ReportWarning, match=naming("report.pdf", "pip install")):
         paths = write_report(one, folder)
     assert [path.name for path in paths] == ["report.json", "report.html"]
-    assert sorted(path.name for path in folder.iterdir()) == ["report.html", "report.json"]
+    assert sorted(path.name for path in folder.glob("report.*")) == ["report.html", "report.json"]
     assert not capsys.readouterr().out
 
 

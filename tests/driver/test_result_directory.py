@@ -13,13 +13,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
-import f90nml
 import pytest
 from conftest import MINIMAL, naming
 
 import thud
 from thud.errors import PlausibilityWarning
-from thud.files import add_files, locked
+from thud.files import HEAD, Results, locked
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -156,11 +155,12 @@ def test_stale_figures_do_not_stand_beside_new_results(
 ) -> None:
     out = tmp_path / "outputs/case"
     run("a/case.nml")
-    add_files(out, {"force.png": b"drawn from the old results"})
-    assert {".thud.new", "force.png"} < set((out / ".thud").read_text().split())
+    Results(out).write({"force.png": b"drawn from the old results"})
+    # A kill has left half a figure.
+    (out / ".thud.new").write_bytes(b"ha")
     for _ in range(2):
         run("a/case.nml")
-        assert (out / "force.png").exists()
+        assert names_in(out) == sorted([*two_inputs["a"], "force.png"])
     run("b/case.nml")
     assert read_bytes(out) == two_inputs["b"]
 
@@ -171,12 +171,10 @@ def test_figures_are_not_added_to_results_of_another_input(
     out = tmp_path / "outputs/case"
     run("b/case.nml")
     with pytest.raises(thud.InputError, match=naming(out)):
-        add_files(out, {"force.png": b""}, two_inputs["a"]["effective.nml"])
+        Results(out).write({"force.png": b""}, marker=two_inputs["a"]["effective.nml"])
     assert read_bytes(out) == two_inputs["b"]
-    add_files(out, {"force.png": b""}, two_inputs["b"]["effective.nml"])
+    Results(out).write({"force.png": b""}, marker=two_inputs["b"]["effective.nml"])
     assert names_in(out) == sorted([*two_inputs["b"], "force.png"])
-    with pytest.raises(FileNotFoundError):
-        add_files(tmp_path / "nowhere", {"force.png": b""})
 
 
 def test_killed_run_does_not_lock_its_directory(
@@ -184,7 +182,7 @@ def test_killed_run_does_not_lock_its_directory(
 ) -> None:
     left = tmp_path / "outputs/.case.part"
     left.mkdir(parents=True)
-    (left / ".thud").write_text("force.csv\n")
+    (left / ".thud").write_text(f"{HEAD}\nforce.csv\n")
     (left / "force.csv").write_text("half a fi")
     assert run(case_file(MINIMAL)).returncode == 0
     assert names_in(tmp_path / "outputs/case") == FILES
@@ -217,7 +215,7 @@ def test_figures_are_added_while_others_write(
     added = 0
     with subprocess.Popen(["/bin/sh", "-c", command], cwd=tmp_path) as process:
         while process.poll() is None:
-            add_files(tmp_path / "o", {f"{added}.png": b"figure"})
+            Results(tmp_path / "o").write({f"{added}.png": b"figure"})
             added += 1
     assert process.returncode == 0
     figures = [f"{i}.png" for i in range(added)]
@@ -339,17 +337,74 @@ def test_unwritable_directories_are_told(run: Run, case_file: CaseFile, tmp_path
     assert names_in(tmp_path / "locked") == ["out"]
 
 
-def test_results_of_an_older_version_keep_their_case(
+def test_results_without_their_manifest_are_replaced_on_request(
     run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
 ) -> None:
     out = tmp_path / "outputs/case"
     run("a/case.nml")
     (out / ".thud").unlink()
     (out / "force.png").write_bytes(b"figure")
+    before = read_bytes(out)
     result = run("b/case.nml")
-    assert result.returncode == 0
+    assert result.returncode == 1
+    assert "outputs/case/effective.nml is in the way" in result.stderr
+    assert "--replace" in result.stderr
+    assert read_bytes(out) == before
+    assert run("b/case.nml", "--replace").returncode == 0
     assert read_bytes(out) == {**two_inputs["b"], "force.png": b"figure"}
-    assert f90nml.read(out / "effective.nml")["ball"]["mass"] == 2.4
+
+
+@pytest.mark.parametrize("folder", [False, True], ids=["exchanged", "moved"])
+def test_edited_results_are_the_users(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path, *, folder: bool
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("b/case.nml")
+    if folder:
+        (out / "more").mkdir()
+    (out / "levels.csv").write_text("with my remarks")
+    result = run("a/case.nml")
+    assert result.returncode == 1
+    assert "outputs/case/levels.csv is in the way" in result.stderr
+    assert (out / "levels.csv").read_text() == "with my remarks"
+    (out / "levels.csv").write_bytes(two_inputs["b"]["levels.csv"])
+    # What the next input does not write is not in its way.
+    (out / "modes.csv").write_text("with my remarks")
+    assert run("a/case.nml").returncode == 0
+    if folder:
+        (out / "more").rmdir()
+    assert read_bytes(out) == {**two_inputs["a"], "modes.csv": b"with my remarks"}
+
+
+def test_results_of_other_commands_stay_beside_those_of_any_input(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("a/case.nml")
+    measured = {"report.json": b"{}", "measured.png": b"figure"}
+    Results(out, "measure").write(measured)
+    for name in "bab":
+        assert run(f"{name}/case.nml").returncode == 0
+        found = read_bytes(out)
+        assert measured.items() <= found.items()
+        assert found.keys() == {*two_inputs[name], *measured}
+    assert [p.name for p in Results(out, "measure").write(measured)] == list(measured)
+
+
+def test_results_are_repeated_from_their_own_input(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("a/case.nml")
+    assert run("outputs/case/effective.nml").returncode == 0
+    assert read_bytes(out) == two_inputs["a"]
+    text = two_inputs["a"]["effective.nml"] + b"! mine\n"
+    (out / "effective.nml").write_bytes(text)
+    for more in ([], ["--replace"]):
+        result = run("outputs/case/effective.nml", *more)
+        assert result.returncode == 1
+        assert "outputs/case/effective.nml is" in result.stderr
+        assert (out / "effective.nml").read_bytes() == text
 
 
 def test_files_of_two_inputs_are_not_read_as_one(
@@ -362,8 +417,8 @@ def test_files_of_two_inputs_are_not_read_as_one(
         (out / name).write_bytes(two_inputs["b"][name])
         with pytest.raises(thud.InputError, match=naming(name)):
             thud.read_results(out)
-        run("a/case.nml")
-    add_files(out, {"force.png": b"figure"})
+        run("a/case.nml", "--replace")
+    Results(out).write({"force.png": b"figure"})
     thud.read_results(out)
 
 

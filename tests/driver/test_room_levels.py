@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,8 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud.cli import main
+from thud.floors.rating import CLASS_LIMITS
+from thud.floors.survey import levels_csv, rating_table
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -17,6 +20,12 @@ if TYPE_CHECKING:
 
 PUBLISHED = REPOSITORY / "inputs" / "floors" / "field_levels.csv"
 OCTAVES = (63.0, 125.0, 250.0, 500.0)
+# A survey of which nothing has to be remarked.
+GOOD = thud.RoomLevels(
+    "good", "octave", np.array(OCTAVES),
+    np.array([[70.0, 60, 50, 40], [73, 64, 51, 42], [71, 60, 52, 44], [69, 61, 49, 40]]),
+    np.full(4, 20.0), np.array([1.2, 0.9, 0.6, 0.4]), 30.0,
+)  # fmt: skip
 
 
 def write(path: Path, text: str) -> Path:
@@ -147,6 +156,8 @@ def test_rooms_that_cannot_be_are_refused(time: float, volume: float) -> None:
     name = "volume" if time > 0 else "reverberation_time"
     with pytest.raises(thud.InputError, match=naming(name, 0)):
         thud.standardised_level([60.0], time, volume)
+    with pytest.raises(thud.InputError, match=f"reverberation_time = {min(time, 0.4):g}|volume ="):
+        thud.standardised_level([60.0, 61.0], [0.4, time], volume)
 
 
 def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -157,7 +168,7 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "46 (46.24)" in shown.out
     assert "background" in shown.err
     assert {path.name for path in folder.iterdir()} == {
-        "room_levels.csv", "room_levels.png", "room_levels.svg",
+        ".thud", "room_levels.csv", "room_levels.png", "room_levels.svg",
     }  # fmt: skip
     lines = (folder / "room_levels.csv").read_text(encoding="utf-8").splitlines()
     assert len(lines) == 13
@@ -180,3 +191,151 @@ def test_column_that_hardly_is_a_position_is_remarked(tmp_path: Path) -> None:
     (tmp_path / "levels.csv").write_text(f"frequency,first,RT60\n{rows}")
     found = thud.read_room_levels(tmp_path / "levels.csv", volume=50.0)
     assert (len(found.positions), found.standardised is None) == (1, False)
+
+
+@pytest.mark.parametrize("volume", [20.0, 50.0, 180.0])
+def test_standardisation_is_the_formula_of_iso_16283_2(volume: float) -> None:
+    level, time = np.array([70.0, 61.0, 52.0, 43.0]), np.array([0.3, 0.5, 1.1, 2.4])
+
+    def shown(time: np.ndarray) -> np.ndarray:
+        ratio = time / 1.7275
+        return ratio ** (-1 / (ratio - 1))
+
+    for times in (time, time[2:3]):
+        expected = level + 10 * np.log10(volume / 50 * shown(np.array([0.5])) / shown(times))
+        found = thud.standardised_level(level, times, volume)
+        assert found == pytest.approx(expected, abs=1e-9)
+    assert thud.standardised_level(level, 1.1, volume) == pytest.approx(expected, abs=1e-9)
+
+
+def test_class_is_the_best_one_whose_limit_is_kept() -> None:
+    above = thud.rating([0.0] * 4).a_weighted
+    for number, limit in enumerate(CLASS_LIMITS, start=1):
+        assert thud.rating([limit - above - 0.01] * 4).korean_class == number
+        assert thud.rating([limit - above + 0.51] * 4).korean_class == (number + 1) % 5
+    assert thud.rating([1000.0] * 4).korean_class == 0
+    thirds = thud.rating([60.0] * 12, "third")
+    assert (thirds.korean_class, thirds.curve) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("change", "count"),
+    [
+        ({}, 0),
+        ({"positions": GOOD.positions[:3]}, 1),
+        # The mean levels of two positions differ by 15 dB, and by more.
+        ({"positions": GOOD.positions[:1] + np.array([[0.0], [5], [15], [1]])}, 0),
+        ({"positions": GOOD.positions[:1] + np.array([[0.0], [5], [15.1], [1]])}, 1),
+        ({"background": None}, 1),
+        ({"background": np.array([20.0, 20, 20, 38])}, 1),
+        ({"background": np.array([20.0, 20, 20, 33])}, 0),
+        ({"reverberation_time": None}, 1),
+        ({"volume": None}, 1),
+        ({"volume": None, "reverberation_time": None}, 1),
+    ],
+)
+def test_each_weakness_of_a_survey_is_remarked(change: dict[str, object], count: int) -> None:
+    assert len(replace(GOOD, **change).remarks) == count  # type: ignore[arg-type]
+
+
+def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:
+    deviation = np.sqrt(((GOOD.positions - GOOD.positions.mean(axis=0)) ** 2).sum(axis=0) / 3)
+    assert GOOD.spread == pytest.approx(deviation)
+    assert GOOD.standardised == pytest.approx(
+        thud.standardised_level(GOOD.level, GOOD.reverberation_time, 30.0)
+    )
+    assert GOOD.standardised_rating == thud.rating(GOOD.standardised)
+    two = replace(GOOD, positions=GOOD.positions[:2])
+    assert two.spread == pytest.approx(abs(np.diff(two.positions, axis=0)[0]) / np.sqrt(2))
+    energy = [10 ** (thud.rating(one).a_weighted / 10) for one in two.positions]
+    error = abs(energy[0] - energy[1]) / 2 / np.mean(energy)
+    assert two.position_uncertainty == pytest.approx(10 / np.log(10) * error)
+    one = replace(GOOD, positions=GOOD.positions[:1], background=None)
+    assert (one.spread, one.position_uncertainty) == (None, None)
+    assert one.level.tolist() == one.measured.tolist()
+    assert not one.is_maximum.any()
+    assert replace(one, volume=None).standardised_rating is None
+    assert replace(one, reverberation_time=None).standardised is None
+
+
+def test_rows_of_a_table_may_have_any_order_and_further_bands(tmp_path: Path) -> None:
+    frequency = np.array([500.0, 31.5, 63, 1000, 250, 125])
+    level, background, time = 80 - frequency / 20, 10 + frequency / 50, 2 - frequency / 1000
+    lines = ["frequency,background,P1,T"]
+    lines += [
+        f"{f},{b},{v},{t}" for f, b, v, t in zip(frequency, background, level, time, strict=True)
+    ]
+    found = thud.read_room_levels(write(tmp_path, "\n".join(lines)), volume=40.0)
+    order = np.sort(frequency)
+    assert found.bands == "octave"
+    assert found.frequency.tolist() == order.tolist()
+    assert found.positions[0] == pytest.approx(80 - order / 20)
+    assert found.background == pytest.approx(10 + order / 50)
+    assert found.reverberation_time == pytest.approx(2 - order / 1000)
+    assert found.rating == thud.rating(found.level[1:5])
+    assert found.standardised_rating == thud.rating(found.standardised[1:5])
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        # Titles within 3 % of a mid frequency mean it.
+        ("61.2,60\n128,60\n250,60\n500,60\n", ""),
+        ("64.8,60\n122,60\n250,60\n500,60\n", ""),
+        ("61,60\n125,60\n250,60\n500,60\n", "frequency = 61 Hz"),
+        ("1,60\n63,60\n125,60\n250,60\n500,60\n", ""),
+        ("63,60\n125,60\n250,60\n500,60\n99000,60\n", ""),
+        ("0.99,60\n63,60\n125,60\n250,60\n500,60\n", "frequency = 0.99 Hz"),
+        ("63,60\n125,60\n250,60\n500,60\n100000,60\n", "frequency = 100000 Hz"),
+        ("63,200\n125,-50\n250,60\n500,60\n", ""),
+        ("63,200.1\n125,60\n250,60\n500,60\n", "level = 200.1 dB"),
+        ("63,60\n125,-50.1\n250,60\n500,60\n", "level = -50.1 dB"),
+    ],
+)
+def test_bounds_of_a_table_are_those_that_are_stated(tmp_path: Path, rows: str, words: str) -> None:
+    path = write(tmp_path, f"frequency,P1\n{rows}")
+    if words:
+        with pytest.raises(thud.InputError, match=words):
+            thud.read_room_levels(path)
+    else:
+        assert set(OCTAVES) <= set(thud.read_room_levels(path).frequency)
+
+
+@pytest.mark.parametrize(
+    ("column", "words"),
+    [
+        ("T", "reverberation_time = 0.009 s"),
+        ("background", ""),
+    ],
+)
+def test_bounds_of_times_are_not_those_of_levels(tmp_path: Path, column: str, words: str) -> None:
+    rows = "63,60,0.009\n125,60,0.01\n250,60,100\n500,60,20\n"
+    path = write(tmp_path, f"frequency,P1,{column}\n{rows}")
+    if words:
+        with pytest.raises(thud.InputError, match=words):
+            thud.read_room_levels(path)
+        path.write_text(path.read_text().replace("0.009", "0.01"))
+        assert thud.read_room_levels(path).reverberation_time is not None
+    else:
+        assert thud.read_room_levels(path).background is not None
+
+
+def test_tables_hold_the_numbers_of_the_survey() -> None:
+    found = replace(GOOD, background=np.array([20.0, 20, 20, 38]))
+    lines = [line.split(",") for line in levels_csv(found).decode().splitlines()]
+    columns = dict(zip(lines[0], np.array(lines[1:], dtype=float).T, strict=True))
+    assert columns["nominal_Hz"].tolist() == list(OCTAVES)
+    for title, values in (
+        ("mean_dB", found.measured), ("spread_dB", found.spread), ("level_dB", found.level),
+        ("background_dB", found.background), ("standardised_dB", found.standardised),
+        ("reverberation_time_s", found.reverberation_time),
+    ):  # fmt: skip
+        assert columns[title] == pytest.approx(values, abs=1e-7)
+    assert columns["is_maximum"].tolist() == [0, 0, 0, 1]
+    both, alone = rating_table(found), found.rating.rows()
+    assert [row[:2] for row in both[1:]] == alone[1:]
+    assert found.standardised_rating is not None
+    after = found.standardised_rating.rows()
+    # The class is that of the levels in the room only.
+    assert [row[2] for row in both[1:]] == [after[1][1], "", after[3][1]]
+    assert rating_table(replace(found, volume=None)) == alone

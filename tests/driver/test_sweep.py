@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import doctest
+import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -604,7 +606,8 @@ def test_command_writes_figure_and_table(
     monkeypatch.chdir(tmp_path)
     assert cli.main(["sweep", str(REPOSITORY / "inputs/studies/sweep.toml")]) == 0
     folder = tmp_path / "outputs/sweep"
-    assert sorted(path.name for path in folder.iterdir()) == ["sweep.nc", "sweep.png", "sweep.svg"]
+    names = [".thud", "sweep.nc", "sweep.png", "sweep.svg"]
+    assert sorted(path.name for path in folder.iterdir()) == names
     printed = capsys.readouterr()
     assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
     assert "peak_force, N" in printed.out
@@ -661,3 +664,37 @@ def test_parameters_of_python_are_those_of_files() -> None:
     parameter = thud.Parameter(**table)
     one, other = ({"parameters": {"height": height}} for height in (table, parameter))
     assert thud.read_study(one).identity == thud.read_study(other).identity
+
+
+@pytest.mark.parametrize(
+    ("kind", "design", "size"),
+    [("sweep", "latin_hypercube", 10**9), ("sensitivity", "saltelli", 2**30)],
+)
+def test_design_that_exceeds_the_memory_is_told(
+    kind: str, design: str, size: int, tmp_path: Path
+) -> None:
+    ranges = 'height = {low = 0.5, high = 1.0, unit = "m"}\nmass = {low = 2.4, high = 2.6}\n'
+    (tmp_path / "large.toml").write_text(
+        f'[design]\nkind = "{design}"\nsize = {size}\n[parameters]\n{ranges}'
+    )
+    limit = 4 * 2**30
+    done = subprocess.run(
+        [sys.executable, "-P", "-m", "thud", kind, "-q", "--yes", "large.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+    )
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert f"[design] size = {size}" in line
+    assert "; allowed: " in line
+
+
+def test_sets_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
+    height = thud.Parameter(low=0.5, high=1.0, count=2**30)
+    mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
+    with pytest.raises(thud.InputError, match=f"{2**60} sets"):
+        thud.sweep({"parameters": {"height": height, "mass": mass}}, yes=True)

@@ -17,7 +17,7 @@ from campaign import Finding
 from injection import ERRORS, KILLS, PATIENCE, executable, library, run
 
 import thud
-from thud.files import add_files
+from thud.files import Results
 
 if TYPE_CHECKING:
     import random
@@ -82,7 +82,7 @@ def made(folder: Path, old: str, way: str) -> Place:
     out.mkdir()
     for name, content in {**whole_sets()[old], **MINE}.items():
         (out / name).write_bytes(content)
-    add_files(out, {FIGURE: b"figure"})
+    Results(out).write({FIGURE: b"figure"})
     if way == "exchanged":
         return Place(out, folder, ["-q", "-o", "o"])
     return Place(out, out, ["-q", "-o", "."])

@@ -21,6 +21,7 @@ from crowds import check_crowds, check_starts, check_threads
 from directories import check_calls, check_damage, check_races
 from directories import plan as plan_calls
 from edges import check_elements, check_lumped, check_many, check_modal
+from foreign_files import check_foreign
 from kills import check_kills, check_slow_kills
 from memory import check_memory
 from places import check_places
@@ -40,6 +41,7 @@ def parts() -> dict[str, Part]:
         "slow kills": Part(500, 1, check_slow_kills),
         "steps": Part(lambda: len(plan_steps()), 4, check_steps),
         "places": Part(3000, 12, check_places),
+        "foreign": Part(3000, 16, check_foreign),
         "crowds": Part(1000, 4, check_crowds),
         "threads": Part(3000, 100, check_threads, share=100),
         "aliasing": Part(2000, 40, check_aliasing, share=100),

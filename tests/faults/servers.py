@@ -5,7 +5,7 @@ from __future__ import annotations
 import atexit
 import http.client
 import json
-import os
+import resource
 import signal
 import socket
 import subprocess
@@ -13,6 +13,7 @@ import sys
 import tempfile
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -34,10 +35,9 @@ HOST = "127.0.0.1"
 WELL = (200, 400, 403, 404, 405, 411, 413, 422, 431)
 VALUES: list[Any] = [0, -1, 1e300, 1e-300, "NaN", "1", None, True, [], [1, [2]], {}, "x" * 2000,
                      2**70, 10**400, "é\0", -0.0, 1.5, [1e9] * 500]  # fmt: skip
-LONG = {
-    "model": {"name": "finite_element"},
-    "mesh": {"radial_elements": 16, "polar_elements": 512},
-}
+LONG = {"model": {"name": "finite_element"}, "mesh": {"radial_elements": 16, "polar_elements": 512}}
+# Bytes that a server may keep of users that have left, and lines that it may log of them.
+GROWTH, LINES = 50e6, 10
 
 
 class Explorer(NamedTuple):
@@ -50,21 +50,26 @@ class Explorer(NamedTuple):
 
     def ask(self, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
         """Return status and content of an answer."""
-        connection = http.client.HTTPConnection(HOST, self.port, timeout=PATIENCE)
-        try:
+        with closing(http.client.HTTPConnection(HOST, self.port, timeout=PATIENCE)) as connection:
             method = "GET" if body is None else "POST"
             connection.request(method, path, body, {TOKEN: self.token, **headers})
             answer = connection.getresponse()
             return answer.status, answer.read()
-        finally:
-            connection.close()
 
     def workers(self) -> list[psutil.Process]:
-        """Return the processes that do slow work: those that the server of forks has started."""
-        found = []
-        for child in psutil.Process(self.process.pid).children():
-            found += child.children()
-        return found
+        """Return the processes that are at work, or stopped; others wait for quick works."""
+        forks = [child.children() for child in psutil.Process(self.process.pid).children()]
+        idle = (psutil.STATUS_SLEEPING, psutil.STATUS_ZOMBIE)
+        return [
+            one for some in forks for one in some if one.is_running() and one.status() not in idle
+        ]
+
+    def begin(self, path: str, body: bytes, *, sent: int | None = None) -> socket.socket:
+        """Return the connection of a request of which no more than so many bytes are sent."""
+        head = f"POST {path} HTTP/1.1\r\nHost: {HOST}\r\nContent-Length: {len(body)}\r\n"
+        connection = socket.create_connection((HOST, self.port), PATIENCE)
+        connection.sendall((f"{head}{TOKEN}: {self.token}\r\n\r\n".encode() + body)[:sent])
+        return connection
 
 
 @cache
@@ -93,10 +98,9 @@ def check_explorer(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[
         kind = list(KINDS)[number % len(KINDS)]
         try:
             found = KINDS[kind](explorer(), chance)
-        except TimeoutError as error:
-            found = f"hung: {error!r}"
-        except OSError as error:
-            found = f"crashed: {error!r}"
+        except (OSError, subprocess.TimeoutExpired) as error:
+            late = isinstance(error, (TimeoutError, subprocess.TimeoutExpired))
+            found = f"{'hung' if late else 'crashed'}: {error!r}"
         except (http.client.HTTPException, ValueError, LookupError) as error:
             found = f"lost: {error!r}"
         word, _, what = (found or _well(explorer())).partition(": ")
@@ -115,10 +119,10 @@ def _well(server: Explorer) -> str:
     if status != 200 or not _same(content, 1.0, "hollow_sphere"):
         return f"mixed: {status}, {content[:300]!r}"
     until = time.monotonic() + PATIENCE
-    while server.workers():
+    while left := server.workers():
         if time.monotonic() > until:
-            return f"hung: {server.workers()} are left"
-        time.sleep(0.02)
+            return f"hung: {left} are left"
+        time.sleep(0.05)
     return ""
 
 
@@ -173,12 +177,10 @@ def _hostile_record(server: Explorer, chance: random.Random) -> str:
 
 def _hostile_request(server: Explorer, chance: random.Random) -> str:
     """Send what is no request, or half of one, and leave."""
-    half = b"POST /measure HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 100000\r\n"
-    head = f"{TOKEN}: {server.token}\r\n\r\n".encode()
     long = b"GET " + b"/x" * 40_000 + b" HTTP/1.1\r\n\r\n"
-    texts = (chance.randbytes(300), half, half + head + b"RIFF", b"GET / HTTP/9\r\n\r\n", long)
-    text = chance.choice(texts)
-    with socket.create_connection((HOST, server.port), PATIENCE) as connection:
+    text = chance.choice((chance.randbytes(300), b"GET / HTTP/9\r\n\r\n", long))
+    half = server.begin("/measure", b"RIFF" * 20_000, sent=chance.randint(0, 300))
+    with half, socket.create_connection((HOST, server.port), PATIENCE) as connection:
         connection.sendall(text)
         time.sleep(chance.uniform(0, 0.05))
     return ""
@@ -201,45 +203,67 @@ def _two_users(server: Explorer, chance: random.Random) -> str:
     return "" if well else "mixed: the answer of another user"
 
 
-def _work(server: Explorer) -> http.client.HTTPConnection:
-    """Begin work that takes minutes; return its connection once it is under way."""
-    connection = http.client.HTTPConnection(HOST, server.port, timeout=PATIENCE)
-    connection.request("POST", "/solve", json.dumps(LONG), {TOKEN: server.token})
-    until = time.monotonic() + PATIENCE
-    while not server.workers() and time.monotonic() < until:
-        time.sleep(0.01)
-    return connection
+def _work(server: Explorer) -> http.client.HTTPResponse:
+    """Begin work that takes minutes; return its answer, whose end ends the connection."""
+    with server.begin("/solve", json.dumps(LONG).encode()) as connection:
+        answer = http.client.HTTPResponse(connection)
+    answer.begin()
+    return answer
 
 
 def _leave(server: Explorer, chance: random.Random) -> str:
-    """Close the page while it waits; its process has to end, see `_well`."""
-    connection = _work(server)
-    time.sleep(chance.uniform(0, 0.2))
-    connection.close()
-    return ""
+    """Close pages in the middle of slow and of quick works, which have to end; end some servers."""
+    process = psutil.Process(server.process.pid)
+    before = process.memory_info().rss
+    bodies = [json.dumps(LONG).encode(), _case(1.0, "hollow_sphere"), _case(1.0, "modal_ball")]
+    for _ in range(chance.choice([1, 10, 60])):
+        path = chance.choice(["/solve", "/solve", "/download/report.html"])
+        with server.begin(path, chance.choice(bodies)):
+            time.sleep(chance.choice([0, chance.uniform(0, 0.1)]))
+    if chance.random() < 0.3:
+        server.process.send_signal(chance.choice([signal.SIGTERM, signal.SIGINT]))
+        explorer.cache_clear()
+        server.process.wait(PATIENCE)
+        return ""
+    grown = process.memory_info().rss - before
+    return _well(server) or (f"grown: {grown} bytes" if grown > GROWTH else "")
+
+
+def _unfinished(server: Explorer, chance: random.Random) -> str:
+    """Begin more heads than the server has files, while a page is answered."""
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (limits[1], limits[1]))
+    lines = len(server.screen.read_text().splitlines())
+    heads = [server.begin("/solve", b"{}", sent=chance.randint(0, 60)) for _ in range(1100)]
+    fault = _well(server)
+    for head in heads:
+        head.close()
+    resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+    lines = len(server.screen.read_text().splitlines()) - lines
+    return fault or (f"grown: {lines} lines are logged" if lines > LINES else "")
 
 
 def _kill_work(server: Explorer, chance: random.Random) -> str:
-    connection = _work(server)
-    time.sleep(chance.uniform(0, 0.2))
-    for worker in server.workers():
-        os.kill(worker.pid, signal.SIGKILL)
-    content = connection.getresponse().read()
-    connection.close()
-    word = b"ended without an answer"
-    return "" if word in content else f"lost: {content[-300:]!r}"
+    with _work(server) as answer:
+        _signal(server, signal.SIGKILL, chance)
+        content = answer.read()
+    return "" if b"ended without an answer" in content else f"lost: {content[-300:]!r}"
 
 
 def _stop_work(server: Explorer, chance: random.Random) -> str:
     """Stop a process: others are served, and it ends when its page leaves."""
-    connection = _work(server)
-    time.sleep(chance.uniform(0, 0.1))
-    for worker in server.workers():
-        os.kill(worker.pid, signal.SIGSTOP)
-    asked = _case(0.7, "finite_element")
-    well = _same(server.ask("/solve", asked)[1], 0.7, "finite_element")
-    connection.close()
-    return "" if well else "mixed: the answer beside a stopped one"
+    with _work(server):
+        _signal(server, signal.SIGSTOP, chance)
+        content = server.ask("/solve", _case(0.7, "finite_element"))[1]
+    return "" if _same(content, 0.7, "finite_element") else "mixed: the answer beside a stopped one"
+
+
+def _signal(server: Explorer, number: signal.Signals, chance: random.Random) -> None:
+    time.sleep(chance.uniform(0, 0.2))
+    while not (workers := server.workers()):
+        time.sleep(0.01)
+    for worker in workers:
+        worker.send_signal(number)
 
 
 KINDS: dict[str, Callable[[Explorer, Any], str]] = {
@@ -251,4 +275,5 @@ KINDS: dict[str, Callable[[Explorer, Any], str]] = {
     "page left": _leave,
     "work killed": _kill_work,
     "work stopped": _stop_work,
+    "heads": _unfinished,
 }

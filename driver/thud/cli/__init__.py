@@ -33,7 +33,7 @@ from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
-from thud.errors import InputError, ThudError
+from thud.errors import InputError, NumericalError, ThudError
 from thud.impact import FORCES
 from thud.levels import SOURCES
 
@@ -50,7 +50,7 @@ COMMANDS = {
         "run cases, write their results and figures",
         (
             argument("cases", nargs="+", metavar="CASE.nml", help="namelist files"),
-            output(
+            *output(
                 "the results; one below it for each of several cases (default: outputs/<case name>)"
             ),
             argument("--check", action="store_true", help="exit with 3 unless all sources conform"),
@@ -71,7 +71,7 @@ COMMANDS = {
                 metavar="CASE.nml|RECORD.csv",
                 help="namelist files, and recordings with columns of time, s, and force, N",
             ),
-            output("the page (default: outputs/comparison)", default="outputs/comparison"),
+            *output("the page (default: outputs/comparison)"),
             argument(
                 "--force",
                 choices=FORCES,
@@ -100,7 +100,7 @@ COMMANDS = {
                 metavar="REPORT",
                 help="report.json files, or directories that hold them",
             ),
-            output("the chart (default: outputs/history)", default="outputs/history"),
+            *output("the chart (default: outputs/history)"),
             argument(
                 "--different-balls", action="store_true", help="allow reports of different balls"
             ),
@@ -115,7 +115,7 @@ COMMANDS = {
     "examples": EXAMPLES,
     "figures": Command(
         "draw the figures of the paper and of the documentation",
-        (output("the figures (default: outputs/figures)", default="outputs/figures"), QUIET),
+        (*output("the figures (default: outputs/figures)"), QUIET),
         draw_figures,
     ),
 }
@@ -143,10 +143,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:
-            # Standard output is full or closed: discard what is still buffered.
+            # Standard output is full: discard what is still buffered.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         print(f"thud-driver: {sentence(error)}", file=sys.stderr)
         return exit_code(error)
+    except MemoryError as error:
+        cause = f" ({error})" if str(error) else ""
+        message = f"the memory does not suffice{cause}; allowed: a smaller task, or more memory"
+        print(f"thud-driver: {message}", file=sys.stderr)
+        return NumericalError.exit_code
     return code
 
 

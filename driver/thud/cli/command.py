@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from thud.display import draw_all
 from thud.errors import InputError, LockWarning, ReportWarning, ThudError, WorkerWarning
-from thud.files import replace_file
+from thud.files import Results
 
 if TYPE_CHECKING:
     import argparse
@@ -51,11 +51,40 @@ def argument(*names: str, **settings: object) -> Argument:
     return names, settings
 
 
-def output(meaning: str, **settings: object) -> Argument:
-    """Return the argument of the output directory."""
-    return argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}", **settings)
+def output(meaning: str) -> tuple[Argument, Argument]:
+    """Return the arguments of a command that writes results."""
+    return (
+        argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}"),
+        argument(
+            "--replace", action="store_true", help="replace also files that thud has not written"
+        ),
+    )
 
 
+def results_of(
+    options: argparse.Namespace, default: str, inputs: Iterable[str | None] = ()
+) -> Results:
+    """Return the directory for the results of a command.
+
+    Parameters
+    ----------
+    options
+        The options of the command.
+    default
+        Name of the directory below ``outputs`` where there is no option.
+    inputs
+        Files that the command reads.
+    """
+    return Results(
+        Path(options.output or Path("outputs", default)),
+        options.name,
+        tuple(path for path in inputs if path is not None),
+        replace=options.replace,
+    )
+
+
+# Endings of the files of a page.
+PAGE = (".png", ".svg", ".html")
 QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and remarks")
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 
@@ -91,28 +120,30 @@ def shown_at_once() -> Iterator[None]:
         yield
 
 
-def conclude(
+def conclude(  # noqa: PLR0913, PLR0917 - each of them differs
     options: argparse.Namespace,
+    source: str,
     found: MobilityFit | RoomLevels,
     shown: str,
     file: tuple[str, bytes],
     figure: str,
 ) -> int:
-    """Save a file and the figure of a result, print its text and remarks; return the exit code."""
-    folder = Path(options.output or Path("outputs", found.name))
-    figures = {} if options.no_figures else draw_all({figure: found.plot})
-    folder.mkdir(parents=True, exist_ok=True)
-    name, content = file
-    replace_file(folder / name, content)
-    if figures:
-        from thud.plot.look import save_all  # noqa: PLC0415 - Matplotlib takes its time
+    """Save a file and the figure of a result, print its text and remarks; return the exit code.
 
-        save_all(figures, folder)
+    The source is the file that the result is from.
+    """
+    results = results_of(options, found.name, [source])
+    contents = dict([file])
+    if not options.no_figures:
+        from thud.plot.look import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+
+        contents |= picture_files(draw_all({figure: found.plot}))
+    results.write(contents)
     if not options.quiet:
         print(shown)
     tell(found.remarks)
     if not options.quiet:
-        print(f"Results: {folder}")
+        print(f"Results: {results.folder}")
     return 0
 
 

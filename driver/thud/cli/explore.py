@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import secrets
-import signal
 import socket
 import sys
+import tempfile
 import webbrowser
+from contextlib import contextmanager
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from thud.checks import refuse
@@ -17,6 +17,7 @@ from thud.extras import require_extra
 
 if TYPE_CHECKING:
     import argparse
+    from collections.abc import Iterator
 
 # Names of this machine for itself, as addresses of pages hold them.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
@@ -25,15 +26,13 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until an interrupt; return the exit code."""
     with require_extra("explorer"):
-        import uvicorn  # noqa: PLC0415 - an extra
-
+        from thud.explorer.connections import run_server  # noqa: PLC0415 - an extra
         from thud.explorer.server import new_application, start_with  # noqa: PLC0415 - likewise
     start = start_with(options.case)
     token = secrets.token_urlsafe(16)
     version_6 = ":" in options.host
     host = f"[{options.host}]" if version_6 else options.host
     hosts = LOOPBACK if host in LOOPBACK else ("*",)
-    application = new_application(start, token=token, hosts=hosts)
     if not 0 <= options.port < 2**16:
         refuse(f"--port = {options.port} is no port", f"0 (any that is free) to {2**16 - 1}")
     try:
@@ -53,14 +52,25 @@ def explore(options: argparse.Namespace) -> int:
             "who has the address can compute here",
             file=sys.stderr,
         )
-    config = uvicorn.Config(application, log_level="warning", timeout_graceful_shutdown=1)
-    # The server raises again, when it has ended, the signal that ended it.
-    signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    with listener, TemporaryDirectory() as folder:
-        if not options.no_browser:
-            webbrowser.open(_redirect(Path(folder), address))
-        uvicorn.Server(config).run(sockets=[listener])
+    application = new_application(start, token=token, hosts=hosts)
+    with listener, tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        with _temporary_files_in(folder):
+            if not options.no_browser:
+                webbrowser.open(_redirect(folder, address))
+            run_server(application, listener, folder)
     return 0
+
+
+@contextmanager
+def _temporary_files_in(folder: Path) -> Iterator[None]:
+    """Keep temporary files in a directory."""
+    before = tempfile.tempdir
+    tempfile.tempdir = str(folder)
+    try:
+        yield
+    finally:
+        tempfile.tempdir = before
 
 
 def _redirect(folder: Path, address: str) -> str:

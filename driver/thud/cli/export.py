@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.case import read_case
 from thud.checks import refuse
-from thud.cli.command import QUIET, Command, argument, output, tell
+from thud.cli.command import QUIET, Command, argument, output, results_of, tell
 from thud.impact import compute
 
 if TYPE_CHECKING:
@@ -37,13 +36,13 @@ def run_export(options: argparse.Namespace) -> int:
     source = _read(options.source, options.config)
     tell(source.remarks)
     force = export_force.blocked_force(source, drop=options.drop, rate=options.rate)
-    folder = Path(options.output)
-    folder.mkdir(parents=True, exist_ok=True)
+    contents: dict[str, bytes] = {}
     for kind in chosen:
-        ending, export = export_force.EXPORTS[kind]
-        paths = export(force, folder / f"{force.name}{ending}")
-        if not options.quiet:
-            print(*paths, sep="\n")
+        ending, make = export_force.EXPORTS[kind]
+        contents |= make(force, f"{force.name}{ending}")
+    paths = results_of(options, "export", [options.source, options.config]).write(contents)
+    if not options.quiet:
+        print(*paths, sep="\n")
     return 0
 
 
@@ -65,7 +64,7 @@ EXPORT = Command(
     (
         argument("source", metavar="CASE.nml|RECORDING", help="namelist file, or recording"),
         *(argument(f"--{kind}", action="store_true", help=what) for kind, what in KINDS.items()),
-        output("the files (default: outputs/export)", default="outputs/export"),
+        *output("the files (default: outputs/export)"),
         argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
         argument("--drop", type=int, default=1, help="drop of a recording (default: 1)"),
         argument("--config", metavar="LAB.toml", help="configuration of a recording"),

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import sys
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.cli.command import tell
+from thud.cli.command import PAGE, results_of, tell
 from thud.display import draw_all
 from thud.errors import PlausibilityWarning
 from thud.tables import format_rows
@@ -22,6 +21,8 @@ def compare_cases(options: argparse.Namespace) -> int:
     """Compare cases and recordings; return the exit code."""
     from thud import comparison  # noqa: PLC0415 - matplotlib takes its time
 
+    results = results_of(options, "comparison", options.cases)
+    results.require(f"comparison{ending}" for ending in PAGE)
     found = comparison.read_all(options.cases)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
@@ -32,7 +33,7 @@ def compare_cases(options: argparse.Namespace) -> int:
             progress=not options.quiet and sys.stderr.isatty(),
         )
     tell(page.remarks)
-    paths = page.save(options.output)
+    paths = results.write(page.files())
     if not options.quiet:
         print(format_rows(page.table()))
         print(f"Page: {paths[-1]}")
@@ -43,13 +44,12 @@ def draw_figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper and of the documentation; return the exit code."""
     from thud import plot  # noqa: PLC0415 - matplotlib takes its time
 
-    folder = Path(options.output)
-    folder.mkdir(parents=True, exist_ok=True)
+    results = results_of(options, "figures")
     figures = plot.documentation_figures()
     for name, draw in tqdm(
         figures.items(), unit="figure", disable=options.quiet or None, leave=False
     ):
-        plot.save_all(draw_all({name: draw}), folder)
+        results.write(plot.picture_files(draw_all({name: draw})))
     if not options.quiet:
-        print(f"Figures: {folder}")
+        print(f"Figures: {results.folder}")
     return 0

@@ -7,7 +7,7 @@ import warnings
 from typing import TYPE_CHECKING
 
 from thud.case import read_case
-from thud.cli.command import QUIET, Command, argument, output, tell
+from thud.cli.command import PAGE, QUIET, Command, argument, output, results_of, tell
 from thud.errors import InputError, PlausibilityWarning
 from thud.tables import format_rows
 
@@ -21,6 +21,8 @@ def compare(options: argparse.Namespace) -> int:
     """Compare the floors of cases, print the table and save the page; return the exit code."""
     from thud.floors.floor_comparison import compare_floors  # noqa: PLC0415 - SciPy takes its time
 
+    results = results_of(options, "floors", options.cases)
+    results.require(f"floors{ending}" for ending in PAGE)
     cases: dict[str, Case] = {}
     for path in options.cases:
         case = read_case(path)
@@ -32,7 +34,7 @@ def compare(options: argparse.Namespace) -> int:
         warnings.simplefilter("ignore", PlausibilityWarning)
         found = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
     tell(found.remarks)
-    paths = found.save(options.output)
+    paths = results.write(found.files())
     if not options.quiet:
         print(format_rows(found.rows()))
         print(f"Page: {paths[-1]}")
@@ -43,7 +45,7 @@ FLOOR = Command(
     "floors and rooms of several cases on one page",
     (
         argument("cases", nargs="+", metavar="CASE.nml", help="namelist files with floor and room"),
-        output("the page (default: outputs/floors)", default="outputs/floors"),
+        *output("the page (default: outputs/floors)"),
         QUIET,
     ),
     compare,

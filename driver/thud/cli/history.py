@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.cli.command import results_of
 from thud.display import draw_all
 from thud.tables import format_rows
 
@@ -17,13 +17,13 @@ def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy take their time.
     from thud.plot.history import draw_history  # noqa: PLC0415
-    from thud.plot.look import save_all  # noqa: PLC0415
+    from thud.plot.look import picture_files  # noqa: PLC0415
     from thud.report.history import read_history  # noqa: PLC0415
 
     history = read_history(options.reports, different_balls=options.different_balls)
-    folder = Path(options.output)
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = save_all(draw_all({"history": partial(draw_history, history)}), folder)
+    results = results_of(options, "history", options.reports)
+    drawn = draw_all({"history": partial(draw_history, history)})
+    paths = results.write(picture_files(drawn))
     if not options.quiet:
         print(history.title)
         print(format_rows(history.table()))

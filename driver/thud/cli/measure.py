@@ -8,7 +8,16 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, channel_of, output, tell
+from thud.cli.command import (
+    NO_FIGURES,
+    QUIET,
+    Command,
+    argument,
+    channel_of,
+    output,
+    results_of,
+    tell,
+)
 from thud.errors import ReportWarning
 from thud.levels import SOURCES
 from thud.tables import format_rows
@@ -27,7 +36,10 @@ def measure(options: argparse.Namespace) -> int:
     from thud.recordings.kept import KeptDrops  # noqa: PLC0415
     from thud.recordings.read_recording import read_recording  # noqa: PLC0415
 
-    folder = Path(options.output or Path("outputs", Path(options.drops[0]).stem))
+    figures = not options.no_figures
+    files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])
+    files.require(results.file_names(figures=figures))
+    folder = files.folder
     # Drops stay until the results are written.
     with KeptDrops(folder) as kept:
         recording = read_recording(
@@ -52,7 +64,7 @@ def measure(options: argparse.Namespace) -> int:
         verdict = recording.conformity()
         with warnings.catch_warnings(record=True) as found:
             warnings.simplefilter("always", ReportWarning)
-            results.save(recording, folder, figures=not options.no_figures)
+            results.save(recording, files, figures=figures)
     if not options.quiet:
         rows = results.drop_table(recording)
         print(format_rows(rows[: SHOWN + 1]))
@@ -102,7 +114,7 @@ MEASURE = Command(
         argument(
             "--workers", type=int, metavar="N", help="processes (default: one for each processor)"
         ),
-        output("the results (default: outputs/<name of the first file>)"),
+        *output("the results (default: outputs/<name of the first file>)"),
         argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
         NO_FIGURES,
         QUIET,

@@ -18,7 +18,7 @@ def fit(options: argparse.Namespace) -> int:
     found = fit_mobility(options.table, quantity=options.quantity, order=options.order)
     shown = f"{repr(found)[1:-1]}\n{format_rows(found.rows())}"
     file = "measured_mobility.nml", found.namelist().encode()
-    return conclude(options, found, shown, file, "mobility_fit")
+    return conclude(options, options.table, found, shown, file, "mobility_fit")
 
 
 MOBILITY = Command(
@@ -35,7 +35,7 @@ MOBILITY = Command(
             help="what a table holds (default: mobility)",
         ),
         argument("--order", type=int, metavar="N", help="number of poles (default: chosen)"),
-        output("the results (default: outputs/<name of the file>)"),
+        *output("the results (default: outputs/<name of the file>)"),
         NO_FIGURES,
         QUIET,
     ),

@@ -19,7 +19,8 @@ def rate(options: argparse.Namespace) -> int:
     shown = f"{format_rows(found.rows())}\n\n{format_rows(rating_table(found))}"
     if (scatter := found.position_uncertainty) is not None:
         shown += f"\n\n  Standard uncertainty by the scatter of positions: {scatter:.1f} dB"
-    return conclude(options, found, shown, ("room_levels.csv", levels_csv(found)), "room_levels")
+    file = "room_levels.csv", levels_csv(found)
+    return conclude(options, options.levels, found, shown, file, "room_levels")
 
 
 RATE = Command(
@@ -31,7 +32,7 @@ RATE = Command(
             help="frequency, levels of positions, and where known background, reverberation_time",
         ),
         argument("--volume", type=float, metavar="M3", help="volume of the room"),
-        output("the results (default: outputs/<name of the file>)"),
+        *output("the results (default: outputs/<name of the file>)"),
         NO_FIGURES,
         QUIET,
     ),

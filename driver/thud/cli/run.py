@@ -16,7 +16,7 @@ from thud.cli.command import exit_code, sentence
 from thud.compression import new_curve
 from thud.display import left_out
 from thud.errors import InputError, ThudError
-from thud.files import add_files
+from thud.files import Results
 from thud.free_modes import new_modes
 from thud.impact import new_impact
 
@@ -62,13 +62,16 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
         )
         raise InputError(message)
     options.done[case.name] = path
-    found = call(api.run, os.fsencode(path), os.fsencode(output), not options.quiet)
+    found = call(
+        api.run, os.fsencode(path), os.fsencode(output), options.replace, not options.quiet
+    )
     for remark in found.get("run_remarks", {}).values():
         tqdm.write(f"thud-driver: {text(remark)}", file=sys.stderr)
     folder = Path(output or os.fsdecode(found["directory"]))
     pictures = _pictures(found, figures=not options.no_figures, animation=options.animation)
     if pictures:
-        add_files(folder, pictures, found["case"])
+        results = Results(folder, inputs=(path,), replace=options.replace)
+        results.write(pictures, marker=found["case"])
     if not options.quiet:
         tqdm.write(f"{text(found['table'])}\n  Results: {folder}\n")
     return bool(found["conforms"])
@@ -83,15 +86,16 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
     modes = new_modes(case.ball, found) if "modes" in found else None
     curve = new_curve(case, found) if "compression" in found else None
     shown = {} if impact is None else {"motion": impact, "floor_motion": impact.on_floor}
-    with TemporaryDirectory() as name, left_out("a figure"):
+    files: dict[str, bytes] = {}
+    with TemporaryDirectory() as folder, left_out("a figure"):
         from thud import plot  # noqa: PLC0415 - matplotlib takes its time
 
-        folder = Path(name)
         if figures:
-            plot.save_all(plot.case_figures(impact, modes, curve), folder)
-        for file, moving in shown.items():
+            files = plot.picture_files(plot.case_figures(impact, modes, curve))
+        for name, moving in shown.items():
             if animation and moving is not None and moving.motion:
-                with left_out(f"{file}.gif"):
-                    plot.animate(moving, folder / f"{file}.gif")
-        return {path.name: path.read_bytes() for path in folder.iterdir()}
-    return {}
+                path = Path(folder, f"{name}.gif")
+                with left_out(path.name):
+                    plot.animate(moving, path)
+                    files[path.name] = path.read_bytes()
+    return files

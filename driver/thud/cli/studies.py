@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import sys
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.display import left_out
 from thud.errors import NumericalError, ThudError
-from thud.studies.directory import save
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -30,9 +29,6 @@ _SETS = (
     argument("--workers", type=int, metavar="N", help="threads or processes"),
     argument("--scheduler", metavar="ADDRESS", help="of Dask, tcp://host:8786"),
 )
-_REPLACE = argument(
-    "--replace", action="store_true", help="remove results of another version of the study"
-)
 
 
 def study_commands() -> dict[str, Command]:
@@ -42,13 +38,12 @@ def study_commands() -> dict[str, Command]:
             entry.help,
             (
                 _STUDY,
-                output(
+                *output(
                     "the results"
                     + ("; an interrupted study resumes there" if entry.has_sets else "")
                     + " (default: outputs/<study name>)"
                 ),
                 *(_SETS if entry.has_sets else ()),
-                _REPLACE,
                 NO_FIGURES,
                 QUIET,
             ),
@@ -75,9 +70,10 @@ def run_study(options: argparse.Namespace) -> int:
     folder = Path(options.output or Path("outputs", study.name))
     if not options.quiet:
         print(kind.describe(study), file=sys.stderr)
-    with kind.take(study, folder, replace=options.replace) as directory:
+    drawn = not options.no_figures
+    with kind.take(study, folder, replace=options.replace, figures=drawn) as results:
         try:
-            result = kind.compute(study, directory, **how)
+            result = kind.compute(study, results, **how)
         except ThudError as error:
             message = f"{options.study}: {error}"
             raise type(error)(message) from error
@@ -85,8 +81,13 @@ def run_study(options: argparse.Namespace) -> int:
             tqdm.write(kind.table(result, study))
         for remark in kind.remarks(result):
             _tell(options.study, remark)
-        draw = None if options.no_figures else partial(kind.figures, result, study)
-        save(directory, kind.files(result, study), draw)
+        contents = kind.files(result, study)
+        if drawn:
+            with left_out("the figure of the study"):
+                from thud.plot import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+
+                contents |= picture_files(kind.figures(result, study))
+        results.write(contents)
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if kind.succeeded(result) else NumericalError.exit_code

@@ -1,11 +1,13 @@
-"""Slow work in processes of its own, which end when nobody waits for them."""
+"""Works in processes of their own, which end when nobody waits for them."""
 
 from __future__ import annotations
 
 import os
 import resource
+import signal
 import tempfile
 import threading
+from contextlib import suppress
 from multiprocessing import forkserver, get_context
 from typing import TYPE_CHECKING, Any
 
@@ -14,82 +16,151 @@ from tqdm import tqdm
 
 from thud._api import progress
 from thud.errors import InputError, ThudError
-from thud.explorer.answer import answer_case, answer_recording, new_case
+from thud.explorer.answer import answer_case, answer_quickly, answer_recording, new_case
 from thud.explorer.downloads import DOWNLOADS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable
     from multiprocessing.connection import Connection
+    from multiprocessing.context import ForkServerProcess
+
+    Report = dict[str, Any]
 
 # Works by name; each takes plain data.
 WORKS: dict[str, Callable[..., Any]] = {
+    "quick case": lambda values: answer_quickly(new_case(values)),
     "case": lambda values: answer_case(new_case(values)),
     "recording": answer_recording,
     "download": lambda what, values: DOWNLOADS[what][0](values),
 }
 # What bad values raise: those of wrong types stop where they are first used.
 REFUSALS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
-# Time between two reports, s, and the longest that a work may take.
+# Time between two reports, s.
 INTERVAL = 0.05
-LONGEST = 300.0
 # Largest memory of a work, bytes: small files can hold long recordings.
 MEMORY = 4_000_000_000
 
 
 class Jobs:
-    """Place of a few works at a time; others wait."""
+    """Processes that do a few works at a time; others wait."""
 
-    def __init__(self, width: int) -> None:
-        """Take the number of processes."""
+    def __init__(
+        self, width: int, longest: float, *, late: Report | None = None, kept: bool = False
+    ) -> None:
+        """Take the number of processes and what they may do.
+
+        Parameters
+        ----------
+        width
+            Works at a time.
+        longest
+            Time that a work may take, s.
+        late
+            The last report of a work that takes longer; by default an error.
+        kept
+            Processes do one work after the other: for works that leave nothing behind.
+        """
         # A server that has modules loaded forks each process at once.
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([__name__])
         forkserver.ensure_running()
         # What ends the reports need not be the task that asked for them.
         self._places = anyio.Semaphore(width)
+        self._longest = longest
+        message = f"the work takes longer than {longest:g} s; allowed: less"
+        self._late = late or {"error": message}
+        self._kept = kept
+        self._idle: list[tuple[ForkServerProcess, Connection]] = []
 
-    async def run(self, work: str, *arguments: object) -> AsyncGenerator[dict[str, Any], None]:
+    async def run(self, work: str, *arguments: object) -> AsyncGenerator[Report, None]:
         """Yield reports ``{"done": part}``, at last ``{"answer": …}`` or ``{"error": sentence}``.
 
         The first report comes before the work begins. The process is ended, and its temporary files
         are removed, where the caller stops to ask.
         """
-        yield {"done": 0.0}
+        report: Report = {"done": 0.0}
+        yield report
         async with self._places:
             with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-                near, far = self._context.Pipe()
-                process = self._context.Process(
-                    target=_work, args=(far, folder, work, arguments), daemon=True
-                )
+                process, near, far = self._take()
+                kept = False
                 try:
-                    with far:
-                        process.start()
-                    end = anyio.current_time() + LONGEST
-                    report: dict[str, Any] = {"done": 0.0}
+                    if far:
+                        with far:
+                            await anyio.to_thread.run_sync(process.start)
+                    end = anyio.current_time() + self._longest
+                    report = await self._call(end, _exchange, near, (folder, work, arguments))
                     while "done" in report:
-                        report = {
-                            "error": f"the work takes longer than {LONGEST:g} s; allowed: less"
-                        }
-                        # A thread that is left still waiting ends with the process.
-                        with anyio.CancelScope(deadline=end):
-                            report = await anyio.to_thread.run_sync(
-                                near.recv, abandon_on_cancel=True
-                            )
                         yield report
+                        report = await self._call(end, near.recv)
+                    kept = self._kept and report is not self._late
                 except (EOFError, OSError):
-                    yield {"error": "the work ended without an answer, perhaps for want of memory"}
+                    message = "the work ended without an answer, perhaps for want of memory"
+                    report = {"error": message}
                 finally:
-                    if process.pid is not None:
-                        process.kill()
-                        process.join()
+                    if kept:
+                        self._idle.append((process, near))
+                    else:
+                        _kill(process)
+        # The place is free by now: whoever asked may be slow to read.
+        yield report
+
+    def close(self) -> None:
+        """End the processes that wait for works."""
+        while self._idle:
+            _kill(self._idle.pop()[0])
+
+    def _take(self) -> tuple[ForkServerProcess, Connection, Connection | None]:
+        """Return a process and its connection; of one still to be started also its own end."""
+        while self._idle:
+            process, near = self._idle.pop()
+            # Of one that has ended the end of its words can be read.
+            if not near.poll():
+                return process, near, None
+            _kill(process)
+        near, far = self._context.Pipe()
+        return self._context.Process(target=_work, args=(far,), daemon=True), near, far
+
+    async def _call(
+        self, end: float, function: Callable[..., Report], *arguments: object
+    ) -> Report:
+        """Return what a thread reports until a time, or else that it is late.
+
+        A thread that is left still waiting ends with the process.
+        """
+        with anyio.CancelScope(deadline=end):
+            return await anyio.to_thread.run_sync(function, *arguments, abandon_on_cancel=True)
+        return self._late
 
 
-def _work(far: Connection, folder: str, work: str, arguments: tuple[Any, ...]) -> None:
-    """Do a work in this process, and report; end with the server."""
-    tempfile.tempdir = folder
+def _exchange(near: Connection, task: object) -> Report:
+    """Return the first report of a task."""
+    near.send(task)
+    report: Report = near.recv()
+    return report
+
+
+def _kill(process: ForkServerProcess) -> None:
+    if process.pid is not None:
+        process.kill()
+        process.join()
+
+
+def _work(far: Connection) -> None:
+    """Do works in this process, and report; end with the server."""
+    # The server ends it, also where an interrupt goes to the whole group.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The usual lock is a semaphore of the system, which a process that is killed leaves behind.
     tqdm.set_lock(threading.RLock())
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    with suppress(EOFError, OSError):
+        while True:
+            tempfile.tempdir, work, arguments = far.recv()
+            far.send(_last_report(far, work, arguments))
+
+
+def _last_report(far: Connection, work: str, arguments: tuple[Any, ...]) -> Report:
+    """Return the last report of a work; send the others meanwhile."""
     over = threading.Event()
 
     def report() -> None:
@@ -101,13 +172,12 @@ def _work(far: Connection, folder: str, work: str, arguments: tuple[Any, ...]) -
 
     thread = threading.Thread(target=report, daemon=True)
     thread.start()
-    last: dict[str, Any]
     try:
-        last = {"answer": WORKS[work](*arguments)}
+        return {"answer": WORKS[work](*arguments)}
     except MemoryError:
-        last = {"error": f"the work needs more than {MEMORY / 1e9:g} GB of memory; allowed: less"}
+        return {"error": f"the work needs more than {MEMORY / 1e9:g} GB of memory; allowed: less"}
     except (*REFUSALS, OSError) as error:
-        last = {"error": str(error) or InputError.__name__}
-    over.set()
-    thread.join()
-    far.send(last)
+        return {"error": str(error) or InputError.__name__}
+    finally:
+        over.set()
+        thread.join()

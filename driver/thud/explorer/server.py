@@ -1,10 +1,10 @@
-"""The server of the page: plain requests, answered at once or by a stream of reports."""
+"""The server of the page: plain requests, answered by other processes, at once or by reports."""
 
 from __future__ import annotations
 
 import json
 import secrets
-from contextlib import AsyncExitStack, aclosing
+from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from importlib import resources
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import anyio
 from starlette.applications import Starlette
-from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
@@ -24,7 +23,6 @@ from thud._api import version
 from thud.case import read_case
 from thud.checks import refuse, shown
 from thud.cli.command import channel_of
-from thud.explorer.answer import answer_case, is_quick, new_case
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import form
 from thud.explorer.jobs import REFUSALS, Jobs
@@ -44,6 +42,9 @@ MAX_RECORDING = 200_000_000
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Longest silence while a body is sent, s.
 PATIENCE = 20.0
+# Longest time of a work, s, and of one that is expected to be quick, which then begins again.
+LONGEST = 300.0
+LONGEST_QUICK = 1.0
 # Files of the page, by name.
 FILES = {one.name: one for one in (resources.files("thud.explorer") / "page").iterdir()}
 TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css"}
@@ -74,8 +75,23 @@ def new_application(
     hosts
         Names under which the server may be asked.
     width
-        Slow works, and copies of recordings, at a time.
+        Slow works, and copies of recordings, at a time; of quick works twice as many.
+
+    Raises
+    ------
+    InputError
+        Where the token is empty: requests without one would carry it.
     """
+    if not token:
+        refuse("the token is empty", "one that nobody can guess")
+    slow = Jobs(width, LONGEST)
+    quick = Jobs(2 * width, LONGEST_QUICK, late={"answer": None}, kept=True)
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
+        yield
+        quick.close()
+
     application = Starlette(
         routes=[
             Route("/", _page),
@@ -92,6 +108,7 @@ def new_application(
         ],
         middleware=[Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts))],
         exception_handlers=dict.fromkeys(REFUSALS, _refuse) | {ClientDisconnect: _forget},
+        lifespan=lifespan,
     )
     application.state.about = {
         "form": form(),
@@ -100,7 +117,8 @@ def new_application(
         "largest": MAX_RECORDING,
     }
     application.state.token = token
-    application.state.jobs = Jobs(width)
+    application.state.slow = slow
+    application.state.quick = quick
     application.state.copies = anyio.Semaphore(width)
     return application
 
@@ -120,16 +138,10 @@ async def _about(request: Request) -> Response:
 
 async def _solve(request: Request) -> Response:
     values = await _values(request)
-    answer = await run_in_threadpool(_answer_at_once, values)
+    answer = await _answer(request, request.app.state.quick.run("quick case", values))
     if answer is None:
-        return _Reports(request.app.state.jobs.run("case", values), AsyncExitStack())
+        return _Reports(request.app.state.slow.run("case", values), AsyncExitStack())
     return JSONResponse({"answer": answer}, headers=HEADERS)
-
-
-def _answer_at_once(values: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the answer of a case that is computed quickly; None of another."""
-    case = new_case(values)
-    return answer_case(case) if is_quick(case) else None
 
 
 async def _measure(request: Request) -> Response:
@@ -142,27 +154,44 @@ async def _measure(request: Request) -> Response:
         settings["channel"] = channel_of(asked["channel"])
     name = asked.get("name", "recording.wav")
     ending = "".join(c for c in Path(name).suffix if c.isascii() and c.isalnum())[:8]
+    state = request.app.state
     async with AsyncExitStack() as needs:
-        await needs.enter_async_context(request.app.state.copies)
+        await needs.enter_async_context(state.copies)
         path = Path(needs.enter_context(TemporaryDirectory()), f"recording.{ending}")
         async with await anyio.open_file(path, "wb") as copy:
             async for part in _body(request, MAX_RECORDING):
                 await copy.write(part)
-        reports = request.app.state.jobs.run("recording", str(path), name, settings)
+        reports = state.slow.run("recording", str(path), name, settings)
         return _Reports(reports, needs.pop_all())
 
 
 async def _download(request: Request) -> Response:
     if (what := request.path_params["what"]) not in DOWNLOADS:
         raise HTTPException(404, "there is no such file")
-    reports = request.app.state.jobs.run("download", what, await _values(request))
-    async with aclosing(reports):
-        async for report in reports:
-            if await request.is_disconnected():
-                raise ClientDisconnect
-            if "error" in report:
-                raise HTTPException(400, report["error"])
-    return Response(report["answer"], media_type=DOWNLOADS[what][1], headers=HEADERS)
+    reports = request.app.state.slow.run("download", what, await _values(request))
+    content = await _answer(request, reports)
+    return Response(content, media_type=DOWNLOADS[what][1], headers=HEADERS)
+
+
+async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None]) -> Any:  # noqa: ANN401 - as the work has it
+    """Return the answer at the end of reports; they end when the page leaves."""
+    report: dict[str, Any] = {}
+
+    async def await_leave() -> None:
+        while (await request.receive())["type"] != "http.disconnect":
+            pass
+        group.cancel_scope.cancel()
+
+    async with anyio.create_task_group() as group, aclosing(reports):
+        group.start_soon(await_leave)
+        async for report in reports:  # noqa: B007 - the last one
+            pass
+        group.cancel_scope.cancel()
+    if "error" in report:
+        raise HTTPException(400, report["error"])
+    if "answer" not in report:
+        raise ClientDisconnect
+    return report["answer"]
 
 
 def _guarded(endpoint: Endpoint) -> Endpoint:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
@@ -13,6 +14,7 @@ from thud.case import Case
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
 from thud.errors import InputError, ThudError
+from thud.files import Results
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.rating import CLASSES
 from thud.floors.tapping import tapping_level
@@ -21,7 +23,6 @@ from thud.levels import get_bands
 
 if TYPE_CHECKING:
     import os
-    from pathlib import Path
 
     from matplotlib.figure import Figure
 
@@ -76,16 +77,24 @@ class FloorComparison(Displayed):
         page: str = MAKERS["floors_html"](self)
         return page
 
-    def save(self, directory: str | os.PathLike[str]) -> list[Path]:
-        """Write ``floors.png``, ``.svg`` and ``.html`` and return their paths.
+    def files(self) -> dict[str, bytes]:
+        """Return ``floors.png``, ``.svg`` and ``.html`` by name."""
+        found: dict[str, bytes] = MAKERS["page_files"]("floors", self.figure, self.html())
+        return found
+
+    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
+        """Write the files of `files` and return their paths.
+
+        Files that thud has not written are replaced with `replace` only.
 
         Raises
         ------
+        InputError
+            Where a file is in the way.
         OSError
             Where they cannot be written.
         """
-        paths: list[Path] = MAKERS["save_page"]("floors", self.figure, self.html(), directory)
-        return paths
+        return Results(Path(directory), "floor", replace=replace).write(self.files())
 
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""

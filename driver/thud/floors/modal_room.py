@@ -191,7 +191,6 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     heard = _positions("microphones", microphones, size, draw)
     numbers, plate_frequency = _plate_modes(floor)
     orders, room_frequency = _room_modes(size, room.sound_speed)
-    time = float(np.max(prediction.reverberation_time))
     found = call(
         floor_api.get_radiator,
         case_text(Case(floor=floor, room=room)),
@@ -199,7 +198,7 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     )
     losses = 2 * np.pi * plate_frequency * found["loss_factor"]
     decay = 6 * math.log(10) / _times(prediction, room_frequency)
-    duration = 0.5 + max(time, 6 * math.log(10) / losses.min()) * WAITED / 60
+    duration = _duration(min(losses.min(), decay.min()))
     omega, force = _spectrum(prediction.source, duration)
     if len(omega) * len(orders) > MAX_VALUES:
         refuse(
@@ -320,6 +319,15 @@ def _coupling(orders: Array, numbers: Array, sides: tuple[float, ...]) -> Array:
         product = np.where(odd, 2 * side * m / (np.pi * np.where(odd, m**2 - waves**2, 1.0)), 0.0)
         total = total * product
     return total
+
+
+def _duration(slowest: float) -> float:
+    """Return a length of the record, s, after which the slowest mode has decayed.
+
+    It is periodic: what rings on longer would come before the impact. `slowest` is the least rate
+    of decay of an energy, 1/s; half a second is for the impact and the detector.
+    """
+    return 0.5 + WAITED * math.log(10) / (10 * slowest)
 
 
 def _receptance(omega: Array, frequency: Array, decay: Array) -> ComplexArray:

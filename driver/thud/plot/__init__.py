@@ -48,6 +48,7 @@ from thud.plot.look import dress as dress
 from thud.plot.look import empty_axes as empty_axes
 from thud.plot.look import legend_above as legend_above
 from thud.plot.look import octave_axis as octave_axis
+from thud.plot.look import picture_files as picture_files
 from thud.plot.look import save as save
 from thud.plot.look import save_all as save_all
 from thud.plot.loss_factor import loss_factor as loss_factor

@@ -20,7 +20,7 @@ from thud._schema import BandSet, LevelsForce
 from thud.checks import require_kind, shown
 from thud.display import draw_all, left_out
 from thud.errors import InputError
-from thud.files import replace_file
+from thud.files import Results, replace_file
 from thud.impact import Impact
 from thud.levels import get_bands
 from thud.recordings.recording import Recording
@@ -228,26 +228,51 @@ def save(figure: Figure, path: str | os.PathLike[str]) -> None:
     if kind not in FORMATS:
         message = f"{path}: ending {shown(kind)} is not known; allowed: {', '.join(FORMATS)}"
         raise InputError(message)
-    replace_file(path, _content(figure, Path(path)))
+    replace_file(path, _picture(figure, Path(path).stem, kind))
 
 
 @own_style()
-def _content(figure: Figure, path: Path) -> bytes:
+def _picture(figure: Figure, name: str, kind: str) -> bytes:
     """Return the content of the file of a figure."""
     content = io.BytesIO()
-    kind = path.suffix[1:].lower()
     # Without a date, the same figure gives the same bytes.
     date = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind, {})
-    title = path.stem.replace("_", " ").capitalize()
+    title = name.replace("_", " ").capitalize()
     figure.savefig(content, format=kind, metadata={"Title": title, **date})
     return content.getvalue()
 
 
-def save_all(figures: Mapping[str, Figure], directory: str | os.PathLike[str]) -> list[Path]:
+def picture_files(figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Return the contents of figures as PNG and SVG by the names of their files.
+
+    Those that cannot be drawn are left out, with a `ReportWarning`.
+    """
+    contents = {}
+    for name, figure in figures.items():
+        for kind in ("png", "svg"):
+            with left_out(f"{name}.{kind}"):
+                contents[f"{name}.{kind}"] = _picture(figure, name, kind)
+    return contents
+
+
+def save_all(
+    figures: Mapping[str, Figure], directory: str | os.PathLike[str], *, replace: bool = False
+) -> list[Path]:
     """Save figures as PNG and SVG under their names and return the paths of the files.
+
+    Parameters
+    ----------
+    figures
+        Figures by name.
+    directory
+        Directory of the files; it is made where there is none.
+    replace
+        Replace also files that thud has not written.
 
     Raises
     ------
+    InputError
+        Where a file is in the way.
     OSError
         Where a file cannot be written.
 
@@ -256,30 +281,9 @@ def save_all(figures: Mapping[str, Figure], directory: str | os.PathLike[str]) -
     ReportWarning
         Where a figure cannot be drawn.
     """
-    contents = {}
-    for name, figure in figures.items():
-        for path in (Path(directory, f"{name}.{ending}") for ending in ("png", "svg")):
-            with left_out(path.name):
-                contents[path] = _content(figure, path)
-    for path, content in contents.items():
-        replace_file(path, content)
-    return list(contents)
+    return Results(Path(directory), "plot", replace=replace).write(picture_files(figures))
 
 
-def save_page(
-    name: str, draw: Callable[[], Figure], html: str, directory: str | os.PathLike[str]
-) -> list[Path]:
-    """Save a figure as PNG and SVG beside the page of the same name; return the paths.
-
-    The directory is made where there is none.
-
-    Raises
-    ------
-    OSError
-        Where a file cannot be written.
-    """
-    page = Path(directory, f"{name}.html")
-    page.parent.mkdir(parents=True, exist_ok=True)
-    pictures = save_all(draw_all({name: draw}), directory)
-    replace_file(page, html.encode())
-    return [*pictures, page]
+def page_files(name: str, draw: Callable[[], Figure], html: str) -> dict[str, bytes]:
+    """Return the contents of a figure and of the page of the same name by the names of files."""
+    return {**picture_files(draw_all({name: draw})), f"{name}.html": html.encode()}

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from thud._api import version
 from thud.errors import InputError
-from thud.files import replace_file, uninterrupted
+from thud.files import is_regular, replace_file, uninterrupted
 from thud.recordings.estimates import Drop
 
 if TYPE_CHECKING:
@@ -92,7 +92,8 @@ class KeptDrops:
 
     def _files(self, digest: str) -> list[Path]:
         """Return the files of a signal and a configuration."""
-        return sorted(self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}")) if self.folder else []
+        found = self.folder.glob(f"{PREFIX}{digest}-*{SUFFIX}") if self.folder else ()
+        return sorted(filter(is_regular, found))
 
     def add(self, start: int, drop: Drop) -> None:
         """Keep a drop by its first sample; it is on disk after some seconds.

@@ -333,11 +333,15 @@ class Recording(Displayed):
         figure: Figure = MAKERS["recording"](self, what)
         return figure
 
-    def report(self, directory: str | os.PathLike[str]) -> list[Path]:
+    def report(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
         """Write the calibration report to a directory and return the paths of its files.
+
+        Files that thud has not written are replaced with `replace` only.
 
         Raises
         ------
+        InputError
+            Where a file is in the way.
         OSError
             Where they cannot be written.
 
@@ -346,7 +350,7 @@ class Recording(Displayed):
         ReportWarning
             Where there is no PDF, or no font for some letters.
         """
-        paths: list[Path] = MAKERS["report"](self, directory)
+        paths: list[Path] = MAKERS["report"](self, directory, replace=replace)
         return paths
 
     def to_force_history(self, drop: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
 
+    from thud.files import Results
     from thud.recordings.recording import Recording
 
 # Columns of the page that the screen leaves out.
@@ -154,7 +155,12 @@ def _csv(rows: Iterable[Iterable[object]]) -> str:
     return text.getvalue()
 
 
-def save(recording: Recording, folder: Path, *, figures: bool = True) -> None:
+def file_names(*, figures: bool = True) -> list[str]:
+    """Return the names of the files that `save` writes."""
+    return ["levels.csv", "criteria.csv", JSON, DATASET, *(_PAGE if figures else ())]
+
+
+def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
     """Write levels, criteria and data, and, with figures, pictures and the page to a directory.
 
     All contents are there before the first file is written. Files of an earlier recording that
@@ -162,6 +168,8 @@ def save(recording: Recording, folder: Path, *, figures: bool = True) -> None:
 
     Raises
     ------
+    InputError
+        Where a file is in the way.
     OSError
         Where they cannot be written.
 
@@ -175,18 +183,16 @@ def save(recording: Recording, folder: Path, *, figures: bool = True) -> None:
         "levels.csv": levels_csv(data).encode(),
         "criteria.csv": criteria_csv(data).encode(),
         JSON: json_bytes(data),
-        **_dataset(data, folder),
+        **_dataset(data, results.folder),
     }
-    if not figures:
-        write_files(folder, data, contents, (DATASET, *_PAGE))
-        return
-    # Matplotlib takes its time.
-    from thud.plot.look import save_all  # noqa: PLC0415
+    if figures:
+        # Matplotlib takes its time.
+        from thud.plot.look import picture_files  # noqa: PLC0415
 
-    drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-    contents |= page_contents(data, list(drawn.values()), folder)
-    write_files(folder, data, contents, (DATASET,))
-    save_all(drawn, folder)
+        drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+        contents |= page_contents(data, list(drawn.values()), results.folder)
+        contents |= picture_files(drawn)
+    write_files(results, data, contents, file_names())
 
 
 def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:

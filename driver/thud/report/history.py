@@ -13,6 +13,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from thud.checks import refuse
+from thud.files import read_input
 from thud.immutable import Immutable
 from thud.recordings.verdict import VERDICTS
 from thud.report.data import FORMAT, read_date
@@ -236,7 +237,7 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
     try:
         if path.stat().st_size > LARGEST:
             refuse(f"{path}: is larger than {LARGEST >> 20} MiB", allowed)
-        report = json.loads(path.read_text(encoding="utf-8"))
+        report = json.loads(read_input(path))
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no JSON"
         refuse(f"{path}: cannot be read ({reason})", allowed, error)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from thud.display import draw_all
 from thud.errors import ReportWarning
-from thud.files import replace_file
+from thud.files import Results, content_of
 
 if TYPE_CHECKING:
     import os
@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 JSON, HTML, PDF = "report.json", "report.html", "report.pdf"
 
 
-def write_report(recording: Recording, directory: str | os.PathLike[str]) -> list[Path]:
+def write_report(
+    recording: Recording, directory: str | os.PathLike[str], *, replace: bool = False
+) -> list[Path]:
     """Write ``report.json``, ``report.html`` and ``report.pdf`` and return their paths.
 
     The page is one sheet of A4; lists that are too long for it are complete in ``report.json``.
@@ -35,9 +37,13 @@ def write_report(recording: Recording, directory: str | os.PathLike[str]) -> lis
         The recording.
     directory
         Directory of the files; it is made where there is none.
+    replace
+        Replace also files that thud has not written.
 
     Raises
     ------
+    InputError
+        Where a file is in the way.
     OSError
         Where a file cannot be written.
 
@@ -53,8 +59,7 @@ def write_report(recording: Recording, directory: str | os.PathLike[str]) -> lis
     folder, data = Path(directory), report_data(recording)
     figures = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
     contents = {JSON: json_bytes(data), **page_contents(data, list(figures.values()), folder)}
-    write_files(folder, data, contents)
-    return [folder / name for name in contents]
+    return write_files(Results(folder, "measure", replace=replace), data, contents)
 
 
 def json_bytes(data: dict[str, Any]) -> bytes:
@@ -93,24 +98,19 @@ def page_contents(
 
 
 def write_files(
-    folder: Path, data: dict[str, Any], contents: Mapping[str, bytes], names: Iterable[str] = ()
-) -> None:
+    results: Results, data: dict[str, Any], contents: Mapping[str, bytes], names: Iterable[str] = ()
+) -> list[Path]:
     """Write the files of a recording; warn where they replace those of another one.
 
-    Where a report lies in the directory, files of `names` that have no content are of an earlier
-    recording: they are removed. So is the PDF of a page that has none.
+    Files of `names` that have no content are of an earlier recording: they are removed. So is the
+    PDF of a page that has none.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    earlier = _earlier(folder)
+    earlier = _earlier(results.folder)
+    paths = results.write(contents, stale=[*names, *([PDF] if HTML in contents else [])])
     if earlier is not None and earlier != _checksums(data):
-        message = f"{folder}: replaces the results of another recording"
+        message = f"{results.folder}: replaces the results of another recording"
         warnings.warn(message, ReportWarning, stacklevel=3)
-    stale = {PDF} if HTML in contents else set()
-    stale |= set(names if earlier is not None else ())
-    for name in stale - set(contents):
-        (folder / name).unlink(missing_ok=True)
-    for name, content in contents.items():
-        replace_file(folder / name, content)
+    return paths
 
 
 def _checksums(data: dict[str, Any]) -> list[str]:
@@ -122,7 +122,7 @@ def _earlier(folder: Path) -> list[str] | None:
     from thud.report.data import FORMAT  # noqa: PLC0415 - SciPy takes its time
 
     try:
-        data = json.loads((folder / JSON).read_text(encoding="utf-8"))
+        data = json.loads(content_of(folder / JSON) or "")
         return _checksums(data) if data["format"] == FORMAT else None
-    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+    except (ValueError, RecursionError, KeyError, TypeError):
         return None

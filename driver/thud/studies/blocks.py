@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from contextlib import contextmanager
 from hashlib import sha256
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from thud.checks import refuse
-from thud.files import own_path, remove, replace_file, uninterrupted
+from thud.files import is_regular, own_path, read_input, remove, replace_file, uninterrupted
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 LARGE = 256 * 2**20
 # The file with the identity of the blocks.
 MARK = "study"
+# Names of the files beside it, and of those that are not whole.
+_OWN = re.compile(rf"{MARK}|block_\d+\.nc|\..*\.part")
 # Separates a NetCDF file from its checksum, which HDF5 ignores.
 _SEAL = b"thud sha256 "
 
@@ -45,7 +48,7 @@ class Blocks:
             self._require_space()
             self._partial.mkdir(exist_ok=True)
             if block_paths(self._partial):
-                before = json.loads((self._partial / MARK).read_bytes())
+                before = json.loads(read_input(self._partial / MARK))
                 if before != self._identity:
                     # Blocks of another size have gaps or overlap.
                     remove(self._partial)
@@ -128,10 +131,15 @@ def block_paths(partial: Path) -> list[Path]:
 def read_identity(path: Path) -> dict[str, str] | None:
     """Return what results depend on; None where they have no finished block."""
     if path.suffix == ".partial":
+        for one in path.iterdir():
+            if not is_regular(one) or not _OWN.fullmatch(one.name):
+                refuse(f"{one} is not of a study", "finished blocks of a study")
+        if not block_paths(path) and not (path / MARK).exists():
+            return None
+        content = json.loads(read_input(path / MARK))
+        del content["sets in a block"]
         if not block_paths(path):
             return None
-        content = json.loads((path / MARK).read_bytes())
-        del content["sets in a block"]
     else:
         with _open(path) as dataset:
             content = json.loads(dataset.attrs["identity"])
@@ -198,6 +206,10 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
     with _readable(path):
         with uninterrupted():
             if path.suffix == ".zarr":
+                # To open a pipe could block.
+                if any(not (one.is_dir() or is_regular(one)) for one in path.rglob("*")):
+                    message = "holds other than files"
+                    raise ValueError(message)
                 dataset = _open_zarr(path)
             else:
                 _require_whole(path)
@@ -230,7 +242,7 @@ def _write(dataset: xr.Dataset, path: Path) -> None:
 
 def _require_whole(path: Path) -> None:
     """Raise ValueError for a damaged NetCDF file: HDF5 may never return from one."""
-    content, seal, digest = path.read_bytes().rpartition(_SEAL)
+    content, seal, digest = read_input(path).rpartition(_SEAL)
     # Files of an older thud have no checksum.
     if seal and sha256(content).digest() != digest:
         message = "wrong checksum"

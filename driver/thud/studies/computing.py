@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import TYPE_CHECKING
 
@@ -9,9 +10,10 @@ import numpy as np
 from tqdm import tqdm
 
 from thud._api import version
+from thud.checks import refuse
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks, read_sweep
-from thud.studies.dataset import grid_of, new_dataset
+from thud.studies.dataset import disk_space, grid_of, new_dataset
 from thud.studies.evaluation import Block
 
 if TYPE_CHECKING:
@@ -27,8 +29,11 @@ if TYPE_CHECKING:
 def compute_sets(study: SetStudy, folder: Path | None, how: How) -> xr.Dataset:
     """Compute or continue a study; without a folder its results are not written.
 
-    Raises NumericalError where the backend loses sets; sets that fail have a status and a reason.
+    Raises InputError where they cannot fit in memory, and NumericalError where the backend loses
+    sets; sets that fail have a status and a reason.
     """
+    if not folder and disk_space(study) > os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"):
+        refuse(f"{study.count} sets do not fit in memory", "fewer sets, or a directory for them")
     size = study.block_size
     blocks = Blocks(folder, study, size) if folder else None
     memory: dict[int, Columns] = {}

@@ -92,6 +92,14 @@ def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
 
 @lru_cache(maxsize=1)
 def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
+    """Return all points of a design that cannot be drawn in parts."""
+    try:
+        return _drawn(design, dimension, size, seed)
+    except MemoryError as error:
+        refuse(f"[design] size = {size} of kind {design} does not fit in memory", "fewer", error)
+
+
+def _drawn(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
     if design == "latin_hypercube":
         from scipy.stats import qmc  # noqa: PLC0415 - takes its time
 

@@ -9,14 +9,11 @@ from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import refuse
-from thud.display import left_out
 from thud.errors import InputError
-from thud.files import lock, remove, replace_file
+from thud.files import Results, lock, refuse_foreign, remove
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
-
-    from matplotlib.figure import Figure
 
     from thud.studies.kind import Kind
     from thud.studies.study import Study
@@ -28,24 +25,32 @@ _MAX_SHOWN = 3
 
 @contextmanager
 def take(
-    folder: str | os.PathLike[str], kind: Kind[Any, Any], study: Study, *, replace: bool = False
-) -> Iterator[Path]:
+    folder: str | os.PathLike[str],
+    kind: Kind[Any, Any],
+    study: Study,
+    *,
+    replace: bool = False,
+    figures: bool = True,
+) -> Iterator[Results]:
     """Yield a results directory, locked for one run.
 
-    Raises InputError where another run uses it or it holds other results (of another version of the
-    study only without `replace`), OSError where nothing can be written.
+    Raises InputError where another run uses it, it holds results of another version of the study or
+    a file is in the way (both only without `replace`), OSError where nothing can be written.
     """
     place = Path(folder)
-    results = [place / name for name in kind.results(study)]
+    names = kind.results(study)
     place.mkdir(parents=True, exist_ok=True)
-    descriptor = lock(place, results[0])
+    descriptor = lock(place, place / names[0])
     try:
-        others = [place / name for name in kind.other_files(study)]
-        require_version(dict.fromkeys(results, kind.identity_in), study, others, replace=replace)
-        if not results[0].exists():
+        results = Results(place, kind.name, study.inputs, replace=replace, is_locked=True)
+        others = [n for n in kind.other_files(study) if figures or not n.endswith(FORMATS)]
+        results.require(others)
+        readers = dict.fromkeys((place / name for name in names), kind.identity_in)
+        require_version(readers, study, results, kind.other_files(study))
+        if not (place / names[0]).exists():
             with TemporaryFile(dir=place):
                 pass
-        yield place
+        yield results
     finally:
         os.close(descriptor)
 
@@ -53,24 +58,37 @@ def take(
 def require_version(
     readers: Mapping[Path, Callable[[Path], dict[str, str] | None]],
     study: Study,
-    others: Iterable[Path],
-    *,
-    replace: bool,
+    results: Results,
+    others: Iterable[str] = (),
 ) -> None:
-    """Raise InputError where results belong to another study; with `replace`, remove them.
+    """Raise InputError where results belong to another study, or else remove them.
 
-    `readers` return the identity of results by their paths; `others` are removed with them.
+    `readers` return the identity of results by their paths; `others` are names of files that are
+    removed with them.
     """
     for path, identity_in in readers.items():
-        changes = _changes(path, identity_in, study) if path.exists() else ""
-        if changes and not replace:
+        if not os.path.lexists(path):
+            continue
+        results.require_no_input(path)
+        try:
+            before = identity_in(path)
+        except (InputError, ValueError, LookupError, TypeError, OSError):
+            if path.is_dir() and not path.is_symlink():
+                refuse(f"{path} is in the way: a directory of something else", "another directory")
+            if not results.replace:
+                refuse_foreign(path)
+            path.unlink()
+            continue
+        changes = "" if before is None else differences(before, study.identity)
+        if changes and not results.replace:
             refuse(
                 f"{path} belongs to another version of this study: {changes}",
                 "another directory, or --replace (replace=True) to compute it again",
             )
         if changes:
-            for one in (*readers, *others):
+            for one in readers:
                 remove(one)
+            results.write({}, stale=others)
 
 
 def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
@@ -86,26 +104,6 @@ def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], s
             error,
         )
     return "" if before is None else differences(before, study.identity)
-
-
-def save(
-    folder: Path,
-    files: Mapping[str, bytes],
-    draw: Callable[[], Mapping[str, Figure]] | None = None,
-) -> list[Path]:
-    """Write files, and what is drawn as PNG and SVG, by name; return their paths."""
-    paths = [folder / name for name in files]
-    for path in paths:
-        replace_file(path, files[path.name])
-    figures: Mapping[str, Figure] = {}
-    if draw is not None:
-        with left_out("the figure of the study"):
-            figures = draw()
-    if figures:
-        from thud.plot import save_all  # noqa: PLC0415 - matplotlib takes its time
-
-        paths += save_all(figures, folder)
-    return paths
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:

@@ -18,6 +18,7 @@ from thud.checks import (
     require_whole,
 )
 from thud.errors import FitWarning, InputError
+from thud.files import read_input
 from thud.key import check_keywords
 from thud.studies.directory import FORMATS
 from thud.studies.emulation.answered_levels import answered, confirmed, within_region
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
+    from thud.files import Results
     from thud.impact import Impact
     from thud.recordings.recording import Recording
     from thud.studies.fitting.misfit import Misfit
@@ -294,7 +296,7 @@ class FitKind(Kind[FitStudy, Fit]):
         _answered(study.pairs(), trained, study.parameters)
         return replace(study, surrogate=trained)
 
-    def compute(self, study: FitStudy, folder: Path | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
+    def compute(self, study: FitStudy, results: Results | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
         """Return the fit."""
         return _search(
             study.pairs(),
@@ -310,14 +312,17 @@ class FitKind(Kind[FitStudy, Fit]):
 
     def identity_in(self, path: Path) -> dict[str, str]:
         """Return the identity of a fit."""
-        return dict(json.loads(path.read_bytes())["identity"])
+        return dict(json.loads(read_input(path))["identity"])
 
     def other_files(self, study: FitStudy) -> list[str]:
         """Return the names of the other files."""
         ends = file_ends(len(study.targets))
         names = [*(f"fit{end}" for end in ends), "confidence"]
         figures = [f"{name}{ending}" for name in names for ending in FORMATS]
-        files = [name for end in ends for name in (f"fit{end}.csv", f"fitted{end}.nml")]
+        files = [
+            "fit.json",
+            *(name for end in ends for name in (f"fit{end}.csv", f"fitted{end}.nml")),
+        ]
         return [*files, *figures]
 
     def table(self, result: Fit, study: FitStudy) -> str:

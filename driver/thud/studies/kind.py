@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
 
 from thud.checks import refuse, require_words
-from thud.studies.directory import save, take
-from thud.studies.study import Study, read_common, read_tables
+from thud.studies.directory import take
+from thud.studies.study import Study, named_files, read_common, read_tables
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping
     from contextlib import AbstractContextManager
     from pathlib import Path
 
     from matplotlib.figure import Figure
 
     from thud.case import Case
+    from thud.files import Results
     from thud.keys import Value
     from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.parameter import Parameter
@@ -44,7 +45,8 @@ class How(TypedDict, total=False):
     progress : bool
         Show a progress bar.
     replace : bool
-        Remove results of another version of the study from the directory.
+        Replace what is in the way: results of another version of the study, and files that thud
+        has not written.
     surrogate : Surrogate or str or None
         What answers the sets instead of the model, or the path of its file.
     """
@@ -73,7 +75,10 @@ class Kind(ABC, Generic[S, R]):
             return source  # type: ignore[return-value]
         with read_tables(source) as (given, folder, text):
             common = read_common(given, folder, self.name, self.words, self.new_parameter)
-            return self.complete(dataclasses.replace(common, text=text), given, folder)
+            own = () if isinstance(source, Mapping) else (source,)
+            inputs = (*own, *named_files(given, folder))
+            common = dataclasses.replace(common, text=text, inputs=inputs)
+            return self.complete(common, given, folder)
 
     def run(
         self, source: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
@@ -83,19 +88,27 @@ class Kind(ABC, Generic[S, R]):
         study = self.read_study(source)
         if (surrogate := how.get("surrogate")) is not None:
             study = self.with_surrogate(study, surrogate)
+            if isinstance(surrogate, str | os.PathLike):
+                study = dataclasses.replace(study, inputs=(*study.inputs, surrogate))
         self.require(study, **how)
         if output is None:
             return self.compute(study, None, **how)
-        with self.take(study, output, replace=how.get("replace", False)) as folder:
-            result = self.compute(study, folder, **how)
-            save(folder, self.files(result, study))
+        replace = how.get("replace", False)
+        with self.take(study, output, replace=replace, figures=False) as results:
+            result = self.compute(study, results, **how)
+            results.write(self.files(result, study))
             return result
 
     def take(
-        self, study: S, folder: str | os.PathLike[str], *, replace: bool = False
-    ) -> AbstractContextManager[Path]:
+        self,
+        study: S,
+        folder: str | os.PathLike[str],
+        *,
+        replace: bool = False,
+        figures: bool = True,
+    ) -> AbstractContextManager[Results]:
         """Return the context of a results directory of a study; see `thud.studies.directory`."""
-        return take(folder, self, study, replace=replace)
+        return take(folder, self, study, replace=replace, figures=figures)
 
     @abstractmethod
     def new_parameter(
@@ -119,7 +132,7 @@ class Kind(ABC, Generic[S, R]):
         return f"{study.name}: {', '.join(p.name for p in study.parameters)} of {study.model}"
 
     @abstractmethod
-    def compute(self, study: S, folder: Path | None, **how: Unpack[How]) -> R:
+    def compute(self, study: S, results: Results | None, **how: Unpack[How]) -> R:
         """Return the result, kept in a directory if given."""
 
     @abstractmethod

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.case import Case
+    from thud.files import Results
     from thud.keys import Value
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
@@ -138,11 +139,15 @@ class SetKind(DropsKind[R]):
             by = f" by a surrogate of {len(study.surrogate.points)} drops"
         return f"{study.name}: {study.count} sets of {study.model}{by}, about {amount} on disk"
 
-    def compute(self, study: SetStudy, folder: Path | None, **how: Unpack[How]) -> R:
+    def compute(self, study: SetStudy, results: Results | None, **how: Unpack[How]) -> R:
         """Return the result of all sets, computed or continued."""
-        if study.plan:
-            study = replace(study, surrogate=train(study, folder, how))
-        return self.conclude(study, compute_sets(study, folder, how))
+        try:
+            if study.plan:
+                study = replace(study, surrogate=train(study, results, how))
+            folder = results.folder if results else None
+            return self.conclude(study, compute_sets(study, folder, how))
+        except MemoryError as error:
+            refuse(f"{study.count} sets do not fit in memory", "fewer sets", error)
 
     @abstractmethod
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:

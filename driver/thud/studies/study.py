@@ -7,7 +7,7 @@ import os
 import re
 import tomllib
 from collections.abc import Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
@@ -20,6 +20,7 @@ from thud._schema import MODELS
 from thud.case import Case, check_case, new_model, read_case, tables_case
 from thud.checks import refuse, refuse_value, require_kind, require_words, shown
 from thud.errors import InputError
+from thud.files import read_input
 from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
 from thud.studies.parameter import Parameter, checked, quantity
 
@@ -56,6 +57,8 @@ class Study:
         Density of the wall where it is fixed instead of the mass, kg/m3.
     text : str
         The text of the study.
+    inputs : tuple of path-like
+        The files that it is read from.
     """
 
     name: str
@@ -64,6 +67,7 @@ class Study:
     parameters: tuple[Parameter, ...]
     density: float | None = None
     text: str = field(default="", compare=False, repr=False)
+    inputs: tuple[str | os.PathLike[str], ...] = field(default=(), compare=False, repr=False)
 
     @property
     def model(self) -> str:
@@ -121,9 +125,20 @@ def read_tables(
         refuse(f"{path}: {error}", "TOML", error)
 
 
+def named_files(given: object, folder: Path) -> Iterator[Path]:
+    """Yield the files that the texts of a study name, relative to its folder."""
+    if isinstance(given, str):
+        with suppress(OSError, ValueError):
+            if (folder / given).is_file():
+                yield folder / given
+    elif isinstance(given, Mapping | list):
+        for one in given.values() if isinstance(given, Mapping) else given:
+            yield from named_files(one, folder)
+
+
 def _content(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_input(path).decode("utf-8")
     except OSError as error:
         refuse(f"{error.strerror}", "a file that exists and can be read", error)
     except UnicodeDecodeError as error:

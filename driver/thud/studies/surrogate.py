@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.case import Case
+    from thud.files import Results
     from thud.keys import Value
     from thud.studies.kind import How
     from thud.studies.sets import SetStudy
@@ -49,9 +50,9 @@ class SurrogateKind(DropsKind[Surrogate]):
             refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
         return found
 
-    def compute(self, study: SetStudy, folder: Path | None, **how: Unpack[How]) -> Surrogate:
+    def compute(self, study: SetStudy, results: Results | None, **how: Unpack[How]) -> Surrogate:
         """Return the surrogate, trained or read."""
-        return train(study, folder, how)
+        return train(study, results, how)
 
     def describe(self, study: SetStudy) -> str:
         """Return what is learned."""

@@ -20,9 +20,10 @@ module thud_modal_ball
    use thud_modal_compression, only: compress_modal_ball
    use thud_modal_damping, only: set_damping
    use thud_mode_step, only: get_energies, mode_step_type, place_q, place_v, set_factors
-   use thud_receiver, only: can_strike, get_impulse_response, new_receiver_step, receiver_type
+   use thud_receiver, only: can_strike, get_impulse_response, get_pole_count, new_receiver_step, receiver_type
    use thud_ring_contact, only: new_ring_contact, ring_contact_type
-   use thud_sampling, only: check_contact_samples, get_sample_count, sampling_type
+   use thud_sampling, only: check_contact_samples, get_sample_count, get_step_count, sampling_type
+   use thud_source_model, only: typical_contact
    use thud_sphere_modes, only: basis_type, family_type, get_family, get_static_family, new_basis
    use thud_surface_rings, only: new_surface_rings, outermost_angle, surface_rings_type
    use thud_text, only: to_text
@@ -54,12 +55,27 @@ module thud_modal_ball
 contains
 
    !> Approximate time of one drop on one core, s.
-   function get_cost(options) result(cost)
+   function get_cost(ball, options, sampling, receiver) result(cost)
+      type(ball_type), intent(in) :: ball
       class(modal_ball_type), intent(in) :: options
+      type(sampling_type), intent(in) :: sampling
+      !> What the source drops on (default: a rigid floor).
+      type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost
+      real(wp) :: n_mode, n_gap, step_cost
 
-      cost = 1.2e-2_wp*(options%rings/60.0_wp)
+      n_mode = real(options%harmonics + 1, wp)*options%radial_modes
+      n_gap = options%rings*merge(2.0_wp, 1.0_wp, options%floor_friction == 'stick')
+      cost = 4.5e-3_wp + 1.0e-7_wp*options%static_harmonics*n_gap + 1.0e-9_wp*n_mode*n_gap**2
+      step_cost = 2.4e-7_wp + n_mode*(2.3e-9_wp + 1.05e-10_wp*n_gap)
+      ! Branches.
+      if (options%damping_law == 'fractional') step_cost = step_cost + 8.0e-9_wp*n_mode
+      if (present(receiver)) then
+         cost = cost + get_step_count(sampling)*(step_cost + 2.6e-9_wp*get_pole_count(receiver))
+      else
+         cost = cost + get_step_count(sampling, typical_contact)*step_cost
+      end if
    end function get_cost
 
    !> Modulus of elasticity of the paper's ball, Pa (section 2.3; of linear modes an effective modulus).

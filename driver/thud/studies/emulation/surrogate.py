@@ -17,7 +17,7 @@ from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
 from thud.display import Displayed
 from thud.extras import require_extra
-from thud.files import replace_file
+from thud.files import read_input, replace_file
 from thud.keys import OF_FILES, put
 from thud.levels import get_bands
 from thud.studies.emulation.verdict import judge_many
@@ -342,7 +342,7 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     """
     require_kind("surrogate", path, str | Path)
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with np.load(io.BytesIO(read_input(Path(path))), allow_pickle=False) as file:
             header = json.loads(str(file["header"]))
             arrays: dict[str, Any] = {
                 name: np.asarray(file[name], dtype=np.float64) for name in _ARRAYS

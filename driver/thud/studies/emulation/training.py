@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -11,13 +12,13 @@ from scipy.linalg import cho_solve
 from threadpoolctl import threadpool_limits
 
 from thud.checks import refuse
-from thud.errors import NumericalError
+from thud.errors import InputError, NumericalError
 from thud.extras import require_extra
 from thud.keys import find_key
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
 from thud.studies.designs import unit_sets
-from thud.studies.directory import require_version, save
+from thud.studies.directory import require_version
 from thud.studies.emulation.surrogate import (
     SMOOTHNESS,
     Surrogate,
@@ -28,11 +29,10 @@ from thud.studies.parameter import Parameter
 from thud.studies.sets import SetStudy
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     import xarray as xr
     from numpy.typing import NDArray
 
+    from thud.files import Results
     from thud.studies.emulation.plan import Plan
     from thud.studies.kind import How
     from thud.studies.sets import Columns
@@ -68,7 +68,7 @@ class TrainingStudy(SetStudy):
         return super().parameter_columns(self.first + start, self.first + stop)
 
 
-def train(study: SetStudy, folder: Path | None, how: How) -> Surrogate:
+def train(study: SetStudy, results: Results | None, how: How) -> Surrogate:
     """Return the surrogate of all sets of a study, trained or read from its directory.
 
     Its drops are kept there, as sets of a study of their own. Raises InputError where a key cannot
@@ -78,11 +78,13 @@ def train(study: SetStudy, folder: Path | None, how: How) -> Surrogate:
     assert plan is not None  # noqa: S101 - see `SetKind.compute`
     parameters = _ranges(study)
     name = surrogate_name(study)
-    path = folder / name if folder else None
-    if path and path.exists():
-        found = read_surrogate(path)
-        if found.identity == study.identity:
-            return found
+    folder = results.folder if results else None
+    if folder:
+        # Anything else of this name is replaced, see `take`.
+        with suppress(InputError):
+            found = read_surrogate(folder / name)
+            if found.identity == study.identity:
+                return found
     stages: list[xr.Dataset] = []
     tried = []
     for first, stop in plan.stages:
@@ -90,16 +92,16 @@ def train(study: SetStudy, folder: Path | None, how: How) -> Surrogate:
             f"{study.name}_training_{stop}", "training", study.case, parameters,
             design="sobol", size=stop, seed=plan.seed, first=first,
         )  # fmt: skip
-        if folder:
-            paths = {folder / one: read_identity for one in result_names(drops)}
-            require_version(paths, drops, [], replace=how.get("replace", False))
+        if results:
+            paths = {results.folder / one: read_identity for one in result_names(drops)}
+            require_version(paths, drops, results)
         stages.append(compute_sets(drops, folder, how).load())
         found = _learn(drops, stages, plan, study.identity)
         label, error = found.worst
         tried.append(f"{error:.3g} dB with {stop}")
         if error <= plan.error:
-            if folder:
-                save(folder, {name: found.to_bytes()})
+            if results:
+                results.write({name: found.to_bytes()})
             return found
     message = (
         f"the surrogate's error of the {label} is {', '.join(tried[-3:])} drops; allowed: up to "

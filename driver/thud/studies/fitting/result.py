@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -12,10 +11,10 @@ import numpy as np
 
 from thud._api import version
 from thud.case import case_text
-from thud.display import Displayed
+from thud.display import Displayed, left_out
+from thud.files import Results
 from thud.immutable import Immutable
 from thud.key import check_keywords
-from thud.studies.directory import save
 from thud.studies.fitting.inference import coverage_factor
 from thud.studies.fitting.misfit import SHIFT
 from thud.tables import format_rows
@@ -348,16 +347,21 @@ class Fit(Displayed):
         units: Units | None = None,
         *,
         figures: bool = True,
+        replace: bool = False,
     ) -> list[Path]:
-        """Write the files of `files`, and figures as PNG and SVG.
+        """Write the files of `files`, and figures as PNG and SVG; return their paths.
 
-        Older files of these names are replaced; their paths are returned. `units` are those of the
-        figures, as in `shown_units`; files have SI units. Raises OSError where a file cannot be
-        written.
+        Files that thud has not written are replaced with `replace` only. `units` are those of the
+        figures, as in `shown_units`; files have SI units. Raises InputError where a file is in the
+        way, OSError where one cannot be written.
         """
-        folder = Path(directory)
-        folder.mkdir(parents=True, exist_ok=True)
-        return save(folder, self.files(), partial(self.figures, units) if figures else None)
+        contents = self.files()
+        if figures:
+            with left_out("the figure of the fit"):
+                from thud.plot import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+
+                contents |= picture_files(self.figures(units))
+        return Results(Path(directory), "fit", replace=replace).write(contents)
 
 
 def file_ends(count: int) -> list[str]:

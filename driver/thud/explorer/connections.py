@@ -1,0 +1,126 @@
+"""The connections of the server: how many, how long they may be silent, and what is logged."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import resource
+import shutil
+import time
+from multiprocessing import active_children
+from multiprocessing.util import get_temp_dir
+from typing import TYPE_CHECKING
+
+from uvicorn import Config, Server
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+if TYPE_CHECKING:
+    import socket
+    from pathlib import Path
+    from types import FrameType
+
+    from starlette.applications import Starlette
+
+# Connections at a time. As many again may be accepted before those that are too many are closed,
+# and works need files, too.
+MAX_CONNECTIONS = 500
+if (_files := resource.getrlimit(resource.RLIMIT_NOFILE)[0]) != resource.RLIM_INFINITY:
+    MAX_CONNECTIONS = min(MAX_CONNECTIONS, _files // 4)
+# Time in which a connection has to send the head of its next request, s.
+HEAD_TIME = 10
+# Time in which messages of one kind are logged once, s.
+SILENCE = 60.0
+
+
+def run_server(application: Starlette, listener: socket.socket, folder: Path) -> None:
+    """Serve until a signal.
+
+    Parameters
+    ----------
+    application
+        What answers.
+    listener
+        Socket that is listened on.
+    folder
+        Directory of temporary files, removed where a second signal ends the process.
+    """
+    config = Config(
+        application,
+        http=_Connection,
+        log_level="warning",
+        backlog=MAX_CONNECTIONS,
+        timeout_keep_alive=HEAD_TIME,
+        timeout_graceful_shutdown=1,
+    )
+    throttle = _Throttle()
+    for name in ("uvicorn.error", "asyncio"):
+        logging.getLogger(name).addFilter(throttle)
+    _Server(config, folder).run(sockets=[listener])
+
+
+class _Server(Server):
+    """A server that a second signal ends at once, whatever it is doing."""
+
+    def __init__(self, config: Config, folder: Path) -> None:
+        super().__init__(config)
+        self._folder = folder
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        if self.should_exit:
+            for process in active_children():
+                process.kill()
+            for folder in (self._folder, get_temp_dir()):
+                shutil.rmtree(folder, ignore_errors=True)
+            os._exit(128 + sig)
+        super().handle_exit(sig, frame)
+
+
+class _Connection(H11Protocol):
+    """A connection that has to send each head in time.
+
+    Where there are too many, the one that has waited for a head the longest makes room.
+    """
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        # The base class does so after an answer only.
+        self.timeout_keep_alive_task = self.loop.call_later(
+            HEAD_TIME, self.timeout_keep_alive_handler
+        )
+        if len(self.connections) > MAX_CONNECTIONS:
+            waiting = {
+                one: end.when()
+                for one in self.connections
+                if isinstance(one, _Connection) and (end := one.timeout_keep_alive_task)
+            }
+            oldest = min(waiting, key=lambda one: waiting[one])
+            self.connections.discard(oldest)
+            oldest.transport.abort()
+
+    def data_received(self, data: bytes) -> None:
+        # The base class gives up the end of the wait at the first byte of a head.
+        end, self.timeout_keep_alive_task = self.timeout_keep_alive_task, None
+        super().data_received(data)
+        if end and (self.cycle is None or self.cycle.response_complete):
+            self.timeout_keep_alive_task = end
+        elif end:
+            end.cancel()
+
+
+class _Throttle(logging.Filter):
+    """Lets messages of one kind pass once in a while, and none of works that the end has ended."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._latest: dict[str, float] = {}
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        if record.exc_info and isinstance(record.exc_info[1], asyncio.CancelledError):
+            return False
+        kind = str(record.msg).partition("\n")[0]
+        now = time.monotonic()
+        if now < self._latest.get(kind, -SILENCE) + SILENCE:
+            return False
+        self._latest[kind] = now
+        return True

@@ -1,0 +1,244 @@
+"""No command replaces an input or a file that thud has not written, whatever it writes."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import signal
+import stat
+import subprocess
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pytest
+from conftest import MINIMAL, REPOSITORY
+
+import thud
+from thud import cli
+from thud.files import MANIFEST, PART
+from thud.plot import look
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from pathlib import Path
+
+RECORDINGS = REPOSITORY / "inputs/recordings"
+MINE = b"of the user, and of nobody else"
+# Seconds after which a command hangs.
+PATIENCE = 300
+FLOOR = MINIMAL + "&floor name = 'plate' / &plate / &room volume = 40 /"
+RANGES = "parameters = {height = {low = 0.9, high = 1.1}, mass = {low = 2.4, high = 2.6}}\n"
+
+
+class Writer(NamedTuple):
+    """A command that writes results, and its inputs by their names."""
+
+    words: list[str]
+    inputs: dict[str, str | bytes]
+
+
+def _study(kind: str, text: str) -> Writer:
+    return Writer([kind, "s.toml"], {"s.toml": f"case = 'case.nml'\n{text}", "case.nml": MINIMAL})
+
+
+def _mobility() -> str:
+    """Return the mobility of one mass on a spring."""
+    omega = 2 * np.pi * np.linspace(20, 200, 100)
+    values = 1j * omega / (50 * (300.0**2 * (1 + 0.1j) - omega**2))
+    rows = zip(omega / (2 * np.pi), values.real, values.imag, strict=True)
+    return "frequency,real,imaginary\n" + "".join(f"{f},{x},{y}\n" for f, x, y in rows)
+
+
+# By command of `thud-driver`; below them the executable.
+WRITERS = {
+    "run": Writer(["run", "case.nml"], {"case.nml": MINIMAL}),
+    "compare": Writer(["compare", "case.nml"], {"case.nml": MINIMAL}),
+    "measure": Writer(
+        ["measure", "drop.csv", "--config", "lab.toml", "--workers", "1"],
+        {
+            "drop.csv": (RECORDINGS / "drop_1.csv").read_bytes(),
+            "lab.toml": 'laboratory = "Lab"',
+        },
+    ),
+    "export": Writer(
+        ["export", "drop.csv", "--csv", "--spectrum", "--mat"],
+        {"drop.csv": (RECORDINGS / "drop_1.csv").read_bytes()},
+    ),
+    "history": Writer(["history", "report.json"], {"report.json": b""}),
+    "rate": Writer(
+        ["rate", "levels.csv", "--volume", "40"],
+        {"levels.csv": (REPOSITORY / "inputs/floors/field_levels.csv").read_bytes()},
+    ),
+    "floor": Writer(["floor", "case.nml"], {"case.nml": FLOOR}),
+    "mobility": Writer(["mobility", "table.csv"], {"table.csv": _mobility()}),
+    "sweep": _study("sweep", "parameters.height.values = [0.9, 1.1]"),
+    "sensitivity": _study("sensitivity", RANGES + "design.size = 8"),
+    "design": _study("design", RANGES.replace("}, mass", ", count = 2}, mass").replace(
+        "2.6}", "2.6, count = 2}")),
+    "uncertainty": _study("uncertainty", RANGES + "design.size = 8"),
+    "surrogate": _study("surrogate", "parameters.height = {low = 0.99, high = 1.01}\n"
+                        "surrogate = {size = 64, error = 1.0}"),
+    "fit": _study("fit", "target.levels = [39, 31, 23, 17, 12]\nparameters.mass = {}"),
+    "figures": Writer(["figures"], {}),
+    "thud": Writer(["thud", "case.nml"], {"case.nml": MINIMAL}),
+    "sets": Writer(["thud", "case.nml", "--sets", "table.csv"],
+                   {"case.nml": MINIMAL, "table.csv": "height\n1\n0.5\n"}),
+}  # fmt: skip
+# They write no results; `examples` makes a directory of its own.
+OTHERS = {"explore", "calibrate", "examples"}
+
+
+def test_no_command_escapes() -> None:
+    options = {
+        name: {word for words, _ in command.arguments for word in words}
+        for name, command in cli.COMMANDS.items()
+    }
+    writing = {name for name, words in options.items() if "--output" in words}
+    assert writing | {"thud", "sets"} == WRITERS.keys()
+    assert writing | OTHERS == cli.COMMANDS.keys()
+    assert all("--replace" in options[name] for name in writing)
+
+
+@pytest.fixture(autouse=True)
+def impatient() -> Iterator[None]:
+    """End what hangs."""
+    signal.alarm(PATIENCE)
+    yield
+    signal.alarm(0)
+
+
+@pytest.fixture
+def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
+    """Run a command of the table."""
+    monkeypatch.chdir(tmp_path)
+    # To draw them takes long, and is tested elsewhere.
+    monkeypatch.setattr(look, "_picture", lambda *_: b"picture")
+    monkeypatch.setattr("thud.plot.documentation_figures", lambda: {"figure1": object})
+    monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
+    monkeypatch.setattr("thud.recordings.results.page_contents", lambda *_: {"report.html": b"p"})
+
+    def run(name: str, *more: str) -> int:
+        words = [*WRITERS[name].words, "-q", "-o", "out", *more]
+        if words[0] != "thud":
+            return cli.main(words)
+        done = subprocess.run([executable, *words[1:]], check=False, timeout=PATIENCE)
+        return done.returncode
+
+    return run
+
+
+@pytest.fixture(params=list(WRITERS))
+def name(request: pytest.FixtureRequest, tmp_path: Path) -> str:
+    """Return the name of a command whose inputs lie in the directory of the test."""
+    name: str = request.param
+    for path, content in WRITERS[name].inputs.items():
+        text = _report() if path == "report.json" else content
+        (tmp_path / path).write_bytes(text.encode() if isinstance(text, str) else text)
+    return name
+
+
+def _report() -> str:
+    from thud.report.data import report_data  # noqa: PLC0415 - takes its time
+
+    data = report_data(thud.read_recording(RECORDINGS / "drop_1.csv", height=1.0, mass=2.5))
+    return json.dumps({**data, "date": "2024-05-03"})
+
+
+def names_written(out: Path) -> list[str]:
+    """Return the names of a directory of results, and empty it."""
+    names = sorted(path.name for path in out.iterdir())
+    assert names
+    shutil.rmtree(out)
+    return names
+
+
+def test_files_of_the_user_and_inputs_are_never_replaced(
+    name: str, command: Callable[..., int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert command(name) in (0, 2)
+    assert command(name) in (0, 2)  # over its own results
+    written = names_written(out)
+    inputs = {path: (tmp_path / path).read_bytes() for path in WRITERS[name].inputs}
+    for i, path in enumerate(one for one in written if one != MANIFEST):
+        out.mkdir()
+        (out / path).write_bytes(MINE)
+        capfd.readouterr()
+        assert command(name) == 1
+        said = capfd.readouterr().err
+        assert (out / path).read_bytes() == MINE
+        assert "--replace" in said
+        assert path in said or name in {"thud", "sets", "run"}
+        if inputs:
+            source = list(inputs)[i % len(inputs)]
+            (out / path).unlink()
+            link = os.link if i % 2 else os.symlink
+            link(tmp_path / source, out / path)
+            assert command(name, "--replace") == 1
+            assert f"{path} is an input" in capfd.readouterr().err
+            assert (out / path).samefile(tmp_path / source)
+            assert (out / path).read_bytes() == inputs[source]
+        shutil.rmtree(out)
+    assert {path: (tmp_path / path).read_bytes() for path in inputs} == inputs
+    # What is in the way is replaced on request, and nothing else.
+    out.mkdir()
+    (out / "notes.txt").write_bytes(MINE)
+    (out / written[-1]).write_bytes(MINE)
+    if not stat.S_ISDIR((out / written[-1]).stat().st_mode):
+        assert command(name, "--replace") in (0, 2)
+        assert (out / written[-1]).read_bytes() != MINE
+        assert (out / "notes.txt").read_bytes() == MINE
+
+
+def test_nothing_but_regular_files_is_opened(
+    name: str, command: Callable[..., int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    assert command(name) in (0, 2)
+    kinds: list[Callable[[Path], object]] = [
+        os.mkfifo,
+        lambda path: path.mkdir(),
+        lambda path: path.symlink_to(tmp_path / "elsewhere"),
+        lambda path: path.symlink_to(tmp_path / "nowhere"),
+    ]
+    (tmp_path / "elsewhere").write_bytes(MINE)
+    written = {*names_written(out), MANIFEST}
+    tries = {(path, kind) for i, path in enumerate(sorted(written)) for kind in (0, 1 + i % 3)}
+    # What it may read, too.
+    if "s.toml" in WRITERS[name].inputs:
+        tries |= {(path, 0) for path in ("s.nc", "s.zarr", "s.partial", "s_surrogate.npz")}
+    for path, kind in sorted({(PART, 0), *tries}):
+        out.mkdir()
+        kinds[kind](out / path)
+        before = (out / path).lstat()
+        capfd.readouterr()
+        code = command(name)
+        assert code in ((1,) if path in written else (0, 1, 2))
+        if code == 1:
+            assert "; allowed: " in capfd.readouterr().err.splitlines()[-1]
+        after = (out / path).lstat()
+        assert (before.st_ino, before.st_mode) == (after.st_ino, after.st_mode), path
+        shutil.rmtree(out)
+    assert (tmp_path / "elsewhere").read_bytes() == MINE
+    assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize("name", ["s.partial", "s.zarr"])
+def test_pipe_among_checkpoints_is_not_opened(
+    name: str, command: Callable[..., int], tmp_path: Path
+) -> None:
+    for path, content in WRITERS["sweep"].inputs.items():
+        (tmp_path / path).write_text(str(content))
+    (tmp_path / "out" / name).mkdir(parents=True)
+    for path in ("study", "block_000000000000.nc", "zarr.json"):
+        os.mkfifo(tmp_path / "out" / name / path)
+        for more in ([], ["--replace"]):
+            assert command("sweep", *more) == 1
+        (tmp_path / "out" / name / path).unlink()
+
+
+@pytest.mark.parametrize("words", [["sweep"], ["fit"], ["run"], ["measure"], ["history"], ["rate"]])
+def test_pipe_is_no_input(words: list[str], tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    assert cli.main([*words, str(tmp_path / "pipe"), "-q", "-o", str(tmp_path / "out")]) == 1

@@ -1,0 +1,319 @@
+"""Noise of recordings: covariances, prediction of the background, posterior, energies of bands."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.integrate import quad
+from synthetic import coloured_noise, make_drop, noise_density
+
+import thud
+from thud.recordings import noise as module
+from thud.recordings.band_noise import band_functionals, band_noise
+from thud.recordings.noise import (
+    Background,
+    Noise,
+    covariances,
+    fit_background,
+    noise_covariances,
+)
+
+if TYPE_CHECKING:
+    from thud.recordings.noise import Cells
+
+# Of docs/recordings_theory.md, section 2.
+MAINS, UNCERTAIN, N_HARMONIC = (50.0, 60.0), 0.1, 5
+OFFSET, DRIFT = 1.0, 0.1
+SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
+PEAK = 1500.0
+
+
+def cells_of(edges: list[float]) -> Cells:
+    return np.array(edges[:-1]), np.array(edges[1:])
+
+
+QUIET_EDGES = -0.012 - np.cumsum([0, 5e-4, 5e-4, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])[::-1]
+QUIET: Cells = tuple(  # type: ignore[assignment]
+    np.concatenate([one, other])
+    for one, other in zip(
+        cells_of(QUIET_EDGES.tolist()), cells_of((-0.7 * QUIET_EDGES[::-1]).tolist()), strict=True
+    )
+)
+CONTACT = cells_of(np.linspace(-0.0115, 0.008, 6).tolist())
+DRAWS = np.array([[0.02, 3.0, 40.0, 2.0, 1.0], [0.03, 1.0, 90.0, 0.5, 8.0], [0.01, 9.0, 5.0, 3, 1]])
+
+
+def middle(cells: Cells) -> np.ndarray:
+    return (cells[0] + cells[1]) / 2
+
+
+def test_noise_between_two_frequencies_is_the_integral_of_its_spectrum() -> None:
+    noise = Noise(1.0, "before", white=0.3, pink=7.0, brown=50.0)
+    assert noise.spectrum(4.0) == pytest.approx(0.3 + 7 / 4 + 50 / 16)
+    power, _ = quad(noise.spectrum, 3, 700, limit=200)
+    assert noise.deviation_between(3, 700) == pytest.approx(np.sqrt(power))
+
+
+def mean_of_lags(one: tuple[float, float], other: tuple[float, float], brown: bool) -> float:  # noqa: FBT001
+    """Return the mean of the covariance at a lag over two cells, by the density of their lags."""
+    (a, b), (c, d) = one, other
+
+    def integrand(lag: float) -> float:
+        overlap = max(min(b, d + lag) - max(a, c + lag), 0.0)
+        value = -(np.pi**2) * abs(lag) if brown else -np.log(max(abs(lag), 1e-300))
+        return value * overlap / ((b - a) * (d - c))
+
+    corners = sorted({a - d, a - c, b - d, b - c, 0.0 if a < d and c < b else a - d})
+    return sum(quad(integrand, low, high, limit=200)[0] for low, high in pairwise(corners))
+
+
+@pytest.mark.parametrize("brown", [False, True])
+def test_covariances_are_means_over_cells(brown: bool) -> None:  # noqa: FBT001
+    begins = np.array([0.0, 1e-3, 2e-3, 5e-3, 9e-3, 0.1])
+    ends = np.array([1e-3, 2e-3, 4e-3, 6e-3, 12e-3, 0.103])
+    cells = begins, ends
+    found = noise_covariances(cells, cells)[int(brown)]
+    for i, k in product(range(6), range(6)):
+        one, other = ((begins[j], ends[j]) for j in (i, k))
+        # Cells that are apart: what the second order leaves, by the fourth moment of the lags.
+        lag = abs(sum(one) - sum(other)) / 2
+        spread = ((one[1] - one[0]) ** 2 + (other[1] - other[0]) ** 2) / 12
+        left = 0.0 if brown or not lag else (spread / lag**2) ** 2
+        assert found[i, k] == pytest.approx(mean_of_lags(one, other, brown), rel=1e-7, abs=left)
+
+
+def test_covariances_belong_to_spectra_of_density_1() -> None:
+    """Differences of autocovariances are integrals of S(f) (cos(2 pi f t1) - cos(2 pi f t2))."""
+    points = np.array([0.0, 0.01, 0.03])
+    cells = points, points + 1e-9
+    pink, brown = noise_covariances(cells, cells)[:2, 0, 1:]
+    f = np.linspace(1e-3, 1e4, 1_000_000)
+    change = np.cos(2 * np.pi * f * 0.01) - np.cos(2 * np.pi * f * 0.03)
+    step = f[1] - f[0]
+    # What is left above the highest frequency is less than 1/(2 pi f t) of its density.
+    assert pink[0] - pink[1] == pytest.approx((change / f).sum() * step, abs=1e-4)
+    assert brown[0] - brown[1] == pytest.approx((change / f**2).sum() * step, rel=1e-3)
+
+
+def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None:
+    found = noise_covariances(QUIET, CONTACT)[2:]
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    time, other = (
+        middle(cells)[:, None] + (cells[1] - cells[0])[:, None] / 2 * nodes
+        for cells in (QUIET, CONTACT)
+    )
+    lag = time[:, None, :, None] - other[None, :, None, :]
+    for one, mains in zip(found, MAINS, strict=True):
+        expected = np.zeros(one.shape)
+        for order in range(1, N_HARMONIC + 1):
+            for f in (mains - UNCERTAIN, mains + UNCERTAIN):
+                wave = np.cos(2 * np.pi * order * f * lag) / 2 / order**2
+                expected += np.einsum("ikab,a,b->ik", wave, weights / 2, weights / 2)
+        np.testing.assert_allclose(one, expected, atol=1e-12)
+
+
+def dense(draw: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return covariances of quiet, quiet and contact, and contact for some variances."""
+    both = tuple(np.concatenate(pair) for pair in zip(QUIET, CONTACT, strict=True))
+    time = middle(both)  # type: ignore[arg-type]
+    whole = np.tensordot(draw[1:], noise_covariances(both, both), 1)  # type: ignore[arg-type]
+    whole += PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
+    n = len(QUIET[0])
+    quiet = whole[:n, :n] + draw[0] / 2 * np.diag(1 / (QUIET[1] - QUIET[0]))
+    return quiet, whole[:n, n:], whole[n:, n:]
+
+
+@pytest.fixture(scope="module")
+def background() -> Background:
+    """Return a background of means that hold an offset, a drift and hum."""
+    time = middle(QUIET)
+    noise = np.random.default_rng(2).normal(size=len(time))
+    mean = 20 + 300 * time + 3 * np.sin(2 * np.pi * 60 * time) + noise
+    return Background(QUIET, mean, DRAWS, PEAK)
+
+
+def test_prediction_is_the_normal_distribution_given_the_quiet(background: Background) -> None:
+    means, total = [], np.zeros(())
+    for draw in DRAWS:
+        quiet, across, contact = dense(draw)
+        weights = np.linalg.solve(quiet, across)
+        means.append(weights.T @ background.mean)
+        total = total + (contact - across.T @ weights) / len(DRAWS)
+    mean, covariance = background.predict(CONTACT)
+    # Offset and drift of 1500 N are known to 1e-3 of them.
+    np.testing.assert_allclose(mean, np.mean(means, axis=0), rtol=1e-6)
+    np.testing.assert_allclose(background.predict_mean(CONTACT), mean, rtol=1e-9)
+    expected = total + np.cov(np.transpose(means), ddof=0)
+    np.testing.assert_allclose(covariance, expected, rtol=1e-4, atol=1e-4 * expected.max())
+
+
+def test_drift_and_hum_are_means_given_the_quiet(background: Background) -> None:
+    time, prior = middle(QUIET), (DRIFT * PEAK) ** 2
+    slopes, variances, hums = [], [], []
+    for draw in DRAWS:
+        quiet, *_ = dense(draw)
+        slopes.append(prior * time @ np.linalg.solve(quiet, background.mean))
+        variances.append(prior - prior**2 * time @ np.linalg.solve(quiet, time))
+        hum = draw[4] * noise_covariances(QUIET, QUIET)[3]
+        hums.append(hum @ np.linalg.solve(quiet, background.mean))
+    assert background.drift == pytest.approx(
+        (np.mean(slopes), np.sqrt(np.mean(variances) + np.var(slopes))), rel=1e-4
+    )
+    frequency, amplitude, deviation = background.hum
+    # 60 Hz has the larger mean variance; white noise of the cells makes as much by chance.
+    assert frequency == 60
+    assert amplitude == pytest.approx(np.sqrt(2) * np.std(np.mean(hums, axis=0)), rel=0.05)
+    assert amplitude == pytest.approx(np.sqrt(2 * np.mean(np.mean(hums, axis=0) ** 2)), rel=1e-6)
+    white = DRAWS[:, 0].mean() / 2 * np.mean(1 / (QUIET[1] - QUIET[0]))
+    assert deviation == pytest.approx(np.sqrt(2 * white / len(time)))
+
+
+def test_density_is_that_of_the_draws(background: Background) -> None:
+    values = DRAWS[:, 0] + DRAWS[:, 1] / 20 + DRAWS[:, 2] / 400
+    assert background.density(20.0) == pytest.approx((values.mean(), values.std()))
+
+
+def posterior(background: Background, large: float = 1e3) -> module._Posterior:
+    time = middle(QUIET)
+    trend = PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
+    parts = covariances(QUIET)
+    return module._Posterior(parts, trend, background.mean, np.full(5, large))  # noqa: SLF001
+
+
+def test_posterior_is_likelihood_times_priors(background: Background) -> None:
+    one = posterior(background)
+    values = []
+    for draw in DRAWS:
+        likelihood = stats.multivariate_normal.logpdf(background.mean, cov=dense(draw)[0])
+        prior = SLOPE @ np.log(draw) - np.log(1 + draw / 1e3).sum()
+        values.append(one.logarithm(np.log(draw)) - likelihood - prior)
+    # Up to a constant.
+    assert np.ptp(values) < 1e-6
+
+
+def test_derivatives_of_the_posterior(background: Background) -> None:
+    one, phi, step = posterior(background, 10.0), np.log(DRAWS[1]), 1e-4
+    score, curvature = one._derivatives(phi)  # noqa: SLF001
+    slopes = [
+        (one.logarithm(phi + change) - one.logarithm(phi - change)) / (2 * step)
+        for change in step * np.eye(5)
+    ]
+    np.testing.assert_allclose(score, slopes, rtol=1e-4, atol=1e-5)
+    # Average information of the likelihood (Gilmour, Thompson and Cullis 1995), and the priors'.
+    inverse = np.linalg.inv(dense(DRAWS[1])[0])
+    turned = [theta * part @ inverse @ background.mean for theta, part in zip(
+        DRAWS[1], covariances(QUIET), strict=True)]  # fmt: skip
+    expected = 0.5 * np.array(turned) @ inverse @ np.transpose(turned) + np.diag(SLOPE)
+    np.testing.assert_allclose(curvature, expected, rtol=1e-4)
+
+
+def test_maximum_has_no_slope_and_draws_have_its_curvature(background: Background) -> None:
+    one = posterior(background, 10.0)
+    likely, curvature = one.maximum(np.log(DRAWS[0]))
+    # The search ends where a step gains less than 0.02: half of the square of the slope.
+    score, _ = one._derivatives(likely)  # noqa: SLF001
+    assert score @ np.linalg.solve(curvature, score) < 2 * module.TOLERANCE
+    draws = one.draw(likely, curvature)
+    assert draws.shape == (module.N_KEPT, 5)
+
+
+def test_proposals_are_those_of_student() -> None:
+    draws, logarithm = module._student(3)  # noqa: SLF001
+    expected = stats.multivariate_t.logpdf(draws, np.zeros(3), np.eye(3), df=module.FREEDOM)
+    np.testing.assert_allclose(logarithm - expected, (logarithm - expected)[0], atol=1e-9)
+    # The squared radius over the dimension has the distribution F; points of Sobol follow it well.
+    radius = (draws**2).sum(axis=1) / 3
+    assert stats.kstest(radius, stats.f(3, module.FREEDOM).cdf).statistic < 0.1
+    assert abs(np.mean(np.sign(draws))) < 0.1
+
+
+def test_draws_weighted_by_the_posterior_have_its_moments() -> None:
+    """A posterior in closed form: each variance has cells of its own, hence a gamma function."""
+    n, scales = 30, np.array([1.0, 2.0, 4.0, 1.0, 3.0])
+    parts = np.array([np.diag(np.repeat(np.eye(5)[k], n)) for k in range(5)])
+    mean = np.repeat(np.sqrt(scales), n) * np.random.default_rng(3).normal(size=5 * n)
+    one = module._Posterior(parts, np.zeros((5 * n, 5 * n)), mean, np.full(5, 1e9))  # noqa: SLF001
+    shape, half = n / 2 - SLOPE, (mean.reshape(5, n) ** 2).sum(axis=1) / 2
+    found, curvature = one.maximum(np.log(2 * scales))
+    np.testing.assert_allclose(found, np.log(half / shape), atol=0.1)
+    # The average information, and of the posterior itself.
+    np.testing.assert_allclose(curvature, np.diag(shape + SLOPE), rtol=0.1, atol=1e-9)
+    # From a place a deviation off, so that the weights must tell.
+    draws = one.draw(found + 0.2, np.diag(shape))
+    moments = [np.log(stats.invgamma(a, scale=b).rvs(100_000, random_state=1)) for a, b in zip(
+        shape, half, strict=True)]  # fmt: skip
+    # Of 16 draws: four standard errors of their mean.
+    error = (draws.mean(axis=0) - np.mean(moments, axis=1)) / np.std(moments, axis=1)
+    assert np.square(error).sum() < stats.chi2.ppf(1 - 1e-3, 5) / module.N_KEPT
+    ratio = draws.std(axis=0) / np.std(moments, axis=1)
+    assert np.exp(np.mean(np.log(ratio))) == pytest.approx(1, abs=4 / np.sqrt(2 * 5 * 16))
+
+
+@pytest.mark.parametrize("colour", ["white", "pink", "brown"])
+def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
+    rate, order = 8000.0, ["white", "pink", "brown"].index(colour)
+    edges = np.arange(0, 801, 8)
+    sides = [cells_of(list(side)) for side in (0.01 + edges / rate, -0.01 - edges[::-1] / rate)]
+    quiet: Cells = tuple(np.concatenate(pair) for pair in zip(*sides, strict=True))  # type: ignore[assignment]
+    ratios = []
+    for seed in range(8):
+        noise = coloured_noise(1900, rate, 5.0, colour, np.random.default_rng(seed))
+        means = [np.add.reduceat(noise[i : i + 800], edges[:-1]) / 8 for i in (960, 0)]
+        found = fit_background(quiet, np.concatenate(means), PEAK)
+        frequency = {"white": 400.0, "pink": 60.0, "brown": 20.0}[colour]
+        density, deviation = found.density(frequency)
+        true = noise_density(rate, 5.0, colour) / frequency**order
+        ratios.append((np.log(density / true), deviation / density))
+    error, stated = np.transpose(ratios)
+    # Eight errors of their own stated size: their mean square between quantiles of chi squared.
+    square = np.sum((error / stated) ** 2)
+    assert stats.chi2.ppf(1e-3, 8) < square < stats.chi2.ppf(1 - 1e-3, 8)
+
+
+@pytest.mark.parametrize("rate", [2500.0, 25600.0])
+def test_functionals_have_the_energy_of_a_band(rate: float) -> None:
+    force = np.random.default_rng(1).normal(size=int(0.02 * rate))
+    bands = thud.get_bands()
+    energies = [
+        np.sum((band_functionals(len(force), rate, *edge) @ force) ** 2)
+        for edge in zip(bands.lower, bands.upper, strict=True)
+    ]
+    np.testing.assert_allclose(
+        10 * np.log10(energies), thud.force_exposure_levels(force, rate), atol=1e-6
+    )
+
+
+def test_energy_of_the_noise_follows_its_formula() -> None:
+    """The variance is 4 F'QCQF + 2 tr(QCQC), F known by y alone; the density is uncertain."""
+    drop = make_drop(3.0)
+    contact = drop.contact
+    n_cell = len(contact.covariance)
+    root = np.random.default_rng(5).normal(size=(n_cell, n_cell))
+    draws = np.array([[2e-3, 0.1, 3.0, 0, 0], [4e-3, 0.3, 9.0, 0, 0]])
+    contact = replace(
+        contact, covariance=root @ root.T, background=replace(contact.background, draws=draws)
+    )
+    rate, bands = drop.sample_rate, thud.get_bands()
+    force = drop.force[slice(*drop.gate)]
+    count = len(force)
+    # Each sample has the error of its cell.
+    edges = np.rint(np.linspace(0, count, n_cell + 1))
+    cell = np.searchsorted(edges, np.arange(count), "right") - 1
+    covariance = contact.covariance[np.ix_(cell, cell)] + 3e-3 * rate / 2 * np.eye(count)
+    found = band_noise([replace(drop, contact=contact)], bands)[0]
+    for (noise, deviation), lower, upper in zip(found, bands.lower, bands.upper, strict=True):
+        rows = band_functionals(count, rate, lower, upper)
+        form = rows.T @ rows
+        expected = np.trace(form @ covariance)
+        squares = np.trace(form @ covariance @ form @ covariance)
+        variance = 4 * force @ form @ covariance @ form @ force - 2 * squares
+        f = (lower + upper) / 2
+        density = draws @ [1, 1 / f, 1 / f**2, 0, 0]
+        variance = max(variance, 2 * squares) + (expected * density.std() / density.mean()) ** 2
+        assert noise == pytest.approx(expected, rel=1e-6)
+        assert deviation == pytest.approx(np.sqrt(variance), rel=1e-6)

@@ -1,0 +1,520 @@
+"""The parts of studies one by one: parameters, designs, temperature, plans, maps, answers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.stats import norm
+
+import thud
+from thud._schema import KEYS
+from thud.studies import designs
+from thud.studies.design_map import KIND as DESIGN
+from thud.studies.design_map import DesignMap, _mark
+from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region
+from thud.studies.emulation.plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
+from thud.studies.emulation.surrogate import Surrogate
+from thud.studies.emulation.verdict import judge_many
+from thud.studies.parameter import MAX_VALUES, Parameter, varied
+from thud.studies.sensitivity import sobol_indices
+from thud.studies.temperature import Temperature, read_temperature
+from thud.studies.uncertainty import Uncertainty
+
+OWNERS = ("modal_ball",)
+REAL = next(key for key in KEYS if (key.group, key.name) == ("drop", "height"))
+WHOLE = next(key for key in KEYS if (key.group, key.name) == ("modal_ball", "rings"))
+
+
+def real(**words: Any) -> Parameter:  # noqa: ANN401 - of any kind
+    return Parameter(**words, name=REAL.name, key=REAL)
+
+
+def whole(**words: Any) -> Parameter:  # noqa: ANN401 - of any kind
+    return Parameter(**words, name=WHOLE.name, key=WHOLE)
+
+
+def test_quantiles_are_the_inverse_of_their_distributions() -> None:
+    share = np.array([0.0, 0.1, 0.25, 0.5, 0.9, 0.999])
+    assert real(low=2.0, high=6.0).quantile(share) == pytest.approx(2 + 4 * share)
+    logarithmic = real(low=2.0, high=32.0, scale="log").quantile(share)
+    assert np.log2(logarithmic) == pytest.approx(1 + 4 * share)
+    normal = real(mean=5.0, std=0.5).quantile(share)
+    assert norm.cdf(normal[1:], 5, 0.5) == pytest.approx(share[1:])
+    assert 5 - 0.5 * 9 < normal[0] < 5 - 0.5 * 8
+    assert real(values=(7, 8, 9, 5)).quantile(share).tolist() == [7, 7, 8, 9, 5, 5]
+    # Each whole number has the share up to the next; of logarithms its own.
+    found = whole(low=10, high=12).quantile(np.array([0, 0.33, 0.34, 0.66, 0.67, 0.9999]))
+    assert found.tolist() == [10, 10, 11, 11, 12, 12]
+    edges = np.log(np.array([3, 4]) / 2) / np.log(2)
+    found = whole(low=2, high=3, scale="log").quantile(np.append(edges[0] + [-1e-9, 1e-9], 1.0))
+    assert found.tolist() == [2, 3, 3]
+
+
+def test_grids_have_their_ends_and_count() -> None:
+    assert real(low=1.0, high=3.0, count=5).grid().tolist() == [1, 1.5, 2, 2.5, 3]
+    assert real(low=1.0, high=4.0, count=3, scale="log").grid() == pytest.approx([1, 2, 4])
+    assert real(values=(3, 1, 2)).grid().tolist() == [3, 1, 2]
+    assert real().grid().size == 0
+    assert whole(low=1, high=4, count=3).grid().tolist() == [1, 2, 4]
+    # Whole numbers are each there once.
+    few = whole(low=1, high=4, count=30)
+    assert (few.grid().tolist(), few.size) == ([1, 2, 3, 4], 4)
+    assert [p.size for p in (real(low=1.0, high=2.0, count=7), real(values=(1, 2)), real())] == [
+        7,
+        2,
+        0,
+    ]
+    assert whole(low=1, high=9).size == 0
+
+
+def test_trial_is_the_start_or_a_quantile() -> None:
+    assert real(start=3.0, low=1.0, high=2.0).trial(0.5) == 3
+    assert real(low=1.0, high=2.0).trial(0.25) == 1.25
+    assert real(mean=2.0, std=0.1).trial(0.5) == 2
+    assert real(values=(4, 5)).trial(0.5) == 5
+    assert real(low=1.0).trial(0.5) is None
+    assert real(high=1.0).trial(0.5) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "words"),
+    [
+        ("height", {"low": 1, "high": 2}, ""), ("height", {"low": 1, "high": 1}, "low = 1"),
+        ("height", {"low": 0, "high": 1, "scale": "log"}, "low = 0"),
+        ("height", {"low": -1, "high": 1}, ""), ("height", {"low": 1, "high": 2, "count": 2}, ""),
+        ("height", {"low": 1, "high": 2, "count": 1}, "count = 1"),
+        ("height", {"low": 1, "high": 2, "count": MAX_VALUES + 1}, "count = "),
+        ("rings", {"low": 10, "high": 12, "count": 3}, ""),
+        ("rings", {"low": 10, "high": 12, "count": 4}, "count = 4"),
+        ("rings", {"low": -5, "high": 12}, "low = -5"),
+        ("rings", {"std": 2}, "whole"), ("height", {"std": 0}, "std = 0"),
+        ("height", {"std": 0.1}, ""), ("height", {"values": []}, "values"),
+        ("rings", {"values": [10.5]}, "10.5"), ("height", {"values": [math.nan]}, "nan"),
+        ("height", {"low": 1}, "high"), ("height", {}, "values"),
+    ],
+)  # fmt: skip
+def test_bounds_of_parameters(name: str, given: dict[str, Any], words: str) -> None:
+    if words:
+        with pytest.raises(thud.InputError, match=words):
+            varied(name, given, OWNERS, 1.0)
+    else:
+        found = varied(name, {**given, "unit": "cm"} if name == "height" else given, OWNERS, 0.7)
+        size = 0.01 if name == "height" else 1
+        for word in ("low", "high", "std"):
+            if word in given:
+                assert getattr(found, word) == pytest.approx(size * given[word])
+        assert found.mean == (0.7 if "std" in given else None)
+        assert found.count == given.get("count", 0)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"size": 0, "kind": "random"}, "size = 0"), ({"size": 1, "kind": "random"}, ""),
+        ({"size": 3, "kind": "saltelli"}, "size = 3"), ({"size": 4, "kind": "saltelli"}, ""),
+        ({"size": 12, "kind": "sobol"}, "such as 8 or 16"), ({"size": 16, "kind": "sobol"}, ""),
+        ({"size": 12, "kind": "latin_hypercube"}, ""), ({"size": MAX_VALUES + 1}, "size"),
+        ({"size": 5, "seed": -1}, "seed"), ({"size": 5, "seed": 2}, ""),
+        ({"kind": "grid"}, "no values for a grid"),
+    ],
+)  # fmt: skip
+def test_bounds_of_designs(given: dict[str, Any], words: str) -> None:
+    kinds = (*designs.DRAWN, "grid", "list")
+    parameters = (real(low=1.0, high=2.0),)
+    if words:
+        with pytest.raises(thud.InputError, match=words):
+            designs.read_design(given, kinds, parameters)
+    else:
+        kind = given.get("kind", "random")
+        expected = {"design": kind, "size": given["size"], "seed": given.get("seed", 0)}
+        assert designs.read_design(given, kinds, parameters) == expected
+
+
+def test_grids_and_lists_need_values_that_fit() -> None:
+    two, three = real(low=1.0, high=2.0, count=2), real(values=(1, 2, 3))
+    assert designs.read_design({"kind": "list"}, ("list",), (three, three)) == {"design": "list"}
+    with pytest.raises(thud.InputError, match="differ in their number"):
+        designs.read_design({"kind": "list"}, ("list",), (two, three))
+    with pytest.raises(thud.InputError, match="count has no use"):
+        designs.read_design({"size": 4}, ("random",), (two,))
+    largest = tuple(replace(two, count=2**21) for _ in range(3))
+    with pytest.raises(thud.InputError, match="too many"):
+        designs.read_design({}, ("grid",), largest)
+    fits = (*largest[:2], replace(two, count=2**21 - 1))
+    assert designs.read_design({}, ("grid",), fits) == {"design": "grid"}
+
+
+def test_sets_of_saltelli_exchange_one_column_each() -> None:
+    """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
+    points = designs.unit_sets("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
+    first, second = points[:, 0], points[:, 4]
+    for j in range(3):
+        mixed = np.where(np.arange(3) == j, second, first)
+        np.testing.assert_array_equal(points[:, 1 + j], mixed)
+    np.testing.assert_array_equal(
+        designs.unit_sets("saltelli", 3, 8, 5, 7, 23), points.reshape(40, 3)[7:23]
+    )
+    other = designs.unit_sets("saltelli", 3, 8, 6, 0, 40)
+    assert not np.array_equal(other, points.reshape(40, 3))
+    assert set(designs.makers("saltelli")) == {"scipy_version", "salib_version"}
+    assert set(designs.makers("random")) == {"scipy_version"}
+    assert not designs.makers("grid")
+
+
+def test_what_varies_by_rounding_only_has_no_indices() -> None:
+    draw = np.random.default_rng(0).random(4 * 16)
+    for size, known in ((1e-13, False), (1e-11, True)):
+        for middle in (1.0, -1e5):
+            found = sobol_indices(middle * (1 + size * draw), 2, 1)
+            assert np.isfinite(found[2]).all() == known
+    assert np.isnan(sobol_indices(np.full(64, np.nan), 2)).all()
+
+
+def test_shift_is_that_of_williams_landel_and_ferry() -> None:
+    law = Temperature(20.0, c1=8.0, c2=100.0)
+    at = np.array([20.0, 30.0, 5.0, -50.0, -80.0, -90.0])
+    above = at[:4] - 20
+    assert np.log10(law.shift(at)[:4]) == pytest.approx(-8 * above / (100 + above))
+    assert np.isnan(law.shift(at)[4:]).all()
+    assert Temperature(20.0, coefficient=-0.01).shift(at).tolist() == [1] * 6
+    assert law.keys == ("youngs_modulus", "loss_factor")
+    assert Temperature(20.0, coefficient=-0.01).keys == ("youngs_modulus",)
+    assert law.given == {"reference": 20, "c1": 8, "c2": 100}
+
+
+def test_modulus_of_a_case_changes_with_its_coefficient() -> None:
+    law = Temperature(15.0, coefficient=-0.004)
+    sets = {"temperature": np.array([15.0, 25.0, 5.0])}
+    found = law.act(thud.Case(ball=thud.Ball(youngs_modulus=2e6), model=thud.HollowSphere()), sets)
+    assert found["youngs_modulus"] == pytest.approx([2e6, 1.92e6, 2.08e6])
+    assert set(found) == {"youngs_modulus"}
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"reference": 20, "coefficient": 0}, ""), ({"reference": 20, "c1": 8, "c2": 1}, ""),
+        ({"reference": 20, "c1": 0, "c2": 1}, "c1 = 0"), ({"reference": 20, "c1": 8}, "no c2"),
+        ({"reference": 20, "c1": 8, "c2": -1}, "c2 = -1"), ({"coefficient": 1}, "no reference"),
+        ({"reference": 20}, "no coefficient"), (None, "both"),
+    ],
+)  # fmt: skip
+def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words: str) -> None:
+    case = thud.Case(model=thud.ModalBall(damping_law="rising"))
+    varying = (varied("temperature", {"values": [20, 30]}, OWNERS, None),)
+    if words:
+        with pytest.raises(thud.InputError, match=words):
+            read_temperature(given, case, varying)
+        return
+    found = read_temperature(given, case, varying)
+    assert found is not None
+    assert found.given == given
+    with pytest.raises(thud.InputError, match="both"):
+        read_temperature(given, case, ())
+    assert read_temperature(None, case, ()) is None
+
+
+def test_stages_are_steps_of_a_half() -> None:
+    ends = [stop for _, stop in Plan(size=3000).stages]
+    expected = sorted({2**n for n in range(6, 12)} | {3 * 2**n for n in range(5, 11)})
+    assert ends == [*(n for n in expected if n < 3000), 3000]
+    assert [start for start, _ in Plan(size=3000).stages] == [0, *ends[:-1]]
+    assert Plan(size=64).stages == [(0, 64)]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"size": MIN_DROPS - 1}, "size"), ({"size": MAX_DROPS + 1}, "size"),
+        ({"error": 0}, "error"), ({"seed": -1}, "seed"),
+        ({"size": MAX_DROPS, "error": 1e-6, "seed": 3}, ""), ({}, ""), ({"size": MIN_DROPS}, ""),
+        ({"file": ""}, "file"), ({"file": 1}, "file"), ({"a": 1}, "'a'"),
+    ],
+)  # fmt: skip
+def test_bounds_of_plans(given: dict[str, Any], words: str, tmp_path: Any) -> None:  # noqa: ANN401
+    if words:
+        with pytest.raises(thud.InputError, match=words):
+            read_plan(given, tmp_path)
+    else:
+        assert read_plan(given, tmp_path) == Plan(**given)
+
+
+def test_fewest_drops_are_those_of_the_order_statistic() -> None:
+    # The largest of n bounds 95 % with a confidence of 1 - 0.95**n.
+    fewest = math.ceil(math.log(0.05) / math.log(0.95))
+    assert fewest <= MIN_DROPS < 1.1 * fewest
+
+
+def test_verdict_is_in_doubt_where_errors_reach_a_limit() -> None:
+    criteria = thud.judge(np.zeros(5), 0, 0, 0, 0, 0).criteria
+    middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
+    half = np.array([(one.upper - one.lower) / 2 for one in criteria])
+
+    def verdict(value: np.ndarray, error: np.ndarray) -> tuple[float, bool, bool]:
+        parts = [(row[None, :5], *(row[i : i + 1] for i in range(5, 10))) for row in (value, error)]
+        found = judge_many(parts[0], parts[1], "rubber_ball")  # type: ignore[arg-type]
+        return tuple(found[name][0] for name in ("margin", "conforms", "doubtful"))  # type: ignore[return-value]
+
+    none = np.zeros(10)
+    margin, conforms, doubtful = verdict(middle, none)
+    assert margin == pytest.approx(half[:5].min())
+    assert (conforms, doubtful) == (True, False)
+    for i in (0, 4, 5, 6, 9):
+        one = np.eye(10)[i]
+        for side in (-1, 1):
+            inside, outside = (middle + side * r * half * one for r in (0.9, 1.1))
+            # An error of less than a tenth of the half width, and one of more.
+            for r, doubt in ((0.09, False), (0.11, True)):
+                error = r * half * one
+                assert verdict(inside, error)[1:] == (True, doubt)
+                assert verdict(outside, error)[1:] == (False, doubt)
+    # A set that fails for sure in another criterion is in no doubt.
+    failed = middle + 2 * half * np.eye(10)[6] + 0.9 * half * np.eye(10)[0]
+    assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
+
+
+def test_range_of_a_surrogate_counts_doubtful_sets_twice() -> None:
+    dataset = xr.Dataset(
+        {"conforms": ("set", [True, True, True, False, False, False, False, False]),
+         "doubtful": ("set", [True, False, False, True, True, False, False, False])}
+    )  # fmt: skip
+    found = Uncertainty(dataset, np.empty((8, 5)), "rubber_ball", 3, 8, 0)
+    assert found.surrogate_range == (2 / 8, 5 / 8)
+    assert found.probability == 3 / 8
+    assert found.standard_error == pytest.approx(math.sqrt(3 / 8 * 5 / 8 / 8))
+
+
+def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
+    criteria = thud.judge(np.zeros(5), 0, 0, 0, 0, 0).criteria[:5]
+    draw = np.random.default_rng(3)
+    levels = np.array([(c.lower + c.upper) / 2 for c in criteria]) + draw.normal(0, 2, (200, 5))
+    # Limits are allowed values.
+    levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
+    found = Uncertainty(xr.Dataset(), levels, "rubber_ball", 50, 200, 0)
+    for row, level, one in zip(found.table()[1:6], levels.T, criteria, strict=True):
+        ordered = np.sort(level)
+        low, high = (ordered[int(p * 199)] + (p * 199) % 1 * (ordered[int(p * 199) + 1]
+                     - ordered[int(p * 199)]) for p in (0.025, 0.975))  # fmt: skip
+        deviation = math.sqrt(((level - level.mean()) ** 2).sum() / 199)
+        share = sum(one.lower <= v <= one.upper for v in level) / 200
+        assert row[1:] == (
+            f"{level.mean():.2f}", f"{deviation:.2f}", f"{low:.2f} to {high:.2f}",
+            f"{100 * share:.1f} %",
+        )  # fmt: skip
+
+
+def test_best_place_of_a_map_is_shown_in_its_unit() -> None:
+    study = {
+        "parameters": {
+            "height": {"values": [90, 100, 110], "unit": "cm"},
+            "mass": {"values": [2.6, 2.4]},
+        }
+    }
+    found = thud.design_map(study)
+    margin = found.dataset["margin"].values
+    rows = dict(found.table())
+    i, j = np.unravel_index(margin.argmax(), margin.shape)
+    assert rows["sets"] == "6"
+    assert float(rows["largest margin, dB"]) == pytest.approx(margin.max(), abs=0.006)
+    assert float(rows["  at height, cm"]) == pytest.approx([90, 100, 110][i])
+    assert float(rows["  at mass, kg"]) == [2.4, 2.6][j]
+    assert int(rows["octave levels conform"]) == (margin >= 0).sum()
+    assert int(rows["all criteria conform"]) == found.dataset["conforms"].sum()
+    # Of a room, the lowest rating.
+    rating = xr.zeros_like(found.dataset["margin"]) + np.arange(6.0).reshape(3, 2)[::-1]
+    dataset = found.dataset.assign(standardised_rating=rating)
+    rows = dict(DesignMap(dataset, found.axes, None, "case").table())
+    assert (rows["  at height, cm"], rows["  at mass, kg"]) == ("110", "2.4")
+
+
+@pytest.mark.parametrize(
+    ("fixed", "parameters", "expected"),
+    [
+        ({}, {"mass": [2.4, 2.6], "height": [0.9, 1.1]}, ((2.5, 1.0), True)),
+        # On the edge, and beyond it.
+        ({}, {"mass": [2.5, 2.6], "height": [0.9, 1.0]}, ((2.5, 1.0), True)),
+        ({}, {"mass": [2.51, 2.6], "height": [0.9, 1.1]}, (None, True)),
+        ({"youngs_modulus": 2e6}, {"mass": [2.4, 2.6], "height": [0.9, 1.1]}, ((2.5, 1), False)),
+        ({"mass": 2.45}, {"youngs_modulus": [1e6, 2e6], "height": [0.9, 1.1]}, ((1.6e6, 1), False)),
+        ({}, {"density": [1000, 1400], "height": [0.9, 1.1]}, ((1147.4, 1.0), True)),
+        ({"density": 1200}, {"height": [0.9, 1.1], "gravity": [9, 10]}, ((1, 9.81), False)),
+    ],
+)  # fmt: skip
+def test_mark_of_a_map_is_the_ball_of_the_paper_or_the_case(
+    fixed: dict[str, Any],
+    parameters: dict[str, Any],
+    expected: Any,  # noqa: ANN401
+) -> None:
+    given = {"fixed": fixed, "parameters": {n: {"values": v} for n, v in parameters.items()}}
+    place, name = _mark(DESIGN.read_study(given))
+    where, of_paper = expected
+    assert place == (where and pytest.approx(where, rel=1e-3))
+    assert (name == "paper's ball") == of_paper
+
+
+@dataclass(frozen=True)
+class Target:
+    """What `confirmed` takes of a target."""
+
+    case: object
+    misfit: object
+    impact: object
+
+
+@dataclass(frozen=True)
+class Found:
+    """What `confirmed` takes of a fit."""
+
+    targets: tuple[Target, ...]
+    warnings: tuple[str, ...]
+
+
+# What `AnsweredLevels` takes of a comparison with levels.
+MISFIT: dict[str, Any] = {
+    "kind": "floor", "bands": "octave", "known_noise": True, "places": np.array([1, 3]),
+    "extra": ("contact_time", "restitution"), "target": np.array([40.0, 20.0, 0.02, 0.8]),
+    "deviation": np.array([0.1, 0.2, 1e-5, 0.01]),
+}  # fmt: skip
+
+
+class _Answers:
+    """A surrogate with known errors."""
+
+    outputs = {"floor_level": 5, "contact_time": 1, "restitution": 1}  # noqa: RUF012
+
+    @staticmethod
+    def mean_square(name: str) -> np.ndarray:
+        known = {"floor_level": [1e-4, 4e-4, 1e-4, 9e-4, 1e-4], "contact_time": [4e-6]}
+        return np.array(known.get(name, [1e-4]))
+
+
+def test_errors_of_a_surrogate_add_to_the_variances() -> None:
+    found = AnsweredLevels(SimpleNamespace(**MISFIT), _Answers(), thud.Case())  # type: ignore[arg-type]
+    # dB of 20 lg: a relative error of ln 10/20 for each, and one sample of the contact time.
+    relative = np.log(10) / 20
+    expected = np.array([
+        0.02, 0.03, np.hypot(0.02 * 2e-3 * relative, 1 / 44100), 0.8 * 1e-2 * relative,
+    ])  # fmt: skip
+    assert found.model_error == pytest.approx(expected)
+    assert found.deviation == pytest.approx(np.sqrt(MISFIT["deviation"] ** 2 + expected**2))
+    with pytest.raises(thud.InputError, match="elastic_level"):
+        AnsweredLevels(
+            SimpleNamespace(**{**MISFIT, "kind": "elastic"}),  # type: ignore[arg-type]
+            _Answers(), thud.Case(),  # type: ignore[arg-type]
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "start", "expected"),
+    [(0.0, 9.0, 2.0, (1, 3)), (1.5, 9.0, 2.0, (1.5, 3)), (0.0, 2.5, 2.0, (1, 2.5)),
+     (0.0, 9.0, 1.0, None), (0.0, 9.0, 3.0, None), (0.0, 9.0, 4.0, None)],
+)  # fmt: skip
+def test_search_stays_within_the_region(
+    low: float, high: float, start: float, expected: tuple[float, float] | None
+) -> None:
+    from thud.studies.fitting.ranges import Range  # noqa: PLC0415 - for this test only
+
+    blank = dict.fromkeys(Range.__dataclass_fields__)
+    entry = Range(**{**blank, "name": "b", "unit": "m", "low": low, "high": high, "start": start,
+                     "spread": (low, high)})  # type: ignore[arg-type]  # fmt: skip
+    answers = SimpleNamespace(keys=("a", "b"), region=np.array([[0.0, 9.0], [1.0, 3.0]]))
+    if expected is None:
+        with pytest.raises(thud.InputError, match="start"):
+            within_region(entry, answers)  # type: ignore[arg-type]
+    else:
+        found = within_region(entry, answers)  # type: ignore[arg-type]
+        assert (found.low, found.high) == found.spread == expected
+
+
+@pytest.mark.parametrize(
+    ("off", "noise", "count"),
+    [(0.0, True, 1), (0.039, True, 1), (0.041, True, 2), (0.041, False, 1), (0.0, False, 0)],
+)
+def test_result_that_the_surrogate_misses_is_doubted(
+    monkeypatch: pytest.MonkeyPatch,
+    off: float,
+    noise: bool,  # noqa: FBT001 - one of two cases
+    count: int,
+) -> None:
+    """More than four of its standard errors; and its share of the variances, in per cent."""
+    misfit = SimpleNamespace(
+        model_error=np.array([0.01, 0.0, 0.03]), deviation=np.array([0.05, 1.0, 0.1]),
+        known_noise=noise,
+        values=lambda impact: np.array([off, 5.0, 0.0]) if impact == "model" else np.zeros(3),
+    )  # fmt: skip
+    monkeypatch.setattr("thud.studies.emulation.answered_levels.compute", lambda _: "model")
+    target = Target(case=None, misfit=misfit, impact="answer")
+    found = confirmed(Found((target,), ("before",)))  # type: ignore[arg-type]
+    assert found.targets[0].impact == "model"
+    assert found.warnings[0] == "before"
+    assert len(found.warnings) == 1 + count
+    if noise:
+        # (0.03/0.1)**2 is the largest.
+        assert "9 %" in found.warnings[1]
+    if off > 0.04:
+        assert f"{off / 0.01:.2g} " in found.warnings[-1]
+
+
+def answering() -> Surrogate:
+    """Return a surrogate whose weights are 0: it answers the means."""
+    names = {"floor_level": 5, "elastic_level": 5, "contact_time": 1, "restitution": 1}
+    mean = np.array(
+        [39.0, 31, 23, 17, 12.5, 1, 2, 3, 4, 5, 20 * np.log10(0.02), 20 * np.log10(0.8)]
+    )
+    return Surrogate(
+        thud.Case(model=thud.HollowSphere()), ("height", "mass"),
+        np.array([[0.9, 1.1], [2.0, 3.0]]), names, 0.1, 1, {"thud": thud.__version__},
+        np.random.default_rng(1).random((64, 2)), np.ones(2), np.zeros((64, 12)), mean, np.ones(12),
+        np.random.default_rng(2).normal(0, 0.02, (64, 12)),
+    )  # fmt: skip
+
+
+def test_answers_are_the_verdict_of_what_is_predicted() -> None:
+    pytest.importorskip("sklearn", reason="the extra surrogate is not installed")
+    surrogate = answering()
+    case = replace(surrogate.case, levels=thud.Levels(force="floor"))
+    surrogate = replace(surrogate, case=case)
+    height = np.array([1.0, 0.985, 1.2, 0.9, 1.1, 0.9 - 1e-12, 1.1 + 1e-12, 0.9 - 1e-8])
+    found = surrogate.predict(case, {"height": height, "mass": 2.5})
+    assert found["status"].tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
+    good = found["status"] == 0
+    assert found["floor_level"][good] == pytest.approx(np.tile(surrogate.mean[:5], (6, 1)))
+    assert found["contact_time"][good] == pytest.approx(0.02)
+    assert found["restitution"][good] == pytest.approx(0.8)
+    assert found["conforms"].tolist() == [True] + [False] * 7
+    assert [bool(reason) for reason in found["reason"]] == (~good).tolist()
+    assert "height = 1.2" in found["reason"][2]
+    # Errors: sorted magnitudes, at the order statistic.
+    sizes = np.sort(abs(surrogate.residuals), axis=0)
+    below = [
+        sum(math.comb(64, k) * 0.95**k * 0.05 ** (64 - k) for k in range(n + 1)) for n in range(64)
+    ]
+    place = next(n for n, share in enumerate(below) if share >= 0.95)
+    assert surrogate.errors.tolist() == sizes[place].tolist()
+    assert surrogate.error_of("elastic_level").tolist() == sizes[place][5:10].tolist()
+    assert surrogate.mean_square("contact_time") == pytest.approx(
+        (surrogate.residuals[:, 10] ** 2).mean()
+    )
+    judged = [0, 1, 2, 3, 4, 10, 11]
+    worst = judged[int(np.argmax(surrogate.errors[judged]))]
+    assert surrogate.worst == (surrogate.labels[worst], surrogate.errors[worst])
+    # A level at its limit within the error is in doubt, and so is a time by its ratio.
+    limit = thud.judge(np.zeros(5), 0, 0, 0, 0, 0).criteria[5].upper
+    for decibels, doubt in ((0.5, True), (1.5, False)):
+        mean = surrogate.mean.copy()
+        mean[10] = 20 * np.log10(limit) - decibels * surrogate.errors[10]
+        near = replace(surrogate, mean=mean).predict(case, {"height": np.array([1.0])})
+        assert near["doubtful"].tolist() == [doubt]
+    # What exceeds the bound is withheld, and what has it is not.
+    for bound, known in ((surrogate.errors[11], True), (surrogate.errors[11] - 1e-12, False)):
+        one = replace(surrogate, bound=float(bound), residuals=np.where(
+            np.arange(12) == 11, surrogate.residuals, 0.0))  # fmt: skip
+        answer = one.predict(case, {"height": np.array([1.0])})["restitution"]
+        assert np.isfinite(answer).all() == known
+        assert one.withheld == ([] if known else ["restitution"])
