@@ -212,7 +212,7 @@ def test_small_forces_have_three_digits() -> None:
 
 def test_drops_of_different_speeds_are_refused_and_others_named() -> None:
     low = thud.Case(drop=thud.Drop(0.9), model=thud.HollowSphere())
-    with pytest.raises(thud.InputError, match="&drop: height or gravity differs"):
+    with pytest.raises(thud.InputError, match=naming("&drop: height", "gravity")):
         thud.compare([thud.solve(), low])
     # The same speed by another height.
     same = thud.Case(drop=thud.Drop(0.5, 2 * 9.81), model=thud.HollowSphere(), name="heavy")

@@ -164,7 +164,7 @@ def test_fewest_points_leave_something_to_two_parameters(
 ) -> None:
     some = np.linspace(3, 43, count).astype(int)
     if count < 5:
-        with pytest.raises(thud.InputError, match="at least 5"):
+        with pytest.raises(thud.InputError, match=naming("deflection", 5)):
             thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)
     else:
         fit = thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)

@@ -162,15 +162,15 @@ def test_invalid_sets_are_marked_and_leave_the_others() -> None:
     bad = [3, 7, 9, 11, 13, 15]
     assert ensemble.status[bad].tolist() == [1, 1, 2, 2, 1, 1]
     expected = (
-        "&ball: outer_radius = -1.0 is not allowed",
-        "&ball: wall_thickness = 1.0 is not allowed",
-        "closes the shell",
-        "substeps is too low for this source",
-        "&sampling: duration = 0.05 s ends",
-        "&ball: poisson_ratio = Infinity is not allowed",
+        naming("&ball: outer_radius", -1.0),
+        naming("&ball: wall_thickness", 1.0),
+        naming("&drop: height"),
+        naming("&sampling: substeps"),
+        naming("&sampling: duration", "0.05 s"),
+        naming("&ball: poisson_ratio", "Infinity"),
     )
     for place, words in zip(bad, expected, strict=True):
-        assert words in ensemble.reason[place]
+        assert re.search(words, ensemble.reason[place])
     assert set(np.delete(ensemble.reason, bad)) == {""}
     assert np.isnan(ensemble.contact_time[bad]).all()
     assert np.isnan(ensemble.elastic_octaves[bad]).all()
@@ -463,10 +463,10 @@ def test_keywords_replace_those_of_the_case() -> None:
     assert thud.solve_many({}, case, model="hollow_sphere").case.model == case.model
     assert thud.solve_many({}, case, model="modal_ball").case.model == thud.ModalBall()
     assert thud.solve_many({}).case.model == thud.HollowSphere()
-    with pytest.raises(thud.InputError, match="'source' is given twice"):
+    with pytest.raises(thud.InputError, match=naming("'source'")):
         thud.solve_many({"source": ["tyre"]}, source="tyre")
     for threads in (0, 1025):
-        with pytest.raises(thud.InputError, match="threads"):
+        with pytest.raises(thud.InputError, match=naming("threads", threads, 1, 1024)):
             thud.solve_many({}, threads=threads)
     assert thud.solve_many({}, threads=1024).status.tolist() == [0]
 

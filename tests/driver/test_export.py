@@ -221,14 +221,14 @@ def test_recording_is_not_replaced_by_its_force(tmp_path: Path) -> None:
     (tmp_path / "link.csv").symlink_to(path)
     force = blocked_force(thud.read_recording(path))
     for name in ("drop.csv", "link.csv"):
-        with pytest.raises(thud.InputError, match="is the recording of the force"):
+        with pytest.raises(thud.InputError, match=naming(name, "recording")):
             export_force.export_csv(force, tmp_path / name)
     assert path.read_bytes() == before
     # A path that its user names is replaced, the text beside it only where thud has written it.
     export_force.export_wav(force, tmp_path / "a.wav")
     export_force.export_wav(force, tmp_path / "a.wav")
     (tmp_path / "b.wav.txt").write_text("mine")
-    with pytest.raises(thud.InputError, match=r"b\.wav\.txt is in the way"):
+    with pytest.raises(thud.InputError, match=naming("b.wav.txt")):
         export_force.export_wav(force, tmp_path / "b.wav")
     assert (tmp_path / "b.wav.txt").read_text() == "mine"
 

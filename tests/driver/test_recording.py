@@ -187,7 +187,6 @@ def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None
         read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
     assert "plate.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert str(caught.value).count("allowed:") == 1
 
 
 def test_missing_record_is_told(tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def test_rooms_that_cannot_be_are_refused(time: float, volume: float) -> None:
     name = "volume" if time > 0 else "reverberation_time"
     with pytest.raises(thud.InputError, match=naming(name, 0)):
         thud.standardised_level([60.0], time, volume)
-    with pytest.raises(thud.InputError, match=f"reverberation_time = {min(time, 0.4):g}|volume ="):
+    with pytest.raises(thud.InputError, match=naming(name, 0)):
         thud.standardised_level([60.0, 61.0], [0.4, time], volume)
 
 
@@ -282,14 +282,14 @@ def test_rows_of_a_table_may_have_any_order_and_further_bands(tmp_path: Path) ->
         # Titles within 3 % of a mid frequency mean it.
         ("61.2,60\n128,60\n250,60\n500,60\n", ""),
         ("64.8,60\n122,60\n250,60\n500,60\n", ""),
-        ("61,60\n125,60\n250,60\n500,60\n", "frequency = 61 Hz"),
+        ("61,60\n125,60\n250,60\n500,60\n", naming("frequency", "61 Hz")),
         ("1,60\n63,60\n125,60\n250,60\n500,60\n", ""),
         ("63,60\n125,60\n250,60\n500,60\n99000,60\n", ""),
-        ("0.99,60\n63,60\n125,60\n250,60\n500,60\n", "frequency = 0.99 Hz"),
-        ("63,60\n125,60\n250,60\n500,60\n100000,60\n", "frequency = 100000 Hz"),
+        ("0.99,60\n63,60\n125,60\n250,60\n500,60\n", naming("frequency", "0.99 Hz")),
+        ("63,60\n125,60\n250,60\n500,60\n100000,60\n", naming("frequency", "100000 Hz")),
         ("63,200\n125,-50\n250,60\n500,60\n", ""),
-        ("63,200.1\n125,60\n250,60\n500,60\n", "level = 200.1 dB"),
-        ("63,60\n125,-50.1\n250,60\n500,60\n", "level = -50.1 dB"),
+        ("63,200.1\n125,60\n250,60\n500,60\n", naming("level", "200.1 dB")),
+        ("63,60\n125,-50.1\n250,60\n500,60\n", naming("level", "-50.1 dB")),
     ],
 )
 def test_bounds_of_a_table_are_those_that_are_stated(tmp_path: Path, rows: str, words: str) -> None:
@@ -304,7 +304,7 @@ def test_bounds_of_a_table_are_those_that_are_stated(tmp_path: Path, rows: str, 
 @pytest.mark.parametrize(
     ("column", "words"),
     [
-        ("T", "reverberation_time = 0.009 s"),
+        ("T", naming("reverberation_time", "0.009 s")),
         ("background", ""),
     ],
 )
