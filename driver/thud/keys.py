@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
-from functools import cache
+from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -48,7 +48,7 @@ def users(case: Case) -> tuple[str, ...]:
     return tuple(filter(None, found))
 
 
-@cache
+@lru_cache
 def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
     """Return the keys in which sets may differ, by name; see `users`.
 

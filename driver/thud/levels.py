@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, cast, get_args
 
 import numpy as np
@@ -85,7 +85,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
     return _bands(bands)
 
 
-@cache
+@lru_cache
 def _bands(name: str) -> Bands:
     """Return the bands of a name."""
     (n_band,) = call_direct(level_api.count_bands, name)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 import thud
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 # Jobs in the background of a shell ignore interrupts, and so would all that they start.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Tests draw the same examples in each run.
+settings.register_profile("thud", derandomize=True)
+settings.load_profile("thud")
 
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))

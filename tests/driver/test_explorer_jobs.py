@@ -82,6 +82,12 @@ def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPa
     assert not workers()
 
 
+def kill(pid: int) -> None:
+    """Kill a child; return once it has ended, as until then it counts as running."""
+    os.kill(pid, signal.SIGKILL)
+    os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+
+
 def test_lost_server_of_forks_is_a_sentence_and_begins_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -90,7 +96,7 @@ def test_lost_server_of_forks_is_a_sentence_and_begins_again(
         with monkeypatch.context() as patch:
             # As where it is killed after it was found to run.
             patch.setattr(forks, "ensure_running", lambda: None)
-            os.kill(vars(forks)["_forkserver_pid"], signal.SIGKILL)
+            kill(vars(forks)["_forkserver_pid"])
             assert (await reports_of(jobs))[-1]["error"]
         assert "answer" in (await reports_of(jobs))[-1]
 

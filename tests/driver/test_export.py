@@ -225,11 +225,11 @@ def test_recording_is_not_replaced_by_its_force(tmp_path: Path) -> None:
             export_force.export_csv(force, tmp_path / name)
     assert path.read_bytes() == before
     # A path that its user names is replaced, the text beside it only where thud has written it.
-    export_force.export_wav(force, tmp_path / "a.wav")
-    export_force.export_wav(force, tmp_path / "a.wav")
+    export_force.export_wav(FORCE, tmp_path / "a.wav")
+    export_force.export_wav(FORCE, tmp_path / "a.wav")
     (tmp_path / "b.wav.txt").write_text("mine")
     with pytest.raises(thud.InputError, match=naming("b.wav.txt")):
-        export_force.export_wav(force, tmp_path / "b.wav")
+        export_force.export_wav(FORCE, tmp_path / "b.wav")
     assert (tmp_path / "b.wav.txt").read_text() == "mine"
 
 

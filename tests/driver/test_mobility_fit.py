@@ -373,7 +373,7 @@ def test_number_of_poles_has_the_least_information_criterion(
         return SimpleNamespace(order=order, error=errors.get(order, 0.0799))
 
     monkeypatch.setattr(mobility_fit, "_fit", fit)
-    for n_line in (20, 40, 100, 400):
+    for n_line in (20, 25, 40, 100, 400):
         tried.clear()
         found = mobility_fit._chosen("a", np.arange(1.0, n_line + 1), np.ones(n_line, complex))  # noqa: SLF001
         count = 2 * n_line

@@ -187,6 +187,7 @@ def test_random_positions_keep_their_distance_and_are_the_same_again(impact: thu
         ({"balls": [[1.0, 9.0]]}, naming("balls", 9.0, 0, 4.5)),
         ({"microphones": [[1.0, 1.0]]}, naming("microphones", "(1, 2)")),
         ({"seed": -1}, naming("seed", -1)),
+        ({"seed": 2**32}, naming("seed", 2**32)),
         ({"floor": thud.Oscillator()}, naming("&floor: name", "plate")),
         (
             {"floor": thud.Plate(thickness=2.0, length=0.5, width=0.5)},
@@ -269,6 +270,10 @@ def test_positions_of_small_rooms_keep_a_quarter_of_the_side() -> None:
     for places in (np.zeros((0, 3)), np.zeros((1001, 3)), np.zeros((1, 2))):
         with pytest.raises(thud.InputError, match=naming("a", places.shape)):
             module._positions("a", places, sides, draw)  # noqa: SLF001
+
+
+def test_seeds_are_those_of_32_bits() -> None:
+    assert module._seed(2**32 - 1) == 2**32 - 1  # noqa: SLF001
 
 
 def test_each_mode_of_the_room_decays_as_the_nearest_third(found: thud.ModalRoom) -> None:

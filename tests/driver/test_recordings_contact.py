@@ -324,15 +324,18 @@ def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
     assert found.quiet == pytest.approx((0.1, 0.1), abs=1e-3)
 
 
-def test_peak_of_a_pulse_is_above_the_line_between_the_quiet_beside_it() -> None:
+@pytest.mark.parametrize("ahead", ["pulse", "step"])
+def test_peak_of_a_pulse_is_above_the_line_between_the_quiet_beside_it(ahead: str) -> None:
     cells = np.zeros(300)
     rise = np.arange(24)
     pulse = np.sin(np.pi * rise / 24) ** 2 * (1 + 0.3 * np.cos(np.pi * rise / 24))
     cells[100:124] += 1000 * pulse
-    # The quiet behind lies 60 N higher, that of another pulse before it does not count.
+    # The quiet behind lies 60 N higher; what is before another pulse, or 20 ms away, is not beside.
     cells += np.interp(np.arange(300), [105, 117], [0, 60])
-    cells[60:80] += 800 * np.sin(np.pi * np.arange(20) / 20)
-    (_, found) = drops._pulses(cells, 0, 1000.0)  # noqa: SLF001
+    cells[:70] -= 50
+    if ahead == "pulse":
+        cells[60:80] += 800 * np.sin(np.pi * np.arange(20) / 20)
+    *_, found = drops._pulses(cells, 0, 1000.0)  # noqa: SLF001
     smooth = uniform_filter1d(cells, 3)
     top = np.argmax(smooth)
     half = np.flatnonzero(smooth > smooth[top] / 2)

@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import re
 from graphlib import CycleError, TopologicalSorter
+from inspect import signature
 from pathlib import Path
+from pkgutil import walk_packages
 
+import numpy as np
 import pytest
+
+import thud
+from thud.recordings.flanks import _table
 
 REPOSITORY = Path(__file__).parents[2]
 SOURCES = REPOSITORY / "src"
@@ -256,3 +263,20 @@ def test_procedures_are_counted_with_those_inside() -> None:
         f"subroutine s(a)\ncontains\n{inner}end subroutine s\nreal(wp) function g()\nend function"
     )
     assert procedures(text) == [("f", 2), ("s", 5), ("g", 2)]
+
+
+def test_caches_of_functions_with_arguments_are_bounded() -> None:
+    found = 0
+    for module in walk_packages(thud.__path__, "thud."):
+        if module.name == "thud.__main__":
+            continue
+        for name, function in vars(importlib.import_module(module.name)).items():
+            if hasattr(function, "cache_parameters") and signature(function).parameters:
+                found += 1
+                assert function.cache_parameters()["maxsize"], f"{module.name}.{name}"
+    assert found
+
+
+def test_tables_of_flanks_are_kept_for_few_rates() -> None:
+    sizes = [_table(1 / rate, None).nbytes for rate in np.linspace(8.0, 64.0, 8)]
+    assert _table.cache_info().currsize * max(sizes) <= 12e6

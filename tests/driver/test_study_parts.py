@@ -155,6 +155,10 @@ def test_sets_of_saltelli_exchange_one_column_each() -> None:
     """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
     points = designs.unit_sets("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
     first, second = points[:, 0], points[:, 4]
+    for matrix in (first, second):
+        # A point in each of eight strata.
+        strata = np.sort((8 * matrix).astype(int), axis=0)
+        np.testing.assert_array_equal(strata, np.arange(8)[:, None].repeat(3, axis=1))
     for j in range(3):
         mixed = np.where(np.arange(3) == j, second, first)
         np.testing.assert_array_equal(points[:, 1 + j], mixed)

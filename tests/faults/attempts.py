@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import os
 import queue
-import random
 import resource
 import signal
 import subprocess
@@ -17,63 +16,76 @@ import tempfile
 import threading
 import traceback
 import warnings
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
-from campaign import Finding
+from campaign import Finding, draw
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Iterable, Iterator
 
-# Seconds that an attempt may take; then it is interrupted, and hangs if it then goes on.
-PATIENCE = 20
+    from campaign import Part
+
+# Seconds for imports, and for the end of an attempt that was interrupted.
+PATIENCE = 60
 # Address space, bytes, and bytes by which memory may grow: what a header claims must not be taken.
 SPACE, GROWTH = 4 * 2**30, 400 * 2**20
 SANITIZED = "libasan" in os.environ.get("LD_PRELOAD", "")
+# Names of what parts keep in the directory of temporary files.
+KEPT = "thud_faults_"
+SEEDS = "seeds"
 
 
-def attempts(part: str) -> Callable[[list[tuple[int, random.Random]], Path], Iterable[Finding]]:
-    """Return the check that lets the module of a part make its attempts in another process."""
-
-    def check(tries: list[tuple[int, random.Random]], _: Path) -> Iterator[Finding]:
-        seeds = [chance.getrandbits(63) for _, chance in tries]
-        while seeds:
-            found = list(_watch(part, seeds))
-            yield from found
-            seeds = seeds[len(found) :]
-
-    return check
+def find(name: str, part: Part, seeds: list[int]) -> Iterator[Finding]:
+    """Yield what becomes of the attempts of a part, in other processes."""
+    while seeds:
+        with tempfile.TemporaryDirectory(prefix=KEPT, ignore_cleanup_errors=True) as folder:
+            found = 0
+            for one in _watch(name, part, seeds, Path(folder)):
+                found += 1
+                yield one
+            seeds = seeds[found:]
 
 
-def _watch(part: str, seeds: list[int]) -> Iterator[Finding]:
-    """Yield the findings of a process, with a last one of the attempt that it ended with."""
-    with tempfile.TemporaryFile() as said, _process(part, said.fileno()) as worker:
-        assert worker.stdin
-        assert worker.stdout
-        lines: queue.Queue[str] = queue.Queue()
-        threading.Thread(target=_forward, args=(worker.stdout, lines), daemon=True).start()
-        worker.stdin.write(json.dumps(seeds))
-        worker.stdin.close()
-        # Before the first come the imports.
-        for seed, patience in zip(seeds, (3 * PATIENCE, *[PATIENCE] * len(seeds)), strict=False):
-            line = _next_line(worker, lines, patience)
-            if line is None or not line:
-                worker.kill()
+def _watch(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[Finding]:
+    """Yield the findings of a process, the last one of the attempt that it ended with."""
+    (folder / SEEDS).write_text(json.dumps(seeds))
+    with tempfile.TemporaryFile() as said, _process(name, folder, said) as (worker, lines):
+        for place in range(len(seeds)):
+            line = _next_line(worker, lines, part.limit if place else part.limit + PATIENCE)
+            if line:
+                found = Finding(*json.loads(line))
+            else:
                 said.seek(0)
                 last = " ".join(said.read()[-2000:].decode(errors="replace").split())
                 word = "hung" if line is None else "crashed"
-                yield Finding(word, f"seed {seed}: {worker.wait()}: {last}")
+                found = Finding(word, f"{worker.poll()}: {last}")
+            yield found
+            # What a hung attempt has started must not stay.
+            if not line or found.word == "hung":
                 return
-            word, detail = json.loads(line)
-            yield Finding(word, f"seed {seed}: {detail}")
 
 
-def _process(part: str, errors: int) -> subprocess.Popen[str]:
-    command = [sys.executable, __file__, part]
-    pipe = subprocess.PIPE
-    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=errors, text=True)
+@contextmanager
+def _process(
+    name: str, folder: Path, said: IO[bytes]
+) -> Iterator[tuple[subprocess.Popen[str], queue.Queue[str]]]:
+    """Start a process that attempts, and end it with all that it has started."""
+    command = [sys.executable, __file__, name, "--work", str(folder)]
+    lines: queue.Queue[str] = queue.Queue()
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=said, text=True, start_new_session=True
+    ) as worker:
+        thread = threading.Thread(target=_forward, args=(worker.stdout, lines))
+        thread.start()
+        try:
+            yield worker, lines
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(worker.pid, signal.SIGKILL)
+            thread.join()
 
 
 def _forward(source: Iterable[str], lines: queue.Queue[str]) -> None:
@@ -84,81 +96,114 @@ def _forward(source: Iterable[str], lines: queue.Queue[str]) -> None:
 
 def _next_line(worker: subprocess.Popen[str], lines: queue.Queue[str], patience: int) -> str | None:
     """Return a line, empty where the process has ended, None where it hangs."""
-    for seconds in (patience, 3 * PATIENCE):
+    for seconds in (patience, PATIENCE):
         with suppress(queue.Empty):
             return lines.get(timeout=seconds)
         worker.send_signal(signal.SIGINT)
     return None
 
 
-def _handles() -> set[str]:
-    """Return the open files."""
+def _observe(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[Finding]:
+    """Make attempts in this process; yield a finding of each and of what it leaves."""
+    for path in ("here", "work", "temporary"):
+        (folder / path).mkdir()
+    os.chdir(folder / "here")
+    tempfile.tempdir = os.environ["TMPDIR"] = str(folder / "temporary")
+    warnings.simplefilter("ignore")
+    handles = usual = None
+    silent = os.fstat(2).st_size
+    for word, detail in _make(name, part, seeds, folder / "work"):
+        found = Finding(word, detail)
+        if os.fstat(2).st_size > silent:
+            found = Finding("raw", f"prints {os.pread(2, 500, silent)!r}; {word}: {detail}")
+        serves = _has_children()
+        left = [path.name for path in Path().iterdir()]
+        if not serves:
+            left += [
+                path.name for path in Path(tempfile.tempdir).iterdir() if KEPT not in path.name
+            ]
+        open_now, memory = _handles(files_only=serves), _memory()
+        # The first attempt imports what it needs.
+        left += open_now - handles if handles is not None else ()
+        if left:
+            found = Finding("left behind", f"{left}; {word}: {detail}")
+        if usual is not None and memory > usual + GROWTH and not SANITIZED:
+            found = Finding("grown", f"{(memory - usual) / 2**20:.0f} MiB; {word}: {detail}")
+        handles, usual, silent = open_now, max(memory, usual or memory), os.fstat(2).st_size
+        yield found
+
+
+def _make(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[Finding]:
+    """Yield a finding of each attempt; one that does not end well is the last of its share."""
+    while seeds:
+        share, made = seeds[: part.share], 0
+        try:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            for found in part.check([draw(name, seed) for seed in share], folder):
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                made += 1
+                yield found
+                signal.signal(signal.SIGINT, signal.default_int_handler)
+            assert made == len(share), f"{made} findings of {len(share)} tries"
+        except (KeyboardInterrupt, subprocess.TimeoutExpired) as late:
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            may_stop = part.may_stop and isinstance(late, KeyboardInterrupt)
+            made += 1
+            yield Finding("stopped" if may_stop else "hung", traceback.format_exc())
+        except Exception:  # noqa: BLE001 - that is the question
+            signal.signal(signal.SIGINT, signal.SIG_IGN)
+            made += 1
+            yield Finding("crashed", traceback.format_exc())
+        seeds = seeds[made:]
+
+
+def _has_children() -> bool:
+    """Return whether processes run that a part keeps: pipes and temporary files may be theirs."""
+    return any(path.read_text() for path in Path("/proc/self/task").glob("*/children"))
+
+
+def _handles(*, files_only: bool) -> set[str]:
+    """Return the open files, and all other descriptors."""
     found = set()
-    for one in Path("/proc/self/fd").iterdir():
+    for handle in Path("/proc/self/fd").iterdir():
         with suppress(OSError):
-            found.add(f"{one.name} {one.readlink()}")
-    return {one for one in found if "/proc/" not in one}
+            target = str(handle.readlink())
+            if "/proc/" not in target and (target.startswith("/") or not files_only):
+                found.add(f"{handle.name} {target}")
+    return found
 
 
 def _memory() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-def _work(part: str) -> None:
-    """Make the attempts whose seeds the standard input gives; print word and detail of each."""
-    warnings.simplefilter("ignore")
+def _work(name: str, part: Part, folder: Path) -> None:
+    """Make the attempts of the seeds in a directory; print word and detail of each."""
     answers = os.fdopen(os.dup(1), "w")
     # Whatever else is printed goes to the same file as errors, which must not grow.
     os.dup2(2, 1)
-    attempt = import_module(part).attempt
     if SANITIZED:
         core = Path(import_module("thud._core").__file__ or "")
         assert b"__asan_init" in core.read_bytes(), f"{core} has no sanitizer"
     else:
         resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
-    handles = usual = None
-    for seed in json.loads(sys.stdin.read()):
-        silent = os.fstat(2).st_size
-        word, detail = _made(attempt, seed)
-        if os.fstat(2).st_size > silent:
-            word, detail = "raw", f"prints {os.pread(2, 500, silent)!r}; {word}: {detail}"
-        left = [path.name for path in Path().iterdir()]
-        if left:
-            word, detail = "left behind", f"{left}"
-        open_now, memory = _handles(), _memory()
-        # The first attempt imports what it needs.
-        if handles is not None and (more := open_now - handles):
-            word, detail = "left behind", f"{more}"
-        if usual is not None and memory > usual + GROWTH and not SANITIZED:
-            word, detail = "grown", f"{(memory - usual) / 2**20:.0f} MiB; {word}: {detail}"
-        handles, usual = open_now, max(memory, usual or memory)
-        answers.write(json.dumps([word, detail]) + "\n")
+    for found in _observe(name, part, json.loads((folder / SEEDS).read_text()), folder):
+        answers.write(json.dumps(found) + "\n")
         answers.flush()
-
-
-def _made(attempt: Callable[[random.Random], tuple[str, str]], seed: int) -> tuple[str, str]:
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        return attempt(random.Random(seed))  # noqa: S311
-    except KeyboardInterrupt:
-        return "stopped", ""
-    except Exception:  # noqa: BLE001 - that is the question
-        return "crashed", traceback.format_exc()
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def main() -> None:
     """Work, or make one attempt again."""
-    with tempfile.TemporaryDirectory(prefix="thud_faults_", dir="/dev/shm") as place:
-        os.chdir(place)
-        if len(sys.argv) > 2:
-            sys.stdout.write(
-                "{}: {}\n".format(*_made(import_module(sys.argv[1]).attempt, int(sys.argv[2])))
-            )
-        else:
-            _work(sys.argv[1])
-        os.chdir("/")
+    from run import parts  # noqa: PLC0415 - that imports this module
+
+    name, *rest = sys.argv[1:]
+    part = parts()[name]
+    if rest[0] == "--work":
+        _work(name, part, Path(rest[1]))
+        return
+    # Twice, as the first attempt imports what it needs.
+    for found in find(name, part, [int(rest[0])] * 2):
+        sys.stdout.write("{}: {}\n".format(*found))
 
 
 if __name__ == "__main__":

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import atexit
 import signal
 import socket
-import subprocess
-import sys
 import time
 from contextlib import suppress
-from functools import cache
 from threading import Event, Thread, Timer
 from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import urlsplit
 
 import psutil
-from campaign import Finding
 from forks import Order, forks
-from kills import judge_again, judge_end, judge_files, prepare
-from scenarios import CLUSTER, NEW, SCENARIOS
+from kills import judge, prepare
+from scenarios import NEW, SCENARIOS, cluster
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Callable, Iterable
     from pathlib import Path
+
+    from campaign import Finding, Tries
+    from scenarios import Cluster
 
 HOST = "127.0.0.1"
 # Time in which a study without trouble ends, s.
@@ -82,43 +79,6 @@ class Connection:
             one.close()
 
 
-class Cluster(NamedTuple):
-    """A scheduler, its process, which restarts two workers, and its port."""
-
-    process: psutil.Popen
-    port: int
-
-    def workers(self) -> list[psutil.Process]:
-        """Return the processes that compute."""
-        found = []
-        for one in self.process.children():
-            with suppress(psutil.NoSuchProcess):
-                if "spawn_main" in " ".join(one.cmdline()):
-                    found.append(one)
-        return found
-
-    def end(self) -> None:
-        """End all processes."""
-        with suppress(psutil.NoSuchProcess):
-            for one in (*self.process.children(recursive=True), self.process):
-                with suppress(psutil.NoSuchProcess):
-                    one.kill()
-            self.process.wait()
-
-
-@cache
-def cluster() -> Cluster:
-    """Return a cluster that ends with this process, at the latest."""
-    process = psutil.Popen(
-        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    port = urlsplit(process.stdout.readline().strip()).port
-    assert port
-    found = Cluster(process, port)
-    atexit.register(found.end)
-    return found
-
-
 def _send(processes: Iterable[psutil.Process], number: int) -> int:
     """Send a signal; return how many were there."""
     hit = 0
@@ -150,7 +110,7 @@ TROUBLES = {
 }
 
 
-def check_clusters(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_clusters(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Let a study on a scheduler meet trouble, then go on with it in threads."""
     place = folder / "cluster"
     for number, chance in tries:
@@ -159,7 +119,7 @@ def check_clusters(tries: list[tuple[int, random.Random]], folder: Path) -> Iter
         prepare(place, "sweep", old=old)
         while len(cluster().workers()) < WORKERS:
             time.sleep(0.1)
-        way = Connection(cluster().port)
+        way = Connection(urlsplit(cluster().address).port or 0)
         hit: list[object] = []
         timer = Timer(delay, lambda: hit.append(trouble.strike(cluster(), way)))  # noqa: B023 - joined below
         timer.start()
@@ -171,13 +131,5 @@ def check_clusters(tries: list[tuple[int, random.Random]], folder: Path) -> Iter
         if not trouble.harmless:
             cluster().end()
             cluster.cache_clear()
-        word = judge_end(done)
-        last = (done.said.splitlines() or [""])[-1]
-        if done.code and not last.startswith("thud-driver: "):
-            word = word or "crashed: no sentence"
-        word = word or judge_files("sweep", place, old=old, done=done.code == 0)
-        again = forks().run(Order(SCENARIOS["sweep"].given(NEW), str(place)))
-        word, _, what = (word or judge_again("sweep", place, again, old=old)).partition(": ")
-        detail = f"{name} after {delay:.2f} s, old {old}: {done}, {again}, {what}"
-        how = "refused" if done.code else "done" if hit and hit[0] else "over before"
-        yield Finding(word or f"{name}, {how}", detail)
+        when = f"after {delay:.2f} s" if hit and hit[0] else "too late"
+        yield judge("sweep", place, done, f"{name} {when}", old=old)

@@ -6,7 +6,6 @@ import os
 import shutil
 import subprocess
 import time
-import warnings
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
@@ -14,7 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from campaign import Finding
-from injection import ERRORS, KILLS, PATIENCE, executable, library, run
+from forks import Order, fail, forks
+from injection import ERRORS, KILLS, PATIENCE, executable, library
 
 import thud
 from thud.files import Results
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Iterable, Iterator
 
-    Tries = list[tuple[int, random.Random]]
+    from campaign import Tries
+
 
 INPUTS = {
     "a": "&case name = 'case' / &ball / &drop / &model /",
@@ -43,6 +44,10 @@ class Place(NamedTuple):
     where: Path
     arguments: list[str]
 
+    def order(self, new: str) -> Order:
+        """Return the command that writes the results of an input there."""
+        return Order(["thud", f"{self.out.parent}/{new}.nml", *self.arguments], str(self.where))
+
 
 @cache
 def whole_sets() -> dict[str, dict[str, bytes]]:
@@ -58,9 +63,13 @@ def whole_sets() -> dict[str, dict[str, bytes]]:
     return found
 
 
-def files_of(folder: Path) -> dict[str, bytes]:
-    """Return the contents of the files of a directory by name."""
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+def files_of(folder: Path, pattern: str = "*") -> dict[str, bytes]:
+    """Return the contents of the files of a directory by their paths in it."""
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in folder.glob(pattern)
+        if path.is_file()
+    }
 
 
 def owner_of(found: dict[str, bytes]) -> str | None:
@@ -96,8 +105,7 @@ def plan() -> list[tuple[str, str, str, str, int]]:
     for way in ("exchanged", "moved"):
         for old, new in ("ab", "ba", "aa"):
             place = made(folder / "o", old, way)
-            counted = run([f"{folder}/o/{new}.nml", *place.arguments], place.where)
-            calls = len(counted.calls)
+            calls = len(fail(place.order(new), 0, "")[1])
             tries += [
                 (way, old, new, action, at + 1)
                 for action in (*KILLS, *ERRORS)
@@ -112,17 +120,16 @@ def check_calls(tries: Tries, folder: Path) -> Iterable[Finding]:
     for number, _ in tries:
         way, old, new, action, at = plan()[number]
         place = made(folder / "calls", old, way)
-        command = [f"{folder}/calls/{new}.nml", *place.arguments]
-        done = run(command, place.where, at, action)
-        call = done.calls[at - 1]
+        done, calls = fail(place.order(new), at, action)
+        call = calls[at - 1]
         # Where the call is of the screen, the results are there and their remarks are not.
-        written = done.code == 0 or "are written" in done.said or " pipe:" in call
+        written = done.code == 0 or "are written" in done.said or "(deleted)" in call
         if done.code not in (0, 1, 2, -9, 130, 143):
             word = "crashed"
         else:
             expected = (old, new) if done.code == -9 else (new if written else old,)
             word = _judged(place, old, expected)
-        word = word or _healed(place, new, command) or ("replaced" if written else "kept")
+        word = word or _healed(place, new) or ("replaced" if written else "kept")
         yield Finding(word, f"{way} {old} to {new}, {action} at {call}: {done.code}, {done.said}")
 
 
@@ -140,18 +147,12 @@ def _judged(place: Place, old: str, expected: tuple[str, ...]) -> str:
     return "mixed" if (FIGURE in found) != (owner == old) else ""
 
 
-def _healed(place: Place, new: str, command: list[str]) -> str:
+def _healed(place: Place, new: str) -> str:
     """Return the fault after another run without a fault, if any."""
-    done = subprocess.run(
-        [executable(), *command],
-        cwd=place.where,
-        capture_output=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+    done = forks().run(place.order(new))
     left = [path for path in (*place.out.iterdir(), *place.out.parent.iterdir())
             if path.name.endswith(".part")]  # fmt: skip
-    if done.returncode or left or owner_of(files_of(place.out)) != new:
+    if done.code or left or owner_of(files_of(place.out)) != new:
         return "lost"
     return "" if _readable(place.out) else "mixed"
 
@@ -211,25 +212,14 @@ def _won(place: Path, codes: tuple[int, int], cases: int) -> str:
 
 def check_damage(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Damage one file of a directory: reading it is refused, or gives what was written."""
-    place = made(folder / "damage", "a", "exchanged").out
-    whole = thud.read_results(place)
     for number, chance in tries:
-        kept = files_of(place)
+        place = made(folder / "damage", "a", "exchanged").out
+        whole = thud.read_results(place)
         said = "".join(_damage(place, chance, with_manifest=number % 4 != 0))
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
-                found = thud.read_results(place)
+            yield _compared(thud.read_results(place), whole, said)
         except thud.InputError:
             yield Finding("refused")
-        except Exception as error:  # noqa: BLE001 - that is the question
-            yield Finding("crashed", f"{said}: {error!r}")
-        else:
-            yield _compared(found, whole, said)
-        shutil.rmtree(place)
-        place.mkdir()
-        for name, content in kept.items():
-            (place / name).write_bytes(content)
 
 
 def _compared(found: thud.Impact, whole: thud.Impact, said: str) -> Finding:

@@ -6,12 +6,11 @@ What `edge_cases` draws and thud does not refuse is held against `edge_laws` and
 
 from __future__ import annotations
 
-import multiprocessing
 import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
-from campaign import Finding
+from campaign import Finding, each
 from edge_cases import LUMPED, WEIGHTS, draw_case
 from edge_comparisons import COMPARISONS, is_of_step
 from edge_laws import BALANCE, get_fault
@@ -21,16 +20,18 @@ from thud.case import case_text
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-
-def check_lumped(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Try lumped models."""
-    return [_try(chance.choices(LUMPED, WEIGHTS)[0], chance) for _, chance in tries]
+    from campaign import Check, Tries
 
 
-def check_many(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
+def check_models(models: Sequence[str], weights: Sequence[int] = (1,)) -> Check:
+    """Return the check of single drops of models."""
+    return each(lambda chance: _try(chance.choices(models, weights)[0], chance))
+
+
+def check_many(tries: Tries, _: Path) -> Iterable[Finding]:
     """Try lumped models on a rigid floor by `thud.solve_many`."""
     models = LUMPED[:2]
     cases = [draw_case(chance.choices(models, WEIGHTS[:2])[0], chance, 0) for _, chance in tries]
@@ -70,32 +71,6 @@ def _many(cases: list[thud.Case]) -> Iterable[Finding]:
             yield Finding("remarked")
         else:
             yield Finding("wrong", f"{many.restitution[i]}; {case_text(case).decode().split()}")
-
-
-def check_modal(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Try the modal ball."""
-    return [_try_in_time("modal_ball", chance, 20) for _, chance in tries]
-
-
-def check_elements(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Try finite elements, with small meshes."""
-    return [_try_in_time("finite_element", chance, 15) for _, chance in tries]
-
-
-def _try_in_time(model: str, chance: random.Random, seconds: float) -> Finding:
-    """Try in another process, which is stopped after some time."""
-    context = multiprocessing.get_context("fork")
-    here, there = context.Pipe(duplex=False)
-    process = context.Process(target=lambda: there.send(_try(model, chance)))
-    process.start()
-    there.close()
-    try:
-        found: Finding = here.recv() if here.poll(seconds) else Finding("stopped")
-    except EOFError:
-        found = Finding("crashed", model)
-    process.kill()
-    process.join()
-    return found
 
 
 def _try(model: str, chance: random.Random) -> Finding:

@@ -102,6 +102,20 @@ def forks() -> Forks:
     return Forks()
 
 
+def fail(order: Order, at: int, action: str) -> tuple[Done, list[str]]:
+    """Run a command whose call of that number goes wrong, none for 0; return the calls, too.
+
+    The action is that of `inject.c`; with "from there on" also all later calls go wrong.
+    """
+    log = Path(order.folder).with_suffix(".log")
+    number, _, on = action.partition(" ")
+    env = {"FAULT_AT": str(at), "FAULT_ACTION": number, "FAULT_LOG": str(log), **order.env}
+    done = forks().run(order._replace(env=env | ({"FAULT_FROM": "1"} if on else {})))
+    calls = log.read_text("utf-8", "replace").splitlines() if log.exists() else []
+    log.unlink(missing_ok=True)
+    return done, calls
+
+
 def _answer(order: Order) -> Done:
     """Fork, send the signals, wait."""
     with TemporaryFile() as errors:
@@ -141,7 +155,6 @@ def _become(order: Order, errors: IO[bytes]) -> NoReturn:
     try:
         os.setpgid(0, 0)
         os.chdir(order.folder)
-        os.environ.update(order.env)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, signal.SIG_DFL)
         # Hung commands end by it.
@@ -154,6 +167,8 @@ def _become(order: Order, errors: IO[bytes]) -> NoReturn:
         os.closerange(3, 64)
         for name, most in order.limits.items():
             resource.setrlimit(getattr(resource, name), (most, most))
+        # What goes wrong counts from here.
+        os.environ.update(order.env)
         if order.command[0] == "thud":
             os.execv(executable(), order.command)  # noqa: S606 - that is the command
         sys.stdin, sys.stdout, sys.stderr = (

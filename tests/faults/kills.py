@@ -9,7 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from campaign import Finding
+from campaign import FAULTS, Finding
+from directories import files_of
 from forks import WORK, Order, forks
 from scenarios import NEW, OLD, OUT, SCENARIOS, inputs, make
 
@@ -19,9 +20,9 @@ if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
+    from campaign import Tries
     from forks import Done
 
-    Tries = list[tuple[int, random.Random]]
     Files = dict[str, bytes]
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -30,13 +31,9 @@ NOTES, MINE = "notes.txt", b"mine"
 AT_ONCE = ("run", "sets")
 
 
-def files_of(folder: Path) -> Files:
-    """Return the contents of all files below a directory by their paths."""
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_file()
-    }
+def order(name: str, place: Path) -> Order:
+    """Return the command of a scenario with the newer input."""
+    return Order(SCENARIOS[name].given(NEW), str(place))
 
 
 @cache
@@ -48,7 +45,7 @@ def undisturbed(name: str, which: str) -> tuple[Files, float]:
         if done.code or done.left:
             message = f"{name}: {done}"
             raise RuntimeError(message)
-        return files_of(Path(place, OUT)), done.seconds
+        return files_of(Path(place, OUT), "**/*"), done.seconds
 
 
 def prepare(place: Path, name: str, *, old: bool) -> None:
@@ -77,7 +74,6 @@ def check_slow_kills(tries: Tries, folder: Path) -> Iterable[Finding]:
 
 
 def _check(name: str, chance: random.Random, place: Path) -> Finding:
-    scenario = SCENARIOS[name]
     old = chance.random() < 0.5
     prepare(place, name, old=old)
     number = chance.choice(SIGNALS) * chance.choice((1, -1))
@@ -85,20 +81,16 @@ def _check(name: str, chance: random.Random, place: Path) -> Finding:
     sent = [(chance.uniform(0, usual), int(number))]
     if chance.random() < 0.1:
         sent.append((sent[0][0] + chance.uniform(0, 0.1), -signal.SIGKILL))
-    first = forks().run(Order(scenario.given(NEW), str(place), sent))
-    word = judge_end(first) or judge_files(name, place, old=old, done=first.code == 0)
+    first = forks().run(order(name, place)._replace(signals=sent))
     parts = list((place / OUT).glob("*.part*"))
     # Of whole results no part is needed any more.
-    whole = undisturbed(name, NEW)[0].items() <= files_of(place / OUT).items()
+    whole = undisturbed(name, NEW)[0].items() <= files_of(place / OUT, "**/*").items()
     finished = _work(place) if parts and not whole else set()
     (place / WORK).unlink(missing_ok=True)
-    again = forks().run(Order(scenario.given(NEW), str(place)))
-    word = word or judge_again(name, place, again, old=old)
-    if not word and (twice := finished & _work(place)):
-        word = f"lost: {twice} repeated"
-    word, _, what = word.partition(": ")
-    detail = f"{name}, old {old}, {sent} of {usual:.3f} s: {first}, {again}, {what}"
-    return Finding(word or f"{name} {'done' if first.code == 0 else 'killed'}", detail)
+    found = judge(name, place, first, f"{sent} of {usual:.3f} s", old=old, killed=True)
+    if found.word not in FAULTS and (twice := finished & _work(place)):
+        return Finding("lost", f"{twice} repeated: {found.detail}")
+    return found
 
 
 def _work(place: Path) -> set[str]:
@@ -107,19 +99,35 @@ def _work(place: Path) -> set[str]:
     return set(path.read_text().split()) if path.exists() else set()
 
 
-def judge_end(done: Done) -> str:
+def judge(  # noqa: PLR0913 - what was disturbed, and how
+    name: str, place: Path, done: Done, what: str, *, old: bool, killed: bool = False
+) -> Finding:
+    """Return the finding of a command that was disturbed, after it has run again undisturbed."""
+    word = _judge_end(done, killed=killed)
+    word = word or _judge_files(name, place, old=old, done=done.code == 0)
+    again = forks().run(order(name, place))
+    word, _, why = (word or _judge_again(name, place, again, old=old)).partition(": ")
+    detail = f"{name}, old {old}, {what}: {done}, {again}, {why}"
+    return Finding(word or f"{name} {'done' if done.code == 0 else 'stopped'}", detail)
+
+
+def _judge_end(done: Done, *, killed: bool) -> str:
     """Return the fault in how a command has ended, if any: a word and what it is about."""
     if done.code == -signal.SIGALRM or done.left:
         return "hung"
-    killed = -done.code in SIGNALS or done.code in (128 + signal.SIGINT, 128 + signal.SIGTERM)
-    if done.code not in (0, 1, 2) and not killed:
+    if killed and (
+        -done.code in SIGNALS or done.code in (128 + signal.SIGINT, 128 + signal.SIGTERM)
+    ):
+        return ""
+    if done.code not in (0, 1, 2) or "Traceback" in done.said or "Warning" in done.said:
         return "crashed"
-    return "crashed" if "Traceback" in done.said or "Warning" in done.said else ""
+    last = (done.said.splitlines() or [""])[-1]
+    return "" if done.code == 0 or last.startswith("thud") else "crashed: no sentence"
 
 
-def judge_files(name: str, place: Path, *, old: bool, done: bool) -> str:
+def _judge_files(name: str, place: Path, *, old: bool, done: bool) -> str:
     """Return the fault of what a command has left that may have ended early, if any."""
-    found = files_of(place / OUT)
+    found = files_of(place / OUT, "**/*")
     before = undisturbed(name, OLD)[0] if old else {}
     new = undisturbed(name, NEW)[0]
     if old and found.pop(NOTES, b"") != MINE:
@@ -138,11 +146,11 @@ def judge_files(name: str, place: Path, *, old: bool, done: bool) -> str:
     return f"mixed: {bad}" if bad else ""
 
 
-def judge_again(name: str, place: Path, again: Done, *, old: bool) -> str:
+def _judge_again(name: str, place: Path, again: Done, *, old: bool) -> str:
     """Return the fault of the undisturbed run that followed, if any."""
     if again.code or again.left:
         return "lost: fails again"
-    found = files_of(place / OUT)
+    found = files_of(place / OUT, "**/*")
     if old and found.pop(NOTES, b"") != MINE:
         return f"lost: {NOTES}"
     left = {path.name for path in place.iterdir()} - {OLD, NEW, OUT, WORK, *inputs()}

@@ -12,9 +12,10 @@ from campaign import Finding
 from injection import PATIENCE, executable
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Iterable
     from pathlib import Path
+
+    from campaign import Tries
 
 HEAD = "&ball / &drop / "
 CASES = {
@@ -32,7 +33,7 @@ CASES = {
 LOADED = 80e6
 
 
-def check_memory(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_memory(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Run a case with an address space of 50 to 1000 MB."""
     for _, chance in tries:
         name = chance.choice(list(CASES))
@@ -45,22 +46,18 @@ def check_memory(tries: list[tuple[int, random.Random]], folder: Path) -> Iterab
         if name == "sets":
             command += ["--sets", "table.csv", "--threads", str(chance.randint(1, 4))]
         detail = f"{name} with {limit} bytes"
-        try:
-            done = subprocess.run(
-                command,
-                cwd=folder / "memory",
-                env={key: value for key, value in os.environ.items() if "THREADS" not in key},
-                preexec_fn=lambda limit=limit: resource.setrlimit(  # type: ignore[misc]
-                    resource.RLIMIT_AS, (limit, limit)
-                ),
-                capture_output=True,
-                text=True,
-                timeout=PATIENCE,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            yield Finding("hung", detail)
-            continue
+        done = subprocess.run(
+            command,
+            cwd=folder / "memory",
+            env={key: value for key, value in os.environ.items() if "THREADS" not in key},
+            preexec_fn=lambda limit=limit: resource.setrlimit(  # type: ignore[misc]
+                resource.RLIMIT_AS, (limit, limit)
+            ),
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
         yield Finding(_word(done, limit), f"{detail}: {done.returncode}, {done.stderr[:300]}")
 
 

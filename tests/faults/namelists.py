@@ -14,7 +14,7 @@ from attempts import SANITIZED
 from sentences import fault_of
 
 import thud
-from thud._api import api, call
+from thud._api import api, call, ensemble_api
 from thud._schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
 from thud.case import case_text
 
@@ -36,11 +36,16 @@ INSERTIONS = [
     "&model name = 'two_mass' /", "mass = 2", "&" * 50, "&x" * 40, "&ball mass = 2 /", ";", "\\",
     "\x1b", "\x7f", "\u2028", "\u00a0",
 ]  # fmt: skip
-# Parts of the accepted cases that are computed.
-COMPUTED = {"modal_ball": 0.02, "finite_element": 0.04, "": 0.02}
-USUALLY_COMPUTED = 0.06
+# Time that an accepted case may take on average, s, and that of reading and writing one.
+MEAN_TIME, FILE_TIME = 0.006, 0.01
+# Fraction of the cases without a model, and of those over a radiator, that are computed.
+WITHOUT_MODEL, OVER_RADIATOR = 0.05, 0.2
 # Floors over which a room may be.
 RADIATORS = ("plate", "floating_floor", "joist_floor")
+# Groups that a case of their owner has.
+NEEDED = (
+    "modes", "mesh", "room", "compression", "measured_modes", "measured_mobility", "hunt_crossley",
+)  # fmt: skip
 # Samples, and elements of a mesh, up to which a case is computed.
 MANY_SAMPLES, MANY_ELEMENTS = 20_000, 64
 NO_NUMBER = re.compile(rb"(?i)(?<![a-z_])(nan|inf|infinity)(?![a-z_])|\*\*\*")
@@ -51,19 +56,20 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     text = _text(chance)
     path = Path("case.nml")
     path.write_bytes(text.encode(errors="surrogateescape"))
+    effective = b""
     try:
-        word, detail = _tried(path, chance)
+        effective = call(api.effective_case, str(path).encode())["case"]
+        word, detail = _tried(path, effective, chance)
     except thud.ThudError as error:
         detail = fault_of(error, "case.nml", text)
-        word = "raw" if detail else "refused"
+        word = "raw" if detail else "failed" if effective else "refused"
     finally:
         path.unlink()
         shutil.rmtree("o", ignore_errors=True)
     return word, f"{detail}: {text!r}" if detail else ""
 
 
-def _tried(path: Path, chance: random.Random) -> tuple[str, str]:
-    effective = call(api.effective_case, str(path).encode())["case"]
+def _tried(path: Path, effective: bytes, chance: random.Random) -> tuple[str, str]:
     if NO_NUMBER.search(re.sub(rb"'.*?'", b"", effective)):
         return "NaN", "in the effective input"
     if _effective(effective) != effective:
@@ -75,10 +81,13 @@ def _tried(path: Path, chance: random.Random) -> tuple[str, str]:
         case = thud.read_case(path)
         if _effective(case_text(case)) != effective:
             return "mixed", "the case of Python is another one"
-    part = COMPUTED.get(name, USUALLY_COMPUTED)
+    fraction = WITHOUT_MODEL
+    if name:
+        cost = call(ensemble_api.size_many, effective, b"", 0)["cost"]
+        fraction = MEAN_TIME / (cost + FILE_TIME)
     if any(b"'%s'" % floor.encode() in effective for floor in RADIATORS):
-        part *= 0.2  # they take ten times as long
-    if dice > part or not _is_small(effective):
+        fraction *= OVER_RADIATOR
+    if dice > fraction or not _is_small(effective):
         return "accepted", ""
     # With sanitizers all takes ten times as long.
     if SANITIZED and chance.random() < 0.8:
@@ -148,9 +157,8 @@ def _differing(files: dict[str, bytes]) -> list[str]:
 def _no_numbers(name: str, found: object) -> str:
     """Return the name of the first entry that is not finite."""
     if isinstance(found, dict):
-        return next(
-            (bad for key, one in found.items() if (bad := _no_numbers(f"{name}.{key}", one))), ""
-        )
+        inner = (_no_numbers(f"{name}.{key}", value) for key, value in found.items())
+        return next(filter(None, inner), "")
     if isinstance(found, bytes):
         return f"{name}: {found!r}" if NO_NUMBER.search(found) else ""
     return "" if np.isfinite(found).all() else name  # type: ignore[call-overload]
@@ -191,30 +199,15 @@ def _text(chance: random.Random) -> str:
     seen = set(groups)
     for owner in owners:
         for group in {key.group: None for key in KEYS if key.owner == owner}:
-            needed = group in (
-                "modes",
-                "mesh",
-                "room",
-                "compression",
-                "measured_modes",
-                "measured_mobility",
-                "hunt_crossley",
-            )
-            if group in seen or not (needed or chance.random() < 0.8):
+            if group in seen or not (group in NEEDED or chance.random() < 0.8):
                 continue
             seen.add(group)
-            text += _group(
-                group,
-                [key for key in KEYS if (key.owner, key.group) == (owner, group)],
-                length,
-                steady,
-                chance,
-            )
+            keys = [key for key in KEYS if (key.owner, key.group) == (owner, group)]
+            text += _group(group, keys, length, steady, chance)
     for _ in range(chance.choice([0, 0, 0, 0, 0, 1, 2])):
         at = chance.randrange(len(text) + 1)
-        text = (
-            text[:at] + chance.choice([*INSERTIONS, ""]) + text[at + chance.choice([0, 0, 1, 9]) :]
-        )
+        insertion = chance.choice([*INSERTIONS, ""])
+        text = text[:at] + insertion + text[at + chance.choice([0, 0, 1, 9]) :]
     return text
 
 

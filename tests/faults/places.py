@@ -1,26 +1,36 @@
-"""Commands with few descriptors, small files, no place to write, and clocks set back."""
+"""Commands whose calls of the system go wrong, without space or rights, and clocks set back."""
 
 from __future__ import annotations
 
+import errno
 import signal
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from campaign import Finding
-from forks import Order, forks
-from kills import judge_again, judge_end, judge_files, prepare
-from scenarios import NEW, OUT, SCENARIOS
+from forks import fail, forks
+from injection import KILLS
+from kills import judge, order, prepare
+from scenarios import OUT, SCENARIOS
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Iterable
 
+    from campaign import Finding, Tries
+    from forks import Done, Order
+
 NAMES = [name for name, one in SCENARIOS.items() if one.weight]
+ERRORS = [str(number) for number in (errno.ENOSPC, errno.EIO, errno.EMFILE, errno.EROFS)]
+# A disk that stays full.
+FULL = f"{errno.ENOSPC} from there on"
+STEPPED = ("sweep", "zarr", "surrogate", "fit", "measure", "export")
 # Variables that say where programs keep what is no result.
 HOMES = ("HOME", "TMPDIR", "MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
 
-def check_places(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_places(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Run a command where something is missing, then where nothing is."""
     for number, chance in tries:
         name = NAMES[number % len(NAMES)]
@@ -29,23 +39,10 @@ def check_places(tries: list[tuple[int, random.Random]], folder: Path) -> Iterab
         _free(place)
         prepare(place, name, old=old)
         kind = chance.choice(list(KINDS))
-        order, told = KINDS[kind](Order(SCENARIOS[name].given(NEW), str(place)), chance)
-        done = forks().run(order)
+        disturbed, what = KINDS[kind](order(name, place), chance)
+        done = forks().run(disturbed)
         _free(place)
-        word = _judge_words(done.code, done.said) or judge_end(done)
-        word = word or judge_files(name, place, old=old, done=done.code == 0)
-        again = forks().run(Order(SCENARIOS[name].given(NEW), str(place)))
-        word, _, what = (word or judge_again(name, place, again, old=old)).partition(": ")
-        detail = f"{name}, old {old}, {kind} {told}: {done}, {again}, {what}"
-        yield Finding(word or f"{kind} {'done' if done.code == 0 else 'refused'}", detail)
-
-
-def _judge_words(code: int, said: str) -> str:
-    """Return the fault of an end that is no sentence, if any."""
-    if code == 0:
-        return ""
-    last = (said.splitlines() or [""])[-1]
-    return "" if code in (1, 2) and last.startswith("thud") else "crashed: no sentence"
+        yield judge(name, place, done, f"{kind} {what}", old=old)
 
 
 def _free(place: Path) -> None:
@@ -55,41 +52,40 @@ def _free(place: Path) -> None:
             path.chmod(0o755)
 
 
-def _few_descriptors(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _few_descriptors(usual: Order, chance: random.Random) -> tuple[Order, str]:
     # With fewer neither an interpreter begins nor the loader of libraries.
-    most = chance.randint(4 if order.command[0] == "thud" else 8, 24)
-    return order._replace(limits={"RLIMIT_NOFILE": most}), str(most)
+    most = chance.randint(4 if usual.command[0] == "thud" else 8, 24)
+    return usual._replace(limits={"RLIMIT_NOFILE": most}), str(most)
 
 
-def _small_files(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _small_files(usual: Order, chance: random.Random) -> tuple[Order, str]:
     # Words on the screen are a file here.
     most = int(10 ** chance.uniform(3, 5))
-    return order._replace(limits={"RLIMIT_FSIZE": most}), str(most)
+    return usual._replace(limits={"RLIMIT_FSIZE": most}), str(most)
 
 
-def _read_only(order: Order, chance: random.Random) -> tuple[Order, str]:
-    place = Path(order.folder)
+def _read_only(usual: Order, chance: random.Random) -> tuple[Order, str]:
+    place = Path(usual.folder)
     path = chance.choice([place, place / OUT] if (place / OUT).exists() else [place])
     path.chmod(0o555)
-    return order._replace(humble=True), path.name
+    return usual._replace(humble=True), path.name
 
 
-def _no_homes(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _no_homes(usual: Order, chance: random.Random) -> tuple[Order, str]:
     names = chance.sample(HOMES, chance.randint(1, len(HOMES)))
     where = chance.choice(["/nonexistent", "/dev/null", "/proc/self", "/dev/full"])
-    return order._replace(env=dict.fromkeys(names, where), humble=True), f"{names} {where}"
+    return usual._replace(env=dict.fromkeys(names, where), humble=True), f"{names} {where}"
 
 
-def _other_clock(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _other_clock(usual: Order, chance: random.Random) -> tuple[Order, str]:
     seconds = chance.choice((-1, 1)) * 10 ** chance.uniform(0, 8)
-    return order._replace(env={"FAULT_CLOCK": f"{seconds:.0f}"}), f"{seconds:.0f}"
+    return usual._replace(env={"FAULT_CLOCK": f"{seconds:.0f}"}), f"{seconds:.0f}"
 
 
-def _interrupted(order: Order, chance: random.Random) -> tuple[Order, str]:
+def _interrupted(usual: Order, chance: random.Random) -> tuple[Order, str]:
     """Kill it first, so that the clock goes back between two runs of one study."""
-    usual = 0.5 * chance.random()
-    forks().run(order._replace(signals=[(usual, signal.SIGKILL)]))
-    return _other_clock(order, chance)
+    forks().run(usual._replace(signals=[(0.5 * chance.random(), signal.SIGKILL)]))
+    return _other_clock(usual, chance)
 
 
 KINDS = {
@@ -100,3 +96,35 @@ KINDS = {
     "clock": _other_clock,
     "clock and kill": _interrupted,
 }
+
+
+def _run(name: str, place: Path, at: int, action: str) -> tuple[Done, list[str]]:
+    """Run a scenario whose call of that number in its directory goes wrong, none for 0."""
+    prepare(place, name, old=True)
+    return fail(order(name, place)._replace(env={"FAULT_UNDER": str(place)}), at, action)
+
+
+@cache
+def plan() -> list[tuple[str, str, int]]:
+    """Return scenario, action and number of the call."""
+    tries = []
+    with TemporaryDirectory(prefix="thud_faults_") as folder:
+        place = Path(folder, "steps")
+        for name in STEPPED:
+            calls = len(_run(name, place, 0, "")[1])
+            tries += [
+                (name, action, at + 1)
+                for action in (*KILLS, *ERRORS, FULL)
+                for at in range(0, calls, 1 + calls // 100)
+            ]
+    return tries
+
+
+def check_steps(tries: Tries, folder: Path) -> Iterable[Finding]:
+    """Let one call after the other go wrong, then run the command again."""
+    for number, _ in tries:
+        name, action, at = plan()[number % len(plan())]
+        done, calls = _run(name, folder / "steps", at, action)
+        call = calls[at - 1] if at <= len(calls) else "none"
+        what = f"{action} at {call}"
+        yield judge(name, folder / "steps", done, what, old=True, killed=action in KILLS)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +13,7 @@ import thud
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
+    import random
     from collections.abc import Callable
     from pathlib import Path
 
@@ -128,6 +131,67 @@ def slow_calls(folder: Path) -> Calls:
         "plot": saved,
         "to_xarray": lambda: impact.to_xarray().floor_force,
         "to_dataframe": lambda: impact.to_dataframe().to_numpy(),
+    }
+
+
+def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]:
+    """Return calls with another value each: rates, floors, recordings, cases, rooms, bands."""
+
+    def rates(chance: random.Random) -> thud.Sampling:
+        return thud.Sampling(chance.uniform(16e3, 64e3), chance.uniform(0.06, 0.09))
+
+    def case(chance: random.Random) -> thud.Case:
+        ball = thud.Ball(wall_thickness=chance.uniform(0.02, 0.04))
+        drop = thud.Drop(height=chance.uniform(0.5, 1.5))
+        floor = chance.choice([
+            None, thud.InfinitePlate(chance.uniform(1e5, 1e6)),
+            thud.Oscillator(mass=chance.uniform(20, 60)),
+            thud.Plate(thickness=chance.uniform(0.15, 0.25)),
+        ])  # fmt: skip
+        model = chance.choice([thud.HollowSphere(), thud.ModalBall(rings=10, harmonics=4)])
+        sampling = rates(chance)
+        return thud.Case("changing", ball, drop, sampling=sampling, model=model, floor=floor)
+
+    def read_case(chance: random.Random) -> thud.Case:
+        thud.write_case(case(chance), folder / "changing.nml")
+        return thud.read_case(folder / "changing.nml")
+
+    def levels(chance: random.Random) -> object:
+        force = np.sin(np.linspace(0, math.pi, chance.randint(300, 3000)))
+        bands, method = chance.choice(["octave", "third"]), chance.choice(["exact", "fft"])
+        return thud.force_exposure_levels(force, chance.uniform(8e3, 64e3), bands, method)
+
+    def recording(chance: random.Random) -> object:
+        impact = thud.solve_case(replace(case(chance), floor=None))
+        force = np.pad(impact.floor_force, chance.randint(4000, 8000))
+        force += np.random.default_rng(chance.getrandbits(32)).normal(scale=0.5, size=force.size)
+        return Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5).levels()
+
+    def room(chance: random.Random) -> object:
+        plate = thud.Plate(thickness=chance.uniform(0.15, 0.25))
+        return thud.predict_level(impact, plate, thud.Room(volume=chance.uniform(20, 60)))
+
+    def modal_room(chance: random.Random) -> object:
+        space = thud.Room(volume=chance.uniform(20, 60))
+        return thud.modal_room(impact, PLATE, space, balls=1, microphones=2)
+
+    impact = thud.solve()
+    return {
+        "case": lambda chance: thud.solve_case(case(chance)),
+        "read_case": read_case,
+        "levels": levels,
+        "recording": recording,
+        "room": room,
+        "modal_room": modal_room,
+        "sets": lambda chance: thud.solve_many(
+            {"height": [chance.uniform(0.5, 1.5) for _ in range(chance.randint(1, 60))]}, threads=2
+        ),
+        "mobility": lambda chance: thud.mobility(
+            PLATE, [chance.uniform(20, 200) for _ in range(chance.randint(1, 40))]
+        ),
+        "elements": lambda chance: thud.solve(
+            thud.Ball(mass=chance.uniform(2.4, 2.6)), model="finite_element", **MESH
+        ),
     }
 
 

@@ -8,27 +8,31 @@ from __future__ import annotations
 
 import argparse
 import sys
-import tempfile
 import time
+from functools import partial
 from pathlib import Path
 
+import mutate_recordings
+import namelists
+import study_files
+import table_files
 from aliasing import check_aliasing
-from attempts import attempts
-from campaign import Part, Report
+from attempts import find
+from campaign import Part, Report, each
 from checkouts import NAMES, check_checkouts
 from clusters import check_clusters
 from crowds import check_crowds, check_starts, check_threads
 from directories import check_calls, check_damage, check_races
 from directories import plan as plan_calls
-from edges import check_elements, check_lumped, check_many, check_modal
+from edge_cases import LUMPED, WEIGHTS
+from edges import check_many, check_models
 from foreign_files import check_foreign
 from kills import check_kills, check_slow_kills
 from memory import check_memory
-from places import check_places
+from places import check_places, check_steps
+from places import plan as plan_steps
 from servers import check_explorer
 from soak import check_soak
-from steps import check_steps
-from steps import plan as plan_steps
 
 
 def parts() -> dict[str, Part]:
@@ -36,7 +40,7 @@ def parts() -> dict[str, Part]:
     return {
         "calls": Part(lambda: len(plan_calls()), 60, check_calls),
         "races": Part(80, 8, check_races),
-        "damage": Part(10_000, 60, check_damage, share=100),
+        "damage": Part(10_000, 60, check_damage),
         "kills": Part(10_000, 15, check_kills),
         "slow kills": Part(500, 1, check_slow_kills),
         "steps": Part(lambda: len(plan_steps()), 4, check_steps),
@@ -50,16 +54,16 @@ def parts() -> dict[str, Part]:
         "clusters": Part(400, 2, check_clusters),
         "soak": Part(100_000, 100, check_soak, share=100),
         "memory": Part(1000, 12, check_memory),
-        "namelists": Part(1_000_000, 400, attempts("namelists"), share=5000),
-        "recordings": Part(100_000, 60, attempts("damaged_recordings"), share=2000),
-        "studies": Part(100_000, 60, attempts("study_files"), share=500),
-        "tables": Part(10_000, 60, attempts("table_files"), share=500),
+        "namelists": Part(1_000_000, 400, each(namelists.attempt), limit=10, may_stop=True),
+        "recordings": Part(100_000, 1000, each(mutate_recordings.attempt), limit=20),
+        "studies": Part(100_000, 60, each(study_files.attempt), limit=20, may_stop=True),
+        "tables": Part(10_000, 60, each(table_files.attempt), limit=20, may_stop=True),
         "many": Part(100_000, 200, check_many, share=1000),
-        "lumped": Part(20_000, 60, check_lumped, share=100),
-        "modal": Part(10_000, 8, check_modal, share=10),
+        "lumped": Part(20_000, 60, check_models(LUMPED, WEIGHTS)),
+        "modal": Part(10_000, 8, check_models(["modal_ball"]), limit=20, may_stop=True),
+        "elements": Part(1000, 4, check_models(["finite_element"]), limit=15, may_stop=True),
         # A build takes minutes.
-        "checkouts": Part(len(NAMES), 0, check_checkouts),
-        "elements": Part(1000, 4, check_elements, share=4),
+        "checkouts": Part(len(NAMES), 0, check_checkouts, limit=900),
     }
 
 
@@ -67,21 +71,23 @@ def main() -> int:
     """Run the campaign; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--small", action="store_true", help="some tries of each part")
-    parser.add_argument("--seed", type=int, default=None, help="of what is random")
+    parser.add_argument("--tries", type=int, help="tries of each part, spread over all of it")
+    parser.add_argument("--seed", type=int, default=0, help="of what is random")
     parser.add_argument("--part", action="append", help="part to run (default: all)")
-    parser.add_argument(
-        "--report", type=Path, default=Path("outputs/faults.json"), help="counts; it goes on there"
-    )
+    parser.add_argument("--report", type=Path, help="counts (default: outputs/faults.json; none "
+                        "with --small); the campaign goes on there")  # fmt: skip
     options = parser.parse_args()
-    seed = options.seed if options.seed is not None else 0 if not options.small else time.time_ns()
-    print(f"seed {seed}")
-    report = Report(seed, None if options.small else options.report)
-    with tempfile.TemporaryDirectory(prefix="thud_faults_") as folder:
-        for name, part in parts().items():
-            if options.part and name not in options.part:
-                continue
-            report.run(name, part, part.small, Path(folder), spread=options.small)
-            print(report, flush=True)
+    path = options.report or (None if options.small else Path("outputs/faults.json"))
+    report = Report(options.seed, path)
+    for name, part in parts().items():
+        if options.part and name not in options.part:
+            continue
+        start = time.monotonic()
+        tries = part.count()
+        count = options.tries or (part.small if options.small else tries)
+        report.run(name, tries, min(count, tries), partial(find, name, part))
+        print(report)
+        print(f"{name}: {time.monotonic() - start:.0f} s", flush=True)
     return 1 if report.faults else 0
 
 

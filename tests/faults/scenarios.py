@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from contextlib import suppress
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+import psutil
 
 import thud
 
@@ -71,7 +73,7 @@ class Scenario(NamedTuple):
         """Return the command with the older or the newer input, and a scheduler."""
         found = [word.replace("IN", which) for word in self.command]
         if "SCHEDULER" in found:
-            found[found.index("SCHEDULER")] = scheduler or cluster()[0]
+            found[found.index("SCHEDULER")] = scheduler or cluster().address
         return [*found, "--replace"] if self.study else found
 
 
@@ -100,14 +102,37 @@ SCENARIOS = {
 }
 
 
+class Cluster(NamedTuple):
+    """A scheduler, its process, which restarts two workers, and its address."""
+
+    process: psutil.Popen
+    address: str
+
+    def workers(self) -> list[psutil.Process]:
+        """Return the processes that compute."""
+        found = []
+        for one in self.process.children():
+            with suppress(psutil.NoSuchProcess):
+                if "spawn_main" in " ".join(one.cmdline()):
+                    found.append(one)
+        return found
+
+    def end(self) -> None:
+        """End all processes."""
+        with suppress(psutil.NoSuchProcess):
+            for one in (*self.process.children(recursive=True), self.process):
+                with suppress(psutil.NoSuchProcess):
+                    one.kill()
+            self.process.wait()
+
+
 @cache
-def cluster() -> tuple[str, subprocess.Popen[str]]:
-    """Return the address of a scheduler of Dask with two workers, which end with this process."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", CLUSTER], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
-    assert process.stdout
-    return process.stdout.readline().strip(), process
+def cluster() -> Cluster:
+    """Return a cluster that ends with this process."""
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-c", CLUSTER]
+    process = psutil.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True)
+    return Cluster(process, process.stdout.readline().strip())
 
 
 @cache

@@ -128,7 +128,7 @@ def _well(server: Explorer) -> str:
 
 def _case(height: float, model: str) -> bytes:
     """Return the request of a case; one of the models is answered at once, one by a process."""
-    mesh = {"mesh": {"polar_elements": 8}} if model == "finite_element" else {}
+    mesh = {"mesh": {"polar_elements": 40}} if model == "finite_element" else {}
     return json.dumps({"drop": {"height": height}, "model": {"name": model}, **mesh}).encode()
 
 

@@ -2,74 +2,82 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
-import os
+import statistics
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import TYPE_CHECKING
 
 from campaign import Finding
-from public_calls import fast_calls, quiet, same, slow_calls
+from public_calls import changing_calls, fast_calls, quiet, same, slow_calls
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
+    from campaign import Tries
     from public_calls import Calls
 
-# Part of the calls that take longer.
-SLOW_PART = 0.04
-# Rounds in which libraries fill their caches, and the growth allowed behind them.
-WARM = 100
+# Fraction of the calls that take longer.
+SLOW_FRACTION = 0.04
+# Rounds before the growth counts, and the growth allowed in their second half.
+WARM = 40
 GROWTH = 0.01
-PAGE = os.sysconf("SC_PAGE_SIZE")
 
 
 @cache
-def _calls() -> tuple[Calls, Calls, dict[str, object]]:
+def _calls() -> tuple[Calls, Calls, dict[str, Callable[[random.Random], object]]]:
     folder = Path(mkdtemp(prefix="thud_faults_"))
     quiet()
-    fast, slow = fast_calls(folder), slow_calls(folder)
-    return fast, slow, {name: call() for name, call in {**fast, **slow}.items()}
+    return fast_calls(folder), slow_calls(folder), changing_calls(folder)
 
 
 @cache
-def _sizes() -> list[float]:
-    """Return the resident sizes after the rounds of this process, bytes."""
+def _expected() -> dict[str, object]:
+    """Return the results of the calls that are always the same."""
+    fast, slow, _ = _calls()
+    return {name: call() for name, call in {**fast, **slow}.items()}
+
+
+@cache
+def _sizes() -> list[int]:
+    """Return the memory after the rounds of this process, bytes."""
     return []
 
 
-def check_soak(tries: list[tuple[int, random.Random]], _: Path) -> Iterable[Finding]:
-    """Make a round of calls, then look at memory and descriptors; each try is one call."""
-    fast, slow, expected = _calls()
-    handles = _handles()
-    found = []
-    for _, chance in tries:
-        calls = slow if chance.random() < SLOW_PART else fast
+def check_soak(tries: Tries, _: Path) -> Iterable[Finding]:
+    """Make a round of calls, then look at memory and descriptors; each try is two calls."""
+    fast, slow, changing = _calls()
+    expected, handles = _expected(), _handles()
+    for place, (_, chance) in enumerate(tries, 1):
+        chance.choice(list(changing.values()))(chance)
+        calls = slow if chance.random() < SLOW_FRACTION else fast
         name = chance.choice(list(calls))
-        found.append(Finding("same" if same(calls[name](), expected[name]) else "mixed", name))
-    gc.collect()
-    # The pool of freed memory changes by itself.
-    ctypes.CDLL(None).malloc_trim(0)
-    _sizes().append(int(Path("/proc/self/statm").read_text().split()[1]) * PAGE)
-    if _handles() > handles or growth() > GROWTH:
-        detail = (
-            f"{_handles() - handles} descriptors, {growth():.3%} of {_sizes()[-1] / 1e6:.0f} MB"
-        )
-        found[-1] = Finding("grown", detail)
-    return found
+        found = Finding("same" if same(calls[name](), expected[name]) else "mixed", name)
+        if place == len(tries):
+            gc.collect()
+            _sizes().append(_memory())
+            if _handles() > handles or growth() > GROWTH:
+                more = f"{_handles() - handles} descriptors, {growth():.3%}"
+                found = Finding("grown", f"{more} of {_sizes()[-1] / 1e6:.0f} MB")
+        yield found
 
 
 def growth() -> float:
-    """Return the growth of the resident size after the first rounds, as part of it."""
-    sizes = _sizes()[WARM:]
-    if len(sizes) < 2:
+    """Return the growth of the memory in the second half of the rounds, as part of it."""
+    sizes = _sizes()
+    if len(sizes) < WARM:
         return 0.0
-    part = max(1, len(sizes) // 10)
-    first, last = (sorted(some)[len(some) // 2] for some in (sizes[:part], sizes[-part:]))
-    return last / first - 1
+    half = sizes[len(sizes) // 2 :]
+    count = len(half) // 5
+    return statistics.median(half[-count:]) / statistics.median(half[:count]) - 1
+
+
+def _memory() -> int:
+    """Return the resident memory, bytes, but for pages of files, which the system drops."""
+    status = Path("/proc/self/status").read_text()
+    return 1024 * int(status.partition("RssAnon:")[2].split()[0])
 
 
 def _handles() -> int:

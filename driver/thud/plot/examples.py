@@ -1,12 +1,12 @@
 """Impacts that several figures of the documentation show."""
 
-from functools import cache
+from functools import cache, lru_cache
 
 from thud._schema import Ball, InfinitePlate
 from thud.impact import Impact, solve
 
 
-@cache
+@lru_cache(maxsize=4)
 def solve_published(viscosity: str = "fractional") -> Impact:
     """Return the impact of the ball of the published modes by finite elements."""
     return solve(Ball.standard(), model="finite_element", viscosity=viscosity)

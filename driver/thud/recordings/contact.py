@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -341,7 +341,7 @@ def find_edge(  # noqa: PLR0913, PLR0917 - what a flank is
     return find_touch(flank, *bounds, searches)
 
 
-@cache
+@lru_cache(maxsize=4)
 def _response(plate: Plate, rate: float) -> NDArray[np.float64]:
     """Return what the correction of a plate makes of one sample; its middle is that sample."""
     reach = int(PLATE_PERIODS * rate / plate.resonance)

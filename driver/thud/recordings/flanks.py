@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -285,7 +285,7 @@ def _crossing(path: NDArray[np.float64], level: float) -> NDArray[np.float64]:
     return np.asarray(found, dtype=np.float64)
 
 
-@cache
+@lru_cache(maxsize=8)
 def _normal_draws(count: int) -> NDArray[np.float64]:
     """Return normal draws: [N_DRAW, count]."""
     points = qmc.Sobol(count, seed=0).random(N_DRAW)
@@ -293,7 +293,7 @@ def _normal_draws(count: int) -> NDArray[np.float64]:
     return np.asarray(np.random.default_rng(0).permutation(ndtri(points)))
 
 
-@cache
+@lru_cache(maxsize=4)
 def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
     """Return the smoothed shapes of a flank at ticks around the touch: [n_tick, n_column]."""
     ticks = np.arange(-round((BEFORE + GUARD) / TICK), round((BEHIND + GUARD) / TICK))
@@ -306,7 +306,8 @@ def _table(interval: float, plate: Plate | None) -> NDArray[np.float64]:
         spectrum = np.fft.rfft(total, axis=0) * plate.passed(frequency)[:, None]
         total = np.fft.irfft(spectrum, len(tau), axis=0)
     guard = round(GUARD / TICK)
-    return total[guard:-guard]
+    # A view would keep the guard.
+    return total[guard:-guard].copy()
 
 
 def _columns(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -336,7 +336,7 @@ class _Posterior:
         return np.asarray(phi[np.searchsorted(weight.cumsum(), places)])
 
 
-@cache
+@lru_cache(maxsize=8)
 def _student(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return draws of Student's distribution, [N_DRAW, count], and their logarithmic density."""
     points = qmc.Sobol(count + 1, seed=0).random(N_DRAW)

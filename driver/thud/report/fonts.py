@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -94,7 +94,7 @@ def _lines(words: Iterable[str], size: float, width: float) -> list[float]:
     return lines
 
 
-@cache
+@lru_cache
 def _path(weight: str) -> Path:
     return Path(mpl.get_data_path(), "fonts", "ttf", FILES[weight])
 

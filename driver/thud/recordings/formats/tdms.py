@@ -56,14 +56,20 @@ class _OpenFile:
         """The file of the library; closed with this object."""
         file = self.path.open("rb")
         weakref.finalize(self, file.close)
-        return library("nptdms", "TDMS").TdmsFile.open(BoundedFile(file, shown_path(self.path)))
+        return _library().TdmsFile.open(BoundedFile(file, shown_path(self.path)))
+
+
+def _library() -> Any:  # noqa: ANN401 - a module
+    """Return the library, which writes no warnings: what they are about is refused here."""
+    found = library("nptdms", "TDMS")
+    # Each of its modules has a logger with a level of its own.
+    found.log.log_manager.set_level(logging.ERROR)
+    return found
 
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the numeric channels of a TDMS file."""
-    library("nptdms", "TDMS")
-    # What it warns of is refused here.
-    logging.getLogger("nptdms").setLevel(logging.ERROR)
+    _library()
     with path.open("rb") as raw:
         _require_complete(raw, shown_path(path))
     file = _OpenFile(path)
