@@ -30,6 +30,8 @@ settings.load_profile("thud")
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
 MINIMAL = "&ball /\n&drop /\n&model /\n"
+# How patterns of `naming` begin: at the begin of a message, in any case, over all its lines.
+NAMING = r"(?is)\A"
 
 
 def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
@@ -47,7 +49,12 @@ def naming(*parts: object) -> str:
     number: neither `mass` in `added_mass` nor 1 in 10 or 0.1.
     """
     named = (rf"(?<!\w)(?<!\d\.){re.escape(str(part))}(?![\d_]|\.\d)" for part in parts)
-    return r"(?is)\A" + "".join(f"(?=.*{part})" for part in named)
+    return NAMING + "".join(f"(?=.*{part})" for part in named)
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Keep patterns of messages out of the names of tests."""
+    return argname if isinstance(val, str) and val.startswith(NAMING) else None
 
 
 @pytest.fixture(scope="session")

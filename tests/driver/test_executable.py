@@ -139,7 +139,7 @@ def test_help_version_and_keys(run: Run, case_file: CaseFile) -> None:
 def test_bad_usage_is_told(run: Run, arguments: list[str], words: str) -> None:
     result = run(*arguments)
     assert result.returncode == 1
-    assert words in result.stderr
+    assert words in result.stderr.splitlines()[0]
     assert result.stdout == ""
 
 
@@ -152,21 +152,18 @@ BAD_CASES = {
         f"{MINIMAL}&sampling rate = 1 /",
         naming("&sampling: rate", "line 4", "'sample_rate'"),
     ),
-    "wrong type": (
-        "&ball mass = 'heavy' / &drop / &model /",
-        naming("&ball: mass", "'heavy'", "kg"),
-    ),
+    "wrong type": ("&ball mass = 'heavy' / &drop / &model /", naming("&ball: mass", "'heavy'")),
     "two values": ("&ball mass = 1 2 / &drop / &model /", naming("&ball: mass", "1 2", "kg")),
     "unit in the value": (
         "&ball mass = 2.5 kg / &drop / &model /",
-        naming("&ball: mass", "2.5 kg", "1000000 kg"),
+        naming("&ball: mass", "2.5 kg"),
     ),
     "decimal comma": ("&ball mass = 2,5 / &drop / &model /", naming("&ball: mass", "2,5", "kg")),
     "nan": ("&ball mass = nan / &drop / &model /", naming("&ball: mass", "NaN", "kg")),
     "infinite": ("&ball mass = 1e999 / &drop / &model /", naming("&ball: mass", "kg")),
     "zero radius": (
         "&ball outer_radius = 0 / &drop / &model /",
-        naming("&ball: outer_radius", 0.0, "10 m"),
+        naming("&ball: outer_radius", 0.0),
     ),
     "negative mass": ("&ball mass = -2.5 / &drop / &model /", naming("&ball: mass", -2.5, "kg")),
     "zero modulus": (
@@ -202,21 +199,12 @@ BAD_CASES = {
         f"{MINIMAL}&sampling sample_rate = 1e6 duration = 4 substeps = 9999 /",
         naming("&sampling: substeps", 9999, "1.0e8"),
     ),
-    "unknown model": (
-        "&ball / &drop / &model name = 'cube' /",
-        naming("'cube'", "'hollow_sphere'"),
-    ),
+    "unknown model": ("&ball / &drop / &model name = 'cube' /", naming("'cube'", "'modal_ball'")),
     "empty file": ("", naming("file", 65536)),
     "null value": ("&ball mass = 1* / &drop / &model /", naming("&ball: mass", "1*", "kg")),
     "bare exponent": ("&ball / &drop height = 1+3 / &model /", naming("&drop: height", "1+3", "m")),
-    "long name": (
-        f"&case name = '{'x' * 129}' / {MINIMAL}",
-        naming("&case: name", "128 characters"),
-    ),
-    "foreign options": (
-        f"{MINIMAL}&hunt_crossley /",
-        naming("&hunt_crossley", "line 4", "'hollow_sphere'"),
-    ),
+    "long name": (f"&case name = '{'x' * 129}' / {MINIMAL}", naming("&case: name", 128)),
+    "foreign options": (f"{MINIMAL}&hunt_crossley /", naming("&hunt_crossley", "line 4")),
     "huge file": ("! " + 70000 * "x", naming("file", 65536)),
     "binary file": ("\x7fELF\x00\x01", naming("line 1", "ASCII")),
     "text": ("Dear Sir or Madam,", naming("line 1", "group")),

@@ -41,7 +41,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         (RECORD, ["mass"], {"confidence": 95.0}, naming("confidence", 95.0, 0, 1)),
         (RECORD, ["mass"], {"starts": 0}, naming("starts", 0, 1)),
         (RECORD, ["mass"], {"case": thud.Case(model=None)}, naming("&model")),
-        (RECORD, {"height": 1e5}, {}, naming("start", "&drop: height", 100000)),
+        (RECORD, {"height": 1e5}, {}, naming("start", "&drop: height", 100000.0)),
         ((RECORD[0], RECORD[1][:-1]), ["mass"], {}, naming("target", "ForceTarget")),
         (1.0, ["mass"], {}, naming("target", "ForceTarget")),
         (
@@ -56,7 +56,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
             thud.ForceTarget(RECORD, window=(2, 3)),
             ["mass"],
             {},
-            naming("window", "(2, 3)"),
+            naming("window", [2, 3], 0),
         ),
         (thud.ForceTarget(RECORD, force="gas"), ["mass"], {}, naming("force", "'gas'", "'floor'")),
         (thud.LevelTarget([39.0] * 4), ["mass"], {}, naming("levels", 5)),

@@ -205,7 +205,7 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
     ("old", "new", "words"),
     [
         ("height = 1.0", "mass = 2.0", naming("target 2", "fixed", "mass")),
-        ("height = 1.0", "heigth = 1.0", naming("target 2", "fixed", "'heigth'", "'height'")),
+        ("height = 1.0", "heigth = 1.0", naming("'heigth'", "'height'")),
         ('unit = "cm"', 'unit = "N"', naming("target 1", "fixed height", "'N'", "cm")),
         ("gain = 0.02", "gain = 'no'", naming("target 2", "gain", "'no'")),
         ("gain = 0.02", "hum = 3", naming("target 2", "hum", 3)),
