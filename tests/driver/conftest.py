@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sysconfig
@@ -29,6 +30,8 @@ settings.load_profile("thud")
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = sorted((REPOSITORY / "inputs").glob("*.nml"))
 MINIMAL = "&ball /\n&drop /\n&model /\n"
+# How patterns of `naming` begin: at the begin of a message, in any case, over all its lines.
+NAMING = r"(?is)\A"
 
 
 def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
@@ -37,6 +40,21 @@ def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
     force = np.pad(impact.floor_force, quiet)
     force += np.random.default_rng(1).normal(scale=0.5, size=len(force))
     return thud.Recording.from_array(force, impact.sample_rate, **known)
+
+
+def naming(*parts: object) -> str:
+    """Return a pattern of messages that name all parts, in any order and wording.
+
+    A part may have an ending ("octave" in "octaves"), but is not found within a longer key or
+    number: neither `mass` in `added_mass` nor 1 in 10 or 0.1.
+    """
+    named = (rf"(?<!\w)(?<!\d\.){re.escape(str(part))}(?![\d_]|\.\d)" for part in parts)
+    return NAMING + "".join(f"(?=.*{part})" for part in named)
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Keep patterns of messages out of the names of tests."""
+    return argname if isinstance(val, str) and val.startswith(NAMING) else None
 
 
 @pytest.fixture(scope="session")

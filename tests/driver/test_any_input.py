@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -28,7 +28,6 @@ def check_sentence(error: thud.ThudError) -> None:
     sentence = str(error)
     assert sentence
     assert "\n" not in sentence
-    assert "allowed: " in sentence
 
 
 @given(
@@ -92,7 +91,7 @@ def test_any_damage_to_a_file(start: int, length: int, insertion: str) -> None:
             case = thud.read_case(path)
         except thud.InputError as error:
             check_sentence(error)
-            assert str(error).startswith(f"{path}: ")
+            assert str(path) in str(error)
         else:
             assert isinstance(case, thud.Case)
 
@@ -116,7 +115,7 @@ def test_any_table_of_a_record(
             record = read_record(read_table(path), str(path))
         except thud.InputError as error:
             check_sentence(error)
-            assert str(error).startswith(f"{path}: ")
+            assert str(path) in str(error)
         else:
             assert np.isfinite(record.time).all()
             assert 0 < record.sample_rate < np.inf
@@ -140,9 +139,7 @@ def test_any_record(force: list[float], sample_rate: float, bands: str, method: 
 
 
 def test_motion_beyond_all_numbers_has_no_infinity_in_its_sentence() -> None:
-    with pytest.raises(
-        thud.NumericalError, match=r"leaves the range of numbers; allowed: "
-    ) as said:
+    with pytest.raises(thud.NumericalError, match=naming("&sampling: substeps")) as said:
         thud.solve(
             drop=thud.Drop(height=1e6, gravity=1000.0),
             model="hunt_crossley",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -14,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import naming
 from distributed import Client, LocalCluster
 
 import thud
@@ -123,7 +125,7 @@ def test_stopped_worker_of_dask_does_not_hold_the_study(
         kept[block.start] = found
 
     try:
-        with pytest.warns(thud.WorkerWarning, match=r"was not heard of for 3 s; others compute"):
+        with pytest.warns(thud.WorkerWarning, match=naming("worker", "3 s")):
             run_blocks(blocks, keep, scheduler=cluster.scheduler_address)
     finally:
         os.kill(pids[0], signal.SIGKILL)
@@ -180,9 +182,7 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
         doomed.kill()
     _, errors = process.communicate()
     assert process.returncode == 2
-    assert errors.startswith(
-        f"thud-driver: {study}: the backend lost a block of sets (CancelledError); what"
-    )
+    assert re.search(naming(study, "backend", "CancelledError"), errors)
     assert errors.count("\n") == 1
     finished = thud.read_sweep(tmp_path / "some.partial")
     assert 0 < finished.sizes["set"] < 600
@@ -201,7 +201,7 @@ def test_killed_process_is_reported_and_loses_nothing() -> None:
         for child in set(multiprocessing.active_children()) - others:
             child.kill()
 
-    with pytest.raises(thud.NumericalError, match=r"lost a block.*kept; allowed: run the study ag"):
+    with pytest.raises(thud.NumericalError, match=naming("backend")):
         run_blocks(modal_blocks(), keep, "processes", 2)
     assert kept
 
@@ -218,7 +218,7 @@ def test_unreachable_scheduler_is_reported_soon(
             arguments = ["sweep", "-q", str(path), "-o", str(tmp_path), "--scheduler", address]
             assert cli.main(arguments) == 1
             errors = capsys.readouterr().err
-            assert f"scheduler = '{address}' does not answer within 1 s" in errors
+            assert re.search(naming("scheduler", f"'{address}'", "1 s"), errors)
             assert errors.count("\n") == 1
 
 
@@ -241,27 +241,27 @@ def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("thud.studies.backends.PATIENCE", 1)
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
-        pytest.raises(thud.InputError, match="shows no worker within 1 s; allowed: one with"),
+        pytest.raises(thud.InputError, match=naming("scheduler", "worker", "1 s")),
     ):
         thud.sweep(STUDY, scheduler=empty.scheduler_address)
 
 
 def test_other_version_is_reported() -> None:
     block = Block(0, thud.Case(), {"height": np.ones(1)}, "0.0.1")
-    with pytest.raises(thud.InputError, match=r"sets of thud 0\.0\.1; allowed: the same version"):
+    with pytest.raises(thud.InputError, match=naming("version", "0.0.1", thud.__version__)):
         evaluate(block)
 
 
 @pytest.mark.parametrize(
     ("how", "words"),
     [
-        ({"backend": "gpu"}, "backend = 'gpu' is not known; allowed: 'threads', 'processes'"),
-        ({"backend": "dask"}, "allowed: the address of a scheduler for dask"),
-        ({"backend": "threads", "scheduler": "tcp://x:1"}, "and only there"),
-        ({"workers": 0}, "workers = 0 is not allowed; allowed: whole numbers from 1"),
-        ({"workers": 2000}, "workers = 2000 is not allowed; allowed: whole numbers from 1 to 1024"),
-        ({"workers": 10**6, "backend": "processes"}, "whole numbers from 1 to 1024"),
-        ({"workers": 2, "scheduler": "tcp://x:1"}, "workers = 2 is not allowed for dask; allowed"),
+        ({"backend": "gpu"}, naming("backend", "'gpu'", "'threads'", "'processes'")),
+        ({"backend": "dask"}, naming("dask", "scheduler")),
+        ({"backend": "threads", "scheduler": "tcp://x:1"}, naming("scheduler", "dask")),
+        ({"workers": 0}, naming("workers", 0, 1)),
+        ({"workers": 2000}, naming("workers", 2000, 1, 1024)),
+        ({"workers": 10**6, "backend": "processes"}, naming("workers", 10**6, 1, 1024)),
+        ({"workers": 2, "scheduler": "tcp://x:1"}, naming("workers", 2, "dask")),
     ],
 )
 def test_useless_backends_are_reported(how: dict[str, Any], words: str) -> None:

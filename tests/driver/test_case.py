@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL
+from conftest import INPUTS, MINIMAL, naming
 
 import thud
 
@@ -46,7 +46,7 @@ def test_cases_do_not_change() -> None:
 
 def test_invalid_case_is_not_written(tmp_path: Path) -> None:
     case = thud.Case(ball=thud.Ball(mass=-1.0))
-    with pytest.raises(thud.InputError, match=r"&ball: mass = -1.0 is not allowed"):
+    with pytest.raises(thud.InputError, match=naming("&ball: mass", -1.0, "1000000 kg")):
         thud.write_case(case, tmp_path / "case.nml")
     assert not list(tmp_path.iterdir())
 
@@ -59,19 +59,19 @@ def test_failed_write_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"nowhere/case\.nml"):
         thud.write_case(thud.Case(), tmp_path / "nowhere/case.nml")
     assert [entry.name for entry in tmp_path.iterdir()] == ["case.nml"]
-    with pytest.raises(thud.InputError, match="allowed: the path of a file"):
+    with pytest.raises(thud.InputError, match=naming(repr("a\0b"))):
         thud.write_case(thud.Case(), "a\0b")
 
 
 @pytest.mark.parametrize("value", [None, [1.0], 1j, {}, b"2"], ids=repr)
 def test_values_of_other_types_are_refused(value: object) -> None:
-    with pytest.raises(thud.InputError, match=r"&ball: mass = .* allowed"):
+    with pytest.raises(thud.InputError, match=naming("&ball: mass", repr(value))):
         thud.solve(thud.Ball(mass=value))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\0b"], ids=repr)
 def test_names_are_plain_text(name: str) -> None:
-    with pytest.raises(thud.InputError, match=r"&case: name = .* is not allowed"):
+    with pytest.raises(thud.InputError, match=naming("&case: name", repr(name))):
         thud.solve_case(thud.Case(name=name))
 
 
@@ -83,20 +83,21 @@ def test_name_is_refused_and_not_cut(case_file: Callable[..., Path], name: str) 
 
 def test_long_value_does_not_hide_what_is_allowed(case_file: Callable[..., Path]) -> None:
     long = 2000 * "x"
-    for text in (f"&model name = '{long}' /", f"&{long} /", f"&ball {long} = 1 /"):
+    for text, allowed in (
+        (f"&model name = '{long}' /", "'hollow_sphere'"),
+        (f"&{long} /", "'ball'"),
+        (f"&ball {long} = 1 /", "'mass'"),
+    ):
         with pytest.raises(thud.InputError) as refused:
             thud.read_case(case_file(f"{text}\n"))
         sentence = str(refused.value)
-        assert "allowed: " in sentence
+        assert allowed in sentence
         assert 81 * "x" not in sentence
 
 
 def test_errors_of_a_file_name_the_file(case_file: Callable[..., Path]) -> None:
     path = case_file("&ball mass = 'x' / &drop / &model /")
-    with pytest.raises(thud.InputError) as caught:
+    with pytest.raises(thud.InputError, match=naming(path, "&ball: mass", "'x'", "1.0e-12")):
         thud.read_case(path)
-    assert str(caught.value).startswith(
-        f"{path}: &ball: mass = 'x' is not a number; allowed: 1.0e-12 <= mass"
-    )
-    with pytest.raises(thud.InputError, match="no such file"):
+    with pytest.raises(thud.InputError, match=naming("nowhere.nml")):
         thud.read_case("nowhere.nml")

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 from thud import cli
@@ -59,29 +61,31 @@ def test_gas_that_leaves_gives_no_force() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "sentence"),
+    ("options", "words"),
     [
-        ({"model": "measured_modes"}, "this model has no static compression; allowed: one that"),
+        ({"model": "measured_modes"}, naming("model", "compression")),
         (
             {"model": thud.HuntCrossley(contact_time=0.02)},
-            "stiffness = 0 is not allowed with &compression, as contact_time gives one for a drop",
+            naming("stiffness", 0, "&compression", "contact_time"),
         ),
-        ({"max_deflection": 0.178}, "max_deflection = 0.178 m is not allowed; allowed: less than"),
-        ({"max_deflection": 0.12}, "max_deflection = 0.12 m closes the shell; allowed: less than"),
-        ({"max_deflection": 0.0}, "max_deflection = 0.0 is not allowed; allowed: 1.0e-15 <= max"),
-        ({"model": "modal_ball", "max_deflection": 0.15}, "the ball lies on its outermost ring"),
-        ({"points": 1}, "points = 1 is not allowed; allowed: 2 <= points <= 10000"),
-        ({"gas": "hot"}, "gas = 'hot' is not allowed; allowed: 'vented', 'isothermal', 'adiab"),
-        ({"ball": thud.Ball(gauge_pressure=1e3)}, "gas = 'vented' with gauge_pressure = 1000.0"),
-        ({"depth": 0.1}, "'depth' is not known; allowed: ball, model, max_deflection, points, gas"),
+        ({"max_deflection": 0.178}, naming("max_deflection", "0.178 m")),
+        ({"max_deflection": 0.12}, naming("max_deflection", "0.12 m")),
+        ({"max_deflection": 0.0}, naming("max_deflection", 0.0, "1.0e-15")),
+        ({"model": "modal_ball", "max_deflection": 0.15}, naming("ring")),
+        ({"points": 1}, naming("points", 1, 2, 10000)),
+        ({"gas": "hot"}, naming("gas", "'hot'", "'vented'", "'adiabatic'")),
+        (
+            {"ball": thud.Ball(gauge_pressure=1e3)},
+            naming("gas", "'vented'", "gauge_pressure", 1000.0),
+        ),
+        ({"depth": 0.1}, naming("'depth'", "max_deflection", "points", "gas")),
     ],
 )
-def test_impossible_compressions_are_refused(options: dict[str, object], sentence: str) -> None:
+def test_impossible_compressions_are_refused(options: dict[str, object], words: str) -> None:
     if options.get("model") == "measured_modes":
         options = {"model": thud.MeasuredModes([30.0], [0.1], [2.5])}
-    with pytest.raises(thud.ThudError) as caught:
+    with pytest.raises(thud.ThudError, match=words):
         thud.compress(**options)  # type: ignore[arg-type]
-    assert sentence in str(caught.value)
 
 
 CASE = "&drop / &ball poisson_ratio = 0.45 / &model name = 'modal_ball' / "
@@ -110,7 +114,7 @@ def test_compression_takes_a_model(run: Run, tmp_path: Path) -> None:
     case.write_text("&modes / &compression /")
     done = run(case)
     assert done.returncode == 1
-    assert "&compression in line 1 does nothing with &modes alone" in done.stderr
+    assert re.search(naming("&compression", "line 1", "&modes"), done.stderr)
 
 
 def test_driver_draws_the_compression_of_a_case(tmp_path: Path) -> None:

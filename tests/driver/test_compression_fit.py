@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy.interpolate import PchipInterpolator
 from scipy.stats import t
 
@@ -57,9 +58,7 @@ def test_fit_shows_its_numbers(measured: tuple[np.ndarray, np.ndarray]) -> None:
 def test_model_that_does_not_explain_the_curve_is_doubted(
     measured: tuple[np.ndarray, np.ndarray],
 ) -> None:
-    with pytest.warns(
-        thud.FitWarning, match="change their sign .*: the model does not explain the curve"
-    ):
+    with pytest.warns(thud.FitWarning, match=naming("sign", "model")):
         fit = thud.fit_compression(*measured, START, "hollow_sphere")
     assert len(fit.warnings) == 1
 
@@ -69,37 +68,36 @@ def test_curve_that_begins_under_load_is_doubted(
 ) -> None:
     with pytest.warns(thud.FitWarning) as caught:
         fit = thud.fit_compression(measured[0][20:], measured[1][20:], START, MODEL)
-    assert "the first touch lies at the limit of the search" in fit.warnings[0]
+    assert "first touch" in fit.warnings[0]
     assert [str(one.message) for one in caught] == list(fit.warnings)
 
 
 @pytest.mark.parametrize(
-    ("deflection", "force", "sentence"),
+    ("deflection", "force", "words"),
     [
-        ([0, 1e-3], [0, 1], "deflection has 2 entries and force 2; allowed: the same number, at"),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [0, 1], "deflection has 5 entries and force 2; allowed: th"),
-        ([0, 1e-3, 1e-3, 2e-3, 3e-3], range(5), "deflection does not rise at point 3; allowed: "),
-        ([0, 1e-3, 2e-3, 3e-3, np.nan], range(5), "holds what is no finite number; allowed: fin"),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [4, 3, 2, 1, 0], "force does not rise with the deflection"),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [1, 1, 1, 1, 1], "force does not rise with the deflection"),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [-2, -1, 0, 0, 0], "force does not rise with the deflectio"),
-        ([0, 1e-3, 2e-3, 3e-3, 0.2], range(5), "m is not allowed; allowed: less than the diameter"),
-        ([0, 1e-12, 2e-12, 3e-12, 4e-12], range(5), "where the model shows no force"),
-        ("curve", range(5), "deflection"),
+        ([0, 1e-3], [0, 1], naming("deflection", "force", 2, 5)),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [0, 1], naming("deflection", "force", 5, 2)),
+        ([0, 1e-3, 1e-3, 2e-3, 3e-3], range(5), naming("deflection", "point 3")),
+        ([0, 1e-3, 2e-3, 3e-3, np.nan], range(5), naming("deflection", "finite")),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [4, 3, 2, 1, 0], naming("force", "deflection")),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [1, 1, 1, 1, 1], naming("force", "deflection")),
+        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [-2, -1, 0, 0, 0], naming("force", "deflection")),
+        ([0, 1e-3, 2e-3, 3e-3, 0.2], range(5), naming("max_deflection", "0.178 m")),
+        ([0, 1e-12, 2e-12, 3e-12, 4e-12], range(5), naming("model", "force")),
+        ("curve", range(5), naming("deflection")),
     ],
 )
-def test_what_is_no_curve_is_refused(deflection: object, force: object, sentence: str) -> None:
+def test_what_is_no_curve_is_refused(deflection: object, force: object, words: str) -> None:
     values = list(force) if isinstance(force, range) else force
-    with pytest.raises(thud.InputError) as caught:
+    with pytest.raises(thud.InputError, match=words):
         thud.fit_compression(deflection, values, START, MODEL)  # type: ignore[arg-type]
-    assert sentence in str(caught.value)
 
 
 def test_modulus_of_a_spring_that_has_none_is_refused(
     measured: tuple[np.ndarray, np.ndarray],
 ) -> None:
     spring = thud.HuntCrossley(stiffness=2e5)
-    with pytest.raises(thud.NumericalError, match="the force of this model does not tell youngs_"):
+    with pytest.raises(thud.NumericalError, match=naming("youngs_modulus")):
         thud.fit_compression(*measured, START, spring)
 
 
@@ -166,7 +164,7 @@ def test_fewest_points_leave_something_to_two_parameters(
 ) -> None:
     some = np.linspace(3, 43, count).astype(int)
     if count < 5:
-        with pytest.raises(thud.InputError, match="at least 5"):
+        with pytest.raises(thud.InputError, match=naming("deflection", 5)):
             thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)
     else:
         fit = thud.fit_compression(measured[0][some], measured[1][some], START, MODEL)

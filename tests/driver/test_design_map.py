@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
@@ -151,7 +151,7 @@ def test_density_of_the_paper_is_marked() -> None:
     result = thud.design_map({"fixed": {"outer_radius": 0.088}, "parameters": axes})
     heavier = 2.5 / (4 / 3 * np.pi * (0.088**3 - 0.056**3))
     assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "case")
-    with pytest.raises(thud.InputError, match=r"\[fixed\]: &ball: outer_radius = 0.0 is not al"):
+    with pytest.raises(thud.InputError, match=naming("[fixed]", "&ball: outer_radius", 0.0)):
         thud.design_map({"fixed": {"outer_radius": 0}, "parameters": axes})
     axes = {"wall_thickness": {"values": [0.03, 0.034]}, **height}
     for given, name in ((density, "paper's ball"), (1000, "case")):
@@ -177,7 +177,7 @@ def test_places_without_results_stay_empty() -> None:
     ],
 )
 def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
-    with pytest.raises(thud.InputError, match="do not make a map; allowed: two numeric ones"):
+    with pytest.raises(thud.InputError, match=naming("[parameters]")):
         thud.design_map({"parameters": parameters})
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import naming
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -99,7 +101,7 @@ def test_fails_where_the_single_solver_fails() -> None:
         try:
             thud.solve(drop=thud.Drop(float(height)), momentum_flux=str(flux))
         except thud.NumericalError as error:
-            assert "closes the shell" in str(error)
+            assert "&drop: height" in str(error)
             assert status == 2
         else:
             assert status == 0
@@ -123,7 +125,7 @@ def test_a_conforming_source_conforms() -> None:
 
 
 def test_forces_beyond_the_memory_are_refused() -> None:
-    with pytest.raises(thud.InputError, match="forces = True for 10000000 sets of 441000 samples"):
+    with pytest.raises(thud.InputError, match=naming("forces", 10000000, 441000)):
         thud.solve_many({"height": np.ones(10_000_000)}, duration=10.0, forces=True)
 
 
@@ -160,15 +162,15 @@ def test_invalid_sets_are_marked_and_leave_the_others() -> None:
     bad = [3, 7, 9, 11, 13, 15]
     assert ensemble.status[bad].tolist() == [1, 1, 2, 2, 1, 1]
     expected = (
-        "&ball: outer_radius = -1.0 is not allowed",
-        "&ball: wall_thickness = 1.0 is not allowed",
-        "closes the shell",
-        "substeps is too low for this source",
-        "&sampling: duration = 0.05 s ends",
-        "&ball: poisson_ratio = Infinity is not allowed",
+        naming("&ball: outer_radius", -1.0),
+        naming("&ball: wall_thickness", 1.0),
+        naming("&drop: height"),
+        naming("&sampling: substeps"),
+        naming("&sampling: duration", "0.05 s"),
+        naming("&ball: poisson_ratio", "Infinity"),
     )
     for place, words in zip(bad, expected, strict=True):
-        assert words in ensemble.reason[place]
+        assert re.search(words, ensemble.reason[place])
     assert set(np.delete(ensemble.reason, bad)) == {""}
     assert np.isnan(ensemble.contact_time[bad]).all()
     assert np.isnan(ensemble.elastic_octaves[bad]).all()
@@ -185,7 +187,7 @@ def test_forces_are_kept_of_records_of_one_length() -> None:
 
 def test_case_without_impact_is_refused() -> None:
     case = thud.Case(modes=thud.Modes(), model=None)
-    with pytest.raises(thud.InputError, match="the case computes no impact; allowed: a case with"):
+    with pytest.raises(thud.InputError, match=naming("case", "model")):
         thud.solve_many({"height": [1.0]}, case)
 
 
@@ -199,7 +201,7 @@ def test_forces_of_invalid_sets_are_nan() -> None:
 
 def test_too_few_samples() -> None:
     ensemble = thud.solve_many({"youngs_modulus": 7e10}, substeps=200)
-    assert "gives the contact of" in ensemble.reason[0]
+    assert re.search(naming("&sampling: sample_rate", "44100.0 Hz"), ensemble.reason[0])
 
 
 def test_an_empty_batch_is_empty() -> None:
@@ -228,46 +230,45 @@ def test_scalars_and_defaults() -> None:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "options", "message"),
+    ("parameters", "options", "words"),
     [
         (
             {"radius": 1},
             {},
-            "'radius' is not a key of hollow_sphere; allowed: keys of &ball, &drop, ",
+            naming("'radius'", "hollow_sphere", "&ball", "&drop"),
         ),
-        ({"height": [1, 2], "mass": [1, 2, 3]}, {}, "differ in length: height (2,), mass"),
-        ({"height": [[1]]}, {}, "height has 2 dimensions"),
-        ({"height": [[1], [1, 2]]}, {}, "height is not an array"),
-        ({"height": ["one"]}, {}, "height is not an array of real numbers"),
-        ({"height": [1j]}, {}, "height is not an array of real numbers"),
-        ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, "height has masked entries"),
-        ({"momentum_flux": "some"}, {}, "momentum_flux = 'some' is not known; allowed: 'mom"),
-        ([1], {}, "parameters = [1] is not allowed"),
-        ({}, {"threads": 0}, "threads = 0 is not allowed; allowed: whole numbers from 1 to 1024"),
-        ({}, {"threads": 1.5}, "threads = 1.5 is not allowed"),
-        ({}, {"substeps": 1.5}, "&sampling: substeps = 1.5 is not a whole number"),
-        ({"density": 1.0}, {}, "'density' is a parameter of studies"),
-        ({"bands": "third"}, {}, "bands"),
-        ({"source": ["tyre"]}, {"source": "tyre"}, "'source' is given twice; allowed: once"),
-        ({1: [1.0]}, {}, "1 is not a key of hollow_sphere"),
-        ({"height": np.broadcast_to(1.0, 10**13)}, {}, "the parameters do not fit in memory"),
-        ({"duration": [0.05, 0.1]}, {"forces": True}, "with their own sampling"),
-        ({}, {"bands": "fifth"}, "bands = 'fifth' is not known"),
-        ({}, {"sample_rate": 10}, "&sampling: sample_rate = 10.0"),
+        ({"height": [1, 2], "mass": [1, 2, 3]}, {}, naming("height (2,)", "mass (3,)")),
+        ({"height": [[1]]}, {}, naming("height", "2 dimensions")),
+        ({"height": [[1], [1, 2]]}, {}, naming("height", "array")),
+        ({"height": ["one"]}, {}, naming("height", "real")),
+        ({"height": [1j]}, {}, naming("height", "real")),
+        ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, naming("height", "masked")),
+        ({"momentum_flux": "some"}, {}, naming("momentum_flux", "'some'", "'none'")),
+        ([1], {}, naming("parameters", [1])),
+        ({}, {"threads": 0}, naming("threads", 0, 1, 1024)),
+        ({}, {"threads": 1.5}, naming("threads", 1.5)),
+        ({}, {"substeps": 1.5}, naming("&sampling: substeps", 1.5)),
+        ({"density": 1.0}, {}, naming("'density'", "studies")),
+        ({"bands": "third"}, {}, naming("bands")),
+        ({"source": ["tyre"]}, {"source": "tyre"}, naming("'source'")),
+        ({1: [1.0]}, {}, naming(1, "hollow_sphere", "&ball")),
+        ({"height": np.broadcast_to(1.0, 10**13)}, {}, naming("parameters", "memory")),
+        ({"duration": [0.05, 0.1]}, {"forces": True}, naming("forces", "sampling")),
+        ({}, {"bands": "fifth"}, naming("bands", "'fifth'", "'third'")),
+        ({}, {"sample_rate": 10}, naming("&sampling: sample_rate", 10.0, 2000)),
         (
             {},
             {"sample_rate": "44100"},
-            "&sampling: sample_rate = '44100' is not a number",
+            naming("&sampling: sample_rate", "'44100'"),
         ),
-        ({}, {"duration": 10**400}, "duration = a very large number is not allowed"),
-        ({}, {"duration": 10.0, "sample_rate": 1e7}, "&sampling: duration = 10.0"),
-        ({}, {"source": "drum"}, "&limits: source = 'drum' is not allowed"),
+        ({}, {"duration": 10**400}, naming("&sampling: duration")),
+        ({}, {"duration": 10.0, "sample_rate": 1e7}, naming("&sampling: duration", "10.0 s")),
+        ({}, {"source": "drum"}, naming("&limits: source", "'drum'", "'tyre'")),
     ],
 )
-def test_bad_input_is_named(parameters: object, options: dict[str, object], message: str) -> None:
-    with pytest.raises(thud.InputError) as caught:
+def test_bad_input_is_named(parameters: object, options: dict[str, object], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
         thud.solve_many(parameters, **options)  # type: ignore[arg-type]
-    assert message in str(caught.value)
 
 
 @settings(max_examples=60, deadline=None)
@@ -462,10 +463,10 @@ def test_keywords_replace_those_of_the_case() -> None:
     assert thud.solve_many({}, case, model="hollow_sphere").case.model == case.model
     assert thud.solve_many({}, case, model="modal_ball").case.model == thud.ModalBall()
     assert thud.solve_many({}).case.model == thud.HollowSphere()
-    with pytest.raises(thud.InputError, match="'source' is given twice"):
+    with pytest.raises(thud.InputError, match=naming("'source'")):
         thud.solve_many({"source": ["tyre"]}, source="tyre")
     for threads in (0, 1025):
-        with pytest.raises(thud.InputError, match="threads"):
+        with pytest.raises(thud.InputError, match=naming("threads", threads, 1, 1024)):
             thud.solve_many({}, threads=threads)
     assert thud.solve_many({}, threads=1024).status.tolist() == [0]
 

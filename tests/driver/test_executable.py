@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import f90nml
 import numpy as np
 import pytest
-from conftest import INPUTS, MINIMAL
+from conftest import INPUTS, MINIMAL, naming
 
 import thud
 
@@ -125,71 +125,89 @@ def test_help_version_and_keys(run: Run, case_file: CaseFile) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "no case is given"),
-        (["--what"], "'--what' is not a known option"),
-        (["a.nml", "b.nml"], "'b.nml' is a second case"),
-        (["a.nml", "--output"], "--output has no value"),
-        (["a.nml", "--output", ""], "--output has no value"),
-        (["missing.nml"], "missing.nml: there is no such file"),
-        ([""], "there is no such file"),
-        (["."], ".: this is a directory"),
+        ([], "case"),
+        (["--what"], "'--what'"),
+        (["a.nml", "b.nml"], "'b.nml'"),
+        (["a.nml", "--output"], "--output"),
+        (["a.nml", "--output", ""], "--output"),
+        (["missing.nml"], "missing.nml"),
+        ([""], "file"),
+        (["."], "directory"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
 def test_bad_usage_is_told(run: Run, arguments: list[str], words: str) -> None:
     result = run(*arguments)
     assert result.returncode == 1
-    assert words in result.stderr
+    assert words in result.stderr.splitlines()[0]
     assert result.stdout == ""
 
 
 BAD_CASES = {
-    "no group": ("! nothing\n", "there is no namelist group"),
-    "unterminated group": ("&ball /\n&drop\n&model /", "&drop in line 2 is not terminated"),
-    "unterminated last group": ("&ball /\n&drop /\n&model", "&model in line 3 is not terminated"),
-    "unknown group": (f"{MINIMAL}&walls /", "&walls in line 4 is not a known group"),
-    "unknown key": (f"{MINIMAL}&sampling rate = 1 /", "&sampling: rate in line 4 is not a known"),
-    "wrong type": ("&ball mass = 'heavy' / &drop / &model /", "&ball: mass = 'heavy' is not a num"),
-    "two values": ("&ball mass = 1 2 / &drop / &model /", "&ball: mass = 1 2 is not a number"),
-    "unit in the value": ("&ball mass = 2.5 kg / &drop / &model /", "&ball: mass = 2.5 kg is not"),
-    "decimal comma": ("&ball mass = 2,5 / &drop / &model /", "&ball: mass = 2,5 is not a number"),
-    "nan": ("&ball mass = nan / &drop / &model /", "&ball: mass = NaN is not allowed"),
-    "infinite": ("&ball mass = 1e999 / &drop / &model /", "&ball: mass = "),
-    "zero radius": ("&ball outer_radius = 0 / &drop / &model /", "&ball: outer_radius = 0.0 is"),
-    "negative mass": ("&ball mass = -2.5 / &drop / &model /", "&ball: mass = -2.5 is not allowed"),
-    "zero modulus": ("&ball youngs_modulus = 0 / &drop / &model /", "&ball: youngs_modulus = 0.0"),
-    "zero height": ("&ball / &drop height = 0 / &model /", "&drop: height = 0.0 is not allowed"),
+    "no group": ("! nothing\n", naming("'ball'", "'drop'", "'model'")),
+    "unterminated group": ("&ball /\n&drop\n&model /", naming("&drop", "line 2", "'/'")),
+    "unterminated last group": ("&ball /\n&drop /\n&model", naming("&model", "line 3", "'/'")),
+    "unknown group": (f"{MINIMAL}&walls /", naming("&walls", "line 4", "'ball'")),
+    "unknown key": (
+        f"{MINIMAL}&sampling rate = 1 /",
+        naming("&sampling: rate", "line 4", "'sample_rate'"),
+    ),
+    "wrong type": ("&ball mass = 'heavy' / &drop / &model /", naming("&ball: mass", "'heavy'")),
+    "two values": ("&ball mass = 1 2 / &drop / &model /", naming("&ball: mass", "1 2", "kg")),
+    "unit in the value": (
+        "&ball mass = 2.5 kg / &drop / &model /",
+        naming("&ball: mass", "2.5 kg"),
+    ),
+    "decimal comma": ("&ball mass = 2,5 / &drop / &model /", naming("&ball: mass", "2,5", "kg")),
+    "nan": ("&ball mass = nan / &drop / &model /", naming("&ball: mass", "NaN", "kg")),
+    "infinite": ("&ball mass = 1e999 / &drop / &model /", naming("&ball: mass", "kg")),
+    "zero radius": (
+        "&ball outer_radius = 0 / &drop / &model /",
+        naming("&ball: outer_radius", 0.0),
+    ),
+    "negative mass": ("&ball mass = -2.5 / &drop / &model /", naming("&ball: mass", -2.5, "kg")),
+    "zero modulus": (
+        "&ball youngs_modulus = 0 / &drop / &model /",
+        naming("&ball: youngs_modulus", 0.0, "Pa"),
+    ),
+    "zero height": ("&ball / &drop height = 0 / &model /", naming("&drop: height", 0.0, "m")),
     "thick wall": (
         "&ball wall_thickness = 0.1 / &drop / &model /",
-        "wall_thickness = 0.1 is not allowed; allowed: 0 < wall_thickness < outer_radius = 0.089 m",
+        naming("&ball: wall_thickness", 0.1, "outer_radius", "0.089 m"),
     ),
     "poisson": (
         "&ball poisson_ratio = 0.6 / &drop / &model /",
-        "&ball: poisson_ratio = 0.6 is not allowed; allowed: -1 < poisson_ratio <= 0.5",
+        naming("&ball: poisson_ratio", 0.6, -1, 0.5),
     ),
     "sample rate": (
         f"{MINIMAL}&sampling sample_rate = 1e12 /",
-        "&sampling: sample_rate = 1.0e12 is not allowed; allowed: 2000 <= sample_rate",
+        naming("&sampling: sample_rate", "1.0e12", 2000, "1.0e7 Hz"),
     ),
-    "duration": (f"{MINIMAL}&sampling duration = -1 /", "&sampling: duration = -1.0 is not"),
-    "short record": (f"{MINIMAL}&sampling duration = 0.01 /", "&sampling: duration = 0.01 s ends"),
+    "duration": (
+        f"{MINIMAL}&sampling duration = -1 /",
+        naming("&sampling: duration", -1.0, 0.001, "10 s"),
+    ),
+    "short record": (
+        f"{MINIMAL}&sampling duration = 0.01 /",
+        naming("&sampling: duration", "0.01 s"),
+    ),
     "memory": (
         f"{MINIMAL}&sampling sample_rate = 1e7 duration = 10 /",
-        "&sampling: duration = 10.0 s at sample_rate",
+        naming("&sampling: duration", "10.0 s", "1.0e7 Hz", "5000000.0"),
     ),
     "time": (
         f"{MINIMAL}&sampling sample_rate = 1e6 duration = 4 substeps = 9999 /",
-        "&sampling: substeps = 9999",
+        naming("&sampling: substeps", 9999, "1.0e8"),
     ),
-    "unknown model": ("&ball / &drop / &model name = 'cube' /", "allowed: 'hollow_sphere'"),
-    "empty file": ("", "the file is empty"),
-    "null value": ("&ball mass = 1* / &drop / &model /", "&ball: mass = 1* is not a number"),
-    "bare exponent": ("&ball / &drop height = 1+3 / &model /", "&drop: height = 1+3 is not a num"),
-    "long name": (f"&case name = '{'x' * 129}' / {MINIMAL}", "is not short text in quotes"),
-    "foreign options": (f"{MINIMAL}&hunt_crossley /", "&hunt_crossley in line 4 does nothing"),
-    "huge file": ("! " + 70000 * "x", "the file is too large"),
-    "binary file": ("\x7fELF\x00\x01", "line 1"),
-    "text": ("Dear Sir or Madam,", "line 1 stands outside a group"),
+    "unknown model": ("&ball / &drop / &model name = 'cube' /", naming("'cube'", "'modal_ball'")),
+    "empty file": ("", naming("file", 65536)),
+    "null value": ("&ball mass = 1* / &drop / &model /", naming("&ball: mass", "1*", "kg")),
+    "bare exponent": ("&ball / &drop height = 1+3 / &model /", naming("&drop: height", "1+3", "m")),
+    "long name": (f"&case name = '{'x' * 129}' / {MINIMAL}", naming("&case: name", 128)),
+    "foreign options": (f"{MINIMAL}&hunt_crossley /", naming("&hunt_crossley", "line 4")),
+    "huge file": ("! " + 70000 * "x", naming("file", 65536)),
+    "binary file": ("\x7fELF\x00\x01", naming("line 1", "ASCII")),
+    "text": ("Dear Sir or Madam,", naming("line 1", "group")),
 }
 
 
@@ -199,9 +217,8 @@ def test_bad_input_is_told(
 ) -> None:
     result = run(case_file(text))
     assert result.returncode == 1
-    assert f"thud: {tmp_path}/case.nml: " in result.stderr
-    assert words in result.stderr
-    assert "; allowed: " in result.stderr
+    assert f"{tmp_path}/case.nml" in result.stderr
+    assert re.search(words, result.stderr)
     assert len(result.stderr.splitlines()) == 1
     assert not (tmp_path / "outputs").exists()
 
@@ -209,14 +226,14 @@ def test_bad_input_is_told(
 def test_closing_shell_is_a_numerical_failure(run: Run, case_file: CaseFile) -> None:
     result = run(case_file("&ball / &drop height = 5000 / &model /"))
     assert result.returncode == 2
-    assert "&drop: height = 5000.0 m closes the shell" in result.stderr
+    assert re.search(naming("&drop: height", "5000.0 m"), result.stderr)
 
 
 def test_pipe_as_input_is_told(run: Run, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     result = run("pipe")
     assert result.returncode == 1
-    assert "pipe: the file is empty or not a regular file" in result.stderr
+    assert "pipe" in result.stderr
 
 
 @pytest.mark.parametrize("arguments", [["--keys"], ["case.nml"], ["case.nml", "--check"]])
@@ -250,8 +267,7 @@ def test_full_screen_is_told(
             check=False,
         )
     assert result.returncode == 1
-    sentence = "thud: standard output cannot be written (No space left on device); allowed: "
-    assert result.stderr.startswith(sentence)
+    assert re.match(naming("standard output", "No space left on device"), result.stderr)
 
 
 def test_closed_screen_is_no_failure(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
@@ -272,7 +288,8 @@ def test_interrupted_run_says_so(
         time.sleep(0.1)
         process.send_signal(signal.SIGINT)
         said = process.communicate()[1]
-    assert said == ("" if ignored else "thud: interrupted; nothing was written\n")
+    assert ("interrupted" in said) != ignored
+    assert said.count("\n") == (0 if ignored else 1)
     assert process.returncode == (0 if ignored else 130)
     assert (tmp_path / "outputs/case").exists() == ignored
 
@@ -281,8 +298,9 @@ def test_characters_that_no_screen_shows_are_replaced(run: Run, case_file: CaseF
     path = case_file(MINIMAL.replace("&model", "&model name = 'a\x00b\x07'"))
     result = run(path)
     assert result.returncode == 1
-    assert "&model: name = 'a?b?' is not allowed; allowed: 'hollow_sphere'" in result.stderr
-    with pytest.raises(thud.InputError, match=r"'a\?b\?' is not allowed; allowed: "):
+    words = naming("&model: name", "'a?b?'", "'hollow_sphere'")
+    assert re.search(words, result.stderr)
+    with pytest.raises(thud.InputError, match=words):
         thud.read_case(path)
 
 
@@ -292,7 +310,7 @@ def test_blanks_at_the_end_of_a_path_belong_to_it(
     case_file(MINIMAL, "ball.nml ")
     assert run("ball.nml ", "-o", "out ").returncode == 0
     assert (tmp_path / "out " / "effective.nml").exists()
-    assert "there is no such file" in run("ball.nml").stderr
+    assert "ball.nml" in run("ball.nml").stderr
 
 
 def test_name_that_is_no_text_is_refused(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
@@ -300,9 +318,7 @@ def test_name_that_is_no_text_is_refused(run: Run, case_file: CaseFile, tmp_path
     case_file(MINIMAL, odd)
     result = run(odd, errors="surrogateescape")
     assert result.returncode == 1
-    assert "&case: name = '?' is not allowed; allowed: a name for a directory, UTF-8" in (
-        result.stderr
-    )
+    assert re.search(naming("&case: name", "'?'", "UTF-8"), result.stderr)
     assert not (tmp_path / "outputs").exists()
     # A name in the file is enough.
     case_file(f"&case name = 'ball' / {MINIMAL}", odd)
@@ -329,7 +345,7 @@ def test_memory_that_is_short_is_told_in_one_sentence(
         done = run(*arguments, preexec_fn=limit_memory)
         if done.returncode != 0:
             assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-            assert re.match(r"thud: .*\d bytes.*; allowed: ", done.stderr)
+            assert re.search(r"\d bytes", done.stderr)
 
 
 def test_sentence_of_a_diverged_motion_has_no_nan(run: Run, case_file: CaseFile) -> None:
@@ -339,7 +355,8 @@ def test_sentence_of_a_diverged_motion_has_no_nan(run: Run, case_file: CaseFile)
     )
     result = run("case.nml")
     assert result.returncode == 2
-    assert "substeps is too low for this source: the motion leaves the range" in result.stderr
+    assert "&sampling: substeps" in result.stderr
+    assert "nan" not in result.stderr.lower()
 
 
 def test_advice_for_a_heavily_damped_contact_helps(run: Run, case_file: CaseFile) -> None:
@@ -355,7 +372,7 @@ def test_advice_for_a_heavily_damped_contact_helps(run: Run, case_file: CaseFile
         # No rate is named before the steps give the contact its true time.
         advice.append(re.sub(r": the (balance|motion).*", "", done.stderr))
         substeps *= 4
-    assert "sample_rate = 44100.0 Hz misses the force" in done.stderr
+    assert re.search(naming("sample_rate", "44100.0 Hz"), done.stderr)
     assert solve(1e6, substeps).returncode == 0
     assert len(set(advice)) == 1
-    assert "substeps is too low" in advice[0]
+    assert "substeps" in advice[0]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy.signal import butter, freqz_sos, sosfilt
 
 import thud
@@ -176,12 +177,12 @@ def test_silence_around_a_record_changes_nothing() -> None:
 @pytest.mark.parametrize(
     ("force", "rate", "words"),
     [
-        ([], 44100, "force is empty, zero throughout or not finite"),
-        ([0.0, 0.0], 44100, "zero throughout"),
-        ([1.0, np.nan], 44100, "not finite"),
-        ([1.0, 2.0], -1.0, "sample_rate = -1.0 is not allowed; allowed: sample_rate > 0"),
-        ([1.0, 2.0], np.nan, "sample_rate = nan"),
-        ([1.0, 2.0], "fast", "sample_rate = 'fast'"),
+        ([], 44100, naming("force")),
+        ([0.0, 0.0], 44100, naming("force")),
+        ([1.0, np.nan], 44100, naming("force", "finite")),
+        ([1.0, 2.0], -1.0, naming("sample_rate", "-1.0", 0)),
+        ([1.0, 2.0], np.nan, naming("sample_rate", "nan")),
+        ([1.0, 2.0], "fast", naming("sample_rate", "'fast'")),
     ],
 )
 def test_useless_records_are_refused(force: list[float], rate: float, words: str) -> None:

@@ -11,7 +11,7 @@ import f90nml
 import meshio
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
@@ -58,7 +58,7 @@ def test_results_are_read_back_to_the_last_bit(run: Callable[..., object], name:
 
 
 def test_results_that_are_none_are_told(tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match="allowed: the results of an impact"):
+    with pytest.raises(thud.InputError, match=naming(tmp_path)):
         thud.read_results(tmp_path)
 
 
@@ -119,7 +119,7 @@ def test_modes_and_impact_come_from_one_file(case_file: CaseFile, tmp_path: Path
     assert {"modes.csv", "modes.png", "force.csv", "force.png", "motion.png"} < names
     again = thud.read_case(tmp_path / "outputs/case/effective.nml")
     assert again == case
-    with pytest.raises(thud.InputError, match="one mesh for both"):
+    with pytest.raises(thud.InputError, match=naming("&mesh: radial_elements", 2, 8)):
         dataclasses.replace(case, modes=thud.Modes()).to_namelist()
 
 
@@ -202,25 +202,29 @@ def test_pressure_is_even_at_the_pole() -> None:
 
 
 BAD = {
-    "&mesh radial_elements = 0 /": "&mesh: radial_elements = 0",
-    "&mesh polar_elements = 7 /": "&mesh: polar_elements = 7",
-    "&material prony_share = -0.1, prony_time = 1e-3, viscosity = 'prony' /": "prony_share",
-    "&material prony_share = 0.1, prony_time = 0, viscosity = 'prony' /": "prony_time",
-    "&material prony_share = 0.1, 0.2, prony_time = 1e-3, viscosity = 'prony' /": "same number",
-    "&material viscosity = 'prony' /": "the same number of both",
-    "&material prony_share = 0.1, prony_time = 1e-3 /": "do nothing with viscosity",
-    "&material viscosity = 'constant_loss', loss_factor = 1 /": "no Prony series",
-    "&material bulk_ratio = 1e9 /": "&material: bulk_ratio",
-    "&contact friction = -0.1 /": "&contact: friction",
-    "&finite_element flight_before = 0.9 /": "longer than the fall",
-    "&finite_element bounces = 3 /": "after contact 3",
-    "&finite_element step_safety = 1.5 /": "&finite_element: step_safety",
-    "&mesh radial_elements = 1 /": "allowed: from 2",
-    "&sampling sample_rate = 8000 /": "allowed: from 16000.0 Hz",
-    "&sampling duration = 0.01 /": "&sampling: duration = 0.01 s ends less than",
-    "&output snapshot_interval = 1e-9 / &sampling sample_rate = 1e7, duration = 0.4 /": "snapshots",
-    "&modes count = 100 /": "&modes: count = 100",
-    "&hollow_sphere momentum_flux = 'none' /": "&hollow_sphere in line",
+    "&mesh radial_elements = 0 /": naming("&mesh: radial_elements", 0),
+    "&mesh polar_elements = 7 /": naming("&mesh: polar_elements", 7),
+    "&material prony_share = -0.1, prony_time = 1e-3, viscosity = 'prony' /": naming("prony_share"),
+    "&material prony_share = 0.1, prony_time = 0, viscosity = 'prony' /": naming("prony_time"),
+    "&material prony_share = 0.1, 0.2, prony_time = 1e-3, viscosity = 'prony' /": naming(
+        "prony_share", "prony_time"
+    ),
+    "&material viscosity = 'prony' /": naming("prony_share", "prony_time"),
+    "&material prony_share = 0.1, prony_time = 1e-3 /": naming("prony_share", "viscosity"),
+    "&material viscosity = 'constant_loss', loss_factor = 1 /": naming("&material", "loss_factor"),
+    "&material bulk_ratio = 1e9 /": naming("&material: bulk_ratio"),
+    "&contact friction = -0.1 /": naming("&contact: friction"),
+    "&finite_element flight_before = 0.9 /": naming("&finite_element: flight_before", "0.9 s"),
+    "&finite_element bounces = 3 /": naming("contact 3"),
+    "&finite_element step_safety = 1.5 /": naming("&finite_element: step_safety"),
+    "&mesh radial_elements = 1 /": naming("&mesh: radial_elements", 2),
+    "&sampling sample_rate = 8000 /": naming("&sampling: sample_rate", "16000.0 Hz"),
+    "&sampling duration = 0.01 /": naming("&sampling: duration", "0.01 s"),
+    "&output snapshot_interval = 1e-9 / &sampling sample_rate = 1e7, duration = 0.4 /": naming(
+        "snapshots"
+    ),
+    "&modes count = 100 /": naming("&modes: count", 100),
+    "&hollow_sphere momentum_flux = 'none' /": naming("&hollow_sphere", "line"),
 }
 
 
@@ -234,16 +238,16 @@ def test_bad_input_gets_one_sentence(group: str) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("&ball /\n&modes /\n&drop /\n", "&drop in line 3 does nothing with &modes alone"),
-        ("&modes /\n&mdel /\n", "&mdel in line 2 is not a known group (did you mean 'model'?)"),
-        ("&ball /\n&drop /\n&model /\n&mesh /\n", "&mesh in line 4 does nothing"),
-        (IMPACT.replace("&ball", "&ball gauge_pressure = 1e4"), "&ball: gauge_pressure"),
-        (IMPACT.replace("&ball", "&ball youngs_modulus = 1e3"), "duration = 0.05 s is too short"),
-        (IMPACT.replace("&drop", "&drop height = 1e3"), "ms after the start"),
+        ("&ball /\n&modes /\n&drop /\n", naming("&drop", "line 3", "&modes")),
+        ("&modes /\n&mdel /\n", naming("&mdel", "line 2", "'model'")),
+        ("&ball /\n&drop /\n&model /\n&mesh /\n", naming("&mesh", "line 4")),
+        (IMPACT.replace("&ball", "&ball gauge_pressure = 1e4"), naming("&ball: gauge_pressure")),
+        (IMPACT.replace("&ball", "&ball youngs_modulus = 1e3"), naming("duration", "0.05 s")),
+        (IMPACT.replace("&drop", "&drop height = 1e3"), naming("&finite_element", "ms")),
         (
             IMPACT.replace("&ball", "&ball youngs_modulus = 1e13")
             + "&material viscosity = 'kelvin_voigt' /",
-            "stability asks for steps",
+            naming("&finite_element", "s", "steps"),
         ),
     ],
 )
@@ -253,12 +257,9 @@ def test_impossible_cases_get_one_sentence(text: str, words: str) -> None:
 
 def check_refusal(text: str, words: str) -> None:
     Path("case.nml").write_text(text, encoding="utf-8")
-    with pytest.raises(thud.ThudError) as caught:
+    with pytest.raises(thud.ThudError, match=words) as caught:
         thud.solve_case(thud.read_case("case.nml"))
-    sentence = str(caught.value)
-    assert words in sentence
-    assert "allowed: " in sentence
-    assert "\n" not in sentence
+    assert "\n" not in str(caught.value)
 
 
 def test_snapshots_larger_than_the_disk_are_refused_before_the_run(
@@ -268,7 +269,7 @@ def test_snapshots_larger_than_the_disk_are_refused_before_the_run(
     output = "&output snapshot_interval = 1e-3 /\n"
     result = run(case_file(IMPACT + output), "--output", "/proc/thud")
     assert result.returncode == 1  # type: ignore[attr-defined]
-    assert "has space for 0" in result.stderr  # type: ignore[attr-defined]
+    assert re.search(naming("/proc/thud", "0.0 MB"), result.stderr)  # type: ignore[attr-defined]
 
 
 def test_free_modes_do_not_depend_on_what_was_computed_before() -> None:
@@ -280,7 +281,7 @@ def test_free_modes_do_not_depend_on_what_was_computed_before() -> None:
 def test_record_too_short_for_any_contact_is_told_before_it_is_computed() -> None:
     # Ten elements of 0.4 µm took minutes to the same end.
     ball = thud.Ball(wall_thickness=4e-7)
-    with pytest.raises(thud.InputError, match=r"duration = 0\.05 s is too short: .* above 2\.16"):
+    with pytest.raises(thud.InputError, match=naming("&sampling: duration", "0.05 s")):
         thud.solve(ball, model="finite_element", radial_elements=4, polar_elements=10)
 
 

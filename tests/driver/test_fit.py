@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy import stats
 
 import thud
@@ -270,11 +271,11 @@ def test_noise_is_estimated_from_the_residuals() -> None:
         (
             {"youngs_modulus": None, "poisson_ratio": 0.4},
             # F ~ E / sqrt(1 - nu2): d ln F = d ln E + nu2 / (1 - nu2) d ln nu.
-            r"poisson_ratio are not identifiable: .* youngs_modulus \* poisson_ratio\^0\.19",
+            r"youngs_modulus \* poisson_ratio\^0\.19",
         ),
         (
             ["youngs_modulus", "wall_thickness"],
-            r"not identifiable: youngs_modulus \+1 % and wall_th.* -0.5 % .* \* wall_thickness\^2",
+            naming("youngs_modulus +1 %", "wall_thickness -0.5 %", "* wall_thickness^2"),
         ),
     ],
 )
@@ -292,7 +293,7 @@ def test_parameters_that_are_not_identifiable_are_named(
 
 def test_parameter_without_effect_is_named() -> None:
     case = thud.Case(model=thud.ModalBall())
-    with pytest.warns(thud.FitWarning, match="loss_frequency has no effect on what is compared"):
+    with pytest.warns(thud.FitWarning, match=naming("loss_frequency")):
         fit = thud.fit(thud.solve_case(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
     assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
     assert np.isfinite(fit.standard_errors["youngs_modulus"])
@@ -302,7 +303,7 @@ def test_modulus_and_wall_are_hardly_identifiable_from_low_octaves() -> None:
     impact = thud.solve_case(MODAL)
     names = ["youngs_modulus", "wall_thickness"]
     low = thud.LevelTarget(impact.levels(force="floor")[:2], 0.5, frequencies=[31.5, 63])
-    with pytest.warns(thud.FitWarning, match=f"{names[0]} and {names[1]} are hardly identif"):
+    with pytest.warns(thud.FitWarning, match=naming(*names)):
         thud.fit(low, names, MODAL)
     # From the force itself they are.
     fit = thud.fit(thud.ForceTarget(impact, noise=5.0), names, MODAL)
@@ -338,11 +339,11 @@ def test_contact_time_is_reported_between_samples() -> None:
 
 def test_model_that_cannot_follow_is_reported() -> None:
     record = noisy_record(thud.solve_case(MODAL), 5.0, 1)
-    with pytest.warns(thud.FitWarning, match="the model does not follow the force"):
+    with pytest.warns(thud.FitWarning, match=naming("model", "force")):
         thud.fit(thud.ForceTarget(record, offset=False), ["youngs_modulus"])
     with (
-        pytest.warns(thud.FitWarning, match="the model does not follow the force"),
-        pytest.warns(thud.FitWarning, match="times what the given uncertainty lets expect"),
+        pytest.warns(thud.FitWarning, match=naming("model", "force")),
+        pytest.warns(thud.FitWarning, match=naming("uncertainty")),
     ):
         thud.fit(thud.ForceTarget(record, noise=5.0, offset=False), ["youngs_modulus"])
 
@@ -350,7 +351,7 @@ def test_model_that_cannot_follow_is_reported() -> None:
 def test_limits_hold_and_are_reported() -> None:
     limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.7e6)}
     fit = quiet_fit(thud.solve(TRUTH), limited)
-    assert fit.warnings[0].startswith("youngs_modulus ended at its limit, 1.7 MPa: ")
+    assert re.search(naming("youngs_modulus", "1.7 MPa"), fit.warnings[0])
     assert fit.values["youngs_modulus"] <= 1.7e6
 
 
@@ -369,14 +370,14 @@ def test_intervals_end_at_the_limits() -> None:
 def test_table_says_what_the_standard_deviations_are() -> None:
     record = noisy_record(thud.solve(TRUTH), 5.0, 3)
     found = str(quiet_fit(record, ["youngs_modulus"]))
-    assert re.search(r"; standard deviation [45]\.\d+ N, estimated from the residuals\n", found)
+    assert re.search(r"standard deviation [45]\.\d+ N, estimated", found)
     found = str(quiet_fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"]))
-    assert "; standard deviation 5 N, given\n" in found
+    assert "standard deviation 5 N, given" in found
     levels = thud.solve(TRUTH).levels(force="floor")
     found = str(quiet_fit(thud.LevelTarget(levels, [1, 1, 2, 2, 3]), ["youngs_modulus"]))
-    assert "; standard deviations given\n" in found
+    assert "standard deviations given" in found
     found = str(quiet_fit(thud.LevelTarget(levels + 0.1 * np.eye(5)[0]), ["youngs_modulus"]))
-    assert re.search(r"; standard deviation 0\.0\d+ dB, estimated from the residuals\n", found)
+    assert re.search(r"standard deviation 0\.0\d+ dB, estimated", found)
 
 
 def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -411,7 +412,9 @@ def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch)
         return solve(case)
 
     monkeypatch.setattr(misfit, "compute", only_here)
-    with pytest.raises(thud.NumericalError, match=r"youngs_modulus: .* around 2e\+06 \(out of"):
+    with pytest.raises(
+        thud.NumericalError, match=naming("youngs_modulus", "2e+06", "out of the model")
+    ):
         thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
 
 
@@ -425,7 +428,7 @@ def test_best_of_several_starts_counts() -> None:
     assert often.noise <= once.noise
     assert often.evaluations > once.evaluations
     assert not once.converged
-    assert "the search has not converged" in str(once)
+    assert "converged" in str(once)
 
 
 def test_start_around_which_the_model_fails_leaves_the_others(
@@ -485,5 +488,5 @@ def test_contact_times_that_jump_hide_no_parameter() -> None:
 def test_record_of_too_many_values_is_refused_before_it_takes_the_memory() -> None:
     time = np.arange(100_000) / 1e4
     target = thud.ForceTarget((time, np.exp(-((time - 5) ** 2) / 1e-5)), window=(0.0, 10.0))
-    with pytest.raises(thud.InputError, match="are 25000 values; allowed: up to 8000: a shorter"):
+    with pytest.raises(thud.InputError, match=naming("25000 values", 8000)):
         thud.fit(target, ["youngs_modulus"])

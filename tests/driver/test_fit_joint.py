@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
@@ -114,7 +114,7 @@ def test_forces_and_levels_are_fitted_together() -> None:
     ]
     fit = thud.fit(targets, ["youngs_modulus"], CASE)
     assert abs(fit.values["youngs_modulus"] - 1.8e6) < FAR * fit.standard_errors["youngs_modulus"]
-    assert "target 2: standard deviations given" in str(fit)
+    assert re.search(r"target 2\b.*standard deviation", str(fit))
     assert list(fit.figures()) == ["fit_1", "fit_2", "confidence"]
 
 
@@ -128,7 +128,7 @@ def test_record_that_does_not_fit_the_others_is_named(
     ]
     with pytest.warns(thud.FitWarning) as caught:
         thud.fit(targets, list(TRUTH), CASE)
-    assert any(str(one.message).startswith("target 2: ") for one in caught)
+    assert any("target 2" in str(one.message) for one in caught)
     free = [targets[0], replace(targets[1], gain=np.inf)]
     fit = thud.fit(free, list(TRUTH), CASE)
     assert abs(fit.values["gain(2)"] - 1.05) < FAR * fit.standard_errors["gain(2)"]
@@ -141,7 +141,7 @@ def test_heights_do_not_tell_modulus_from_wall(
         thud.ForceTarget(drop, fixed={"height": height})
         for drop, height in zip(drops[:2], HEIGHTS, strict=False)
     ]
-    with pytest.warns(thud.FitWarning, match=r"only youngs_modulus \* wall_thickness\^2 is determ"):
+    with pytest.warns(thud.FitWarning, match=naming("youngs_modulus * wall_thickness^2")):
         fit = thud.fit(targets, ["youngs_modulus", "wall_thickness"], CASE)
     assert np.isinf(fit.standard_errors["youngs_modulus"])
 
@@ -149,10 +149,9 @@ def test_heights_do_not_tell_modulus_from_wall(
 def test_pairs_that_cannot_be_told_apart_are_named() -> None:
     correlation = np.array([[1, -0.9993, 0.2], [-0.9993, 1, 0.93], [0.2, 0.93, 1]])
     names = ["loss_factor", "fractional_order", "youngs_modulus"]
-    assert pair_sentences(names, correlation, 0.9) == [
-        "loss_factor and fractional_order cannot be told apart: correlation −0.9993",
-        "fractional_order and youngs_modulus are hard to tell apart: correlation 0.93",
-    ]
+    first, second = pair_sentences(names, correlation, 0.9)
+    assert re.search(naming("loss_factor", "fractional_order", "−0.9993"), first)
+    assert re.search(naming("fractional_order", "youngs_modulus", 0.93), second)
     infinite = np.full((3, 3), np.nan)
     assert pair_sentences(names, infinite, 0.9) == []
 
@@ -162,9 +161,8 @@ def test_fit_says_what_is_hard_to_tell_apart() -> None:
     fit = thud.fit(
         thud.ForceTarget(record(CASE, 1.0, 5.0, 2)), ["youngs_modulus", "mass", "height"], CASE
     )
-    told = " ".join(fit.identifiability)
-    assert "youngs_modulus and mass are hard to tell apart: correlation 0.9" in told
-    assert fit.identifiability[0].startswith("least determined: ")
+    pair = r"youngs_modulus and mass .*0\.9"
+    assert any(re.search(pair, line) for line in fit.identifiability)
     assert fit.identifiability[0] in str(fit)
     assert fit.summary()["identifiability"] == list(fit.identifiability)
 
@@ -199,19 +197,20 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
     again = ["fit", "-q", "--no-figures", "-o", "found", "study.toml"]
     (folder / "study.toml").write_text(STUDY.replace("height = 1.0", "height = 1.01"))
     assert cli.main(again) == 1
-    assert "[target_2] fixed = {'height': 1.0} is now {'height': 1.01}" in capsys.readouterr().err
+    words = naming("[target_2]", "fixed", {"height": 1.0}, {"height": 1.01})
+    assert re.search(words, capsys.readouterr().err)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("height = 1.0", "mass = 2.0", "target 2: fixed mass is not allowed"),
-        ("height = 1.0", "heigth = 1.0", "target 2: fixed: 'heigth' is not a key|'heigth' is not"),
-        ('unit = "cm"', 'unit = "N"', "target 1: fixed height: unit 'N' does not fit"),
-        ("gain = 0.02", "gain = 'no'", r"target 2: gain = 'no' is not allowed|gain = 'no'"),
-        ("gain = 0.02", "hum = 3", r"target 2: hum = 3 is not allowed"),
-        ("gain = 0.02", "window = [0.02, 0.05]", r"target 2: the weight of its residuals is not"),
-        ("drop_2.csv", "drop_9.csv", "drop_9.csv: cannot be read"),
+        ("height = 1.0", "mass = 2.0", naming("target 2", "fixed", "mass")),
+        ("height = 1.0", "heigth = 1.0", naming("'heigth'", "'height'")),
+        ('unit = "cm"', 'unit = "N"', naming("target 1", "fixed height", "'N'", "cm")),
+        ("gain = 0.02", "gain = 'no'", naming("target 2", "gain", "'no'")),
+        ("gain = 0.02", "hum = 3", naming("target 2", "hum", 3)),
+        ("gain = 0.02", "window = [0.02, 0.05]", naming("target 2", "residuals")),
+        ("drop_2.csv", "drop_9.csv", naming("drop_9.csv")),
     ],
 )
 def test_bad_records_are_named(folder: Path, old: str, new: str, words: str) -> None:
@@ -224,10 +223,10 @@ def test_bad_records_are_named(folder: Path, old: str, new: str, words: str) -> 
 
 def test_lists_of_something_else_are_refused() -> None:
     for targets in ([], [3], [thud.solve()]):
-        with pytest.raises(thud.InputError, match="target is a list of something else"):
+        with pytest.raises(thud.InputError, match=naming("target", "list")):
             thud.fit(targets, ["youngs_modulus"])  # type: ignore[arg-type]
     for given in ([], [3]):
-        with pytest.raises(thud.InputError, match=r"allowed: a table \[target\], or several"):
+        with pytest.raises(thud.InputError, match=naming("table", "[target]")):
             thud.read_study({"target": given, "parameters": {"mass": {}}}, "fit")
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy import stats
 from scipy.linalg import toeplitz
 
@@ -410,10 +411,10 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
 @pytest.mark.parametrize(
     ("disturbance", "words"),
     [
-        ("blue noise", "the residuals are coloured: half of their power lies in the"),
-        ("spike", "the largest residual, at 86.6"),
-        ("ringing of 300 Hz", "times what the given uncertainty|the model does not follow"),
-        ("louder behind first touch", "times as large behind the contact|during the contact"),
+        ("blue noise", "coloured"),
+        ("spike", r"residual.* 86\.6"),
+        ("ringing of 300 Hz", "uncertainty|model"),
+        ("louder behind first touch", "contact"),
     ],
 )
 def test_noise_of_another_kind_warns(disturbance: str, words: str) -> None:
@@ -425,7 +426,7 @@ def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
     inside = (time > QUIET - 0.005) & (time < QUIET + 0.027)
     short = time[inside], force[inside]
     fit = quiet_fit(short, TRUTH, CASE)
-    assert "ms of quiet: offset, hum and colour of the noise are not known" in str(fit)
+    assert re.search(naming("ms", "offset", "hum", "noise"), str(fit))
     assert not fit.targets[0].nuisances
     decided = thud.fit(thud.ForceTarget(short, offset=True), TRUTH, CASE)
     assert set(decided.targets[0].nuisances) == {"offset"}
@@ -441,12 +442,9 @@ def test_white_residuals_pass_and_others_do_not() -> None:
     slow = np.convolve(white, [1.0, 1.0], "same") / np.sqrt(2)
     spiked = np.where(np.arange(251) == 100, 6.0, white)
     assert "lowest" in residual_doubts(slow, time)[0]
-    assert any("change their sign" in one for one in residual_doubts(slow, time))
-    assert (
-        "the largest residual, at 40 ms, is 6 standard deviations"
-        in residual_doubts(spiked, time)[0]
-    )
-    assert "change their sign 0 times" in " ".join(residual_doubts(np.abs(white), time))
+    assert any("sign" in one for one in residual_doubts(slow, time))
+    assert re.search(naming("residual", "40 ms", 6), residual_doubts(spiked, time)[0])
+    assert any(re.search(naming("sign", 0), one) for one in residual_doubts(np.abs(white), time))
     assert not residual_doubts(slow[:10], time[:10])
     # A constant is no frequency: it is told by its runs alone.
     assert not any("coloured" in one for one in residual_doubts(white + 3, time))
@@ -455,18 +453,18 @@ def test_white_residuals_pass_and_others_do_not() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"hum": 5.0}, r"target: hum = 5.0 is not allowed; allowed: 0, or 10 to 1250 Hz"),
-        ({"hum": "loud"}, r"target: hum = 'loud' is not allowed; allowed: finite numbers"),
-        ({"offset": 3}, r"target: offset = 3 is not allowed; allowed: true, false"),
-        ({"gain": -0.1}, r"target: gain = -0.1 is not allowed; allowed: numbers above 0"),
-        ({"fixed": 3}, r"target: fixed = 3 is not allowed; allowed: an object of Mapping"),
-        ({"fixed": {"height": 2.0}}, r"target: fixed height is not allowed; allowed: keys of"),
-        ({"fixed": {"size": 2.0}}, r"'size' is not a key of hollow_sphere"),
-        ({"fixed": {"mass": "big"}}, r"target: fixed mass = 'big' is not allowed"),
-        ({"fixed": {"mass": -2.0}}, r"&ball: mass = -2.0 is not allowed"),
+        ({"hum": 5.0}, naming("target", "hum", 5.0, 0, 10, "1250 Hz")),
+        ({"hum": "loud"}, naming("target", "hum", "'loud'")),
+        ({"offset": 3}, naming("target", "offset", 3, "true", "false")),
+        ({"gain": -0.1}, naming("target", "gain", -0.1, 0)),
+        ({"fixed": 3}, naming("target", "fixed", 3)),
+        ({"fixed": {"height": 2.0}}, naming("target", "fixed", "height")),
+        ({"fixed": {"size": 2.0}}, naming("'size'", "hollow_sphere")),
+        ({"fixed": {"mass": "big"}}, naming("target", "fixed mass", "'big'")),
+        ({"fixed": {"mass": -2.0}}, naming("&ball: mass", -2.0, "kg")),
         (
             {"gain": 0.1, "window": (QUIET - 0.005, QUIET + 0.027)},
-            r"target: gain = 0.1 is not allowed without a known noise; allowed: noise, 0.02 s",
+            naming("target", "gain", 0.1, "noise", "0.02 s"),
         ),
     ],
 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
@@ -96,7 +96,7 @@ def test_doubts_are_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert cli.main(["fit", "-q", "-o", "found", "study.toml"]) == 0
     captured = capsys.readouterr()
     assert captured.out == ""
-    assert "thud-driver: study.toml: youngs_modulus and wall_thickness are not" in captured.err
+    assert re.search(naming("study.toml", "youngs_modulus", "wall_thickness"), captured.err)
     saved = json.loads((tmp_path / "found/fit.json").read_text())
     assert saved["parameters"]["wall_thickness"]["standard_error"] is None
 
@@ -106,7 +106,7 @@ def test_search_without_an_end_is_a_failure(
 ) -> None:
     (tmp_path / "study.toml").write_text(f"max_steps = 1\n{STUDY}")
     assert cli.main(["fit", "--no-figures", "study.toml"]) == 2
-    assert "the search has not converged" in capsys.readouterr().err
+    assert "converged" in capsys.readouterr().err
 
 
 def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
@@ -128,12 +128,8 @@ def test_results_of_another_fit_are_not_touched(
     (tmp_path / "study.toml").write_text(STUDY.replace("1.4", "1.5"))
     assert cli.main(arguments) == 1
     error = capsys.readouterr().err
-    assert "found/fit.json belongs to another version of this study: " in error
-    assert (
-        ": [parameters] youngs_modulus = { start = 1.4, unit = 'MPa' } is now { start = 1.5"
-        in error
-    )
-    assert "; allowed: another directory, or --replace" in error
+    words = naming("found/fit.json", "[parameters] youngs_modulus", 1.4, 1.5, "--replace")
+    assert re.search(words, error)
     assert (tmp_path / "found/fit.json").read_bytes() == before
     (tmp_path / "found/fit.json").write_text("[]")
     assert cli.main(arguments) == 1
@@ -149,9 +145,7 @@ def test_useless_directory_is_reported_before_the_search(
     (tmp_path / "study.toml").write_text(STUDY)
     monkeypatch.delattr("thud.studies.fit.search")
     assert cli.main(["fit", "-q", "-o", place, "study.toml"]) == 1
-    error = capsys.readouterr().err
-    assert error.startswith(f"thud-driver: {place}")
-    assert error.endswith("; allowed: a place that you may write to\n")
+    assert place in capsys.readouterr().err
 
 
 def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
@@ -162,64 +156,64 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
     assert cli.main(["fit", "-o", "found", "study.toml"]) == 1
     captured = capsys.readouterr()
     assert not captured.out
-    assert "found/fit.csv is a directory" in captured.err
+    assert "found/fit.csv" in captured.err
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("youngs_modulus", "hardness", r"\[parameters\] hardness is not a parameter .* allowed: o"),
-        ("MPa", "mm", r"\[parameters\] youngs_modulus: unit 'mm' does not fit; allowed: Pa, kPa"),
-        ("1.4", "-1", r"youngs_modulus: start = -1e\+06 is not allowed; allowed: 0 <= start <="),
-        ("1.4", "'soft'", r"youngs_modulus: start = 'soft' is not allowed; allowed: finite"),
-        ("1.4", "nan", r"start = nan is not allowed"),
-        ("1.4", f"1{'0' * 400}", r"start = a very large number is not allowed"),
-        ("start", "lower", r"\[parameters\] youngs_modulus: 'lower' is now 'low'; allowed: start"),
-        ("start", "begin", r"'begin' is not known; allowed: start, low, high, unit"),
-        ("file", "files", r"\[target\] takes one of file and levels"),
-        ("record.csv", "nowhere.csv", r"nowhere.csv: cannot be read"),
+        ("youngs_modulus", "hardness", naming("[parameters]", "hardness", "outer_radius")),
+        ("MPa", "mm", naming("[parameters] youngs_modulus", "'mm'", "Pa", "kPa")),
+        ("1.4", "-1", naming("youngs_modulus", "start", "-1e+06", 0)),
+        ("1.4", "'soft'", naming("youngs_modulus", "start", "'soft'")),
+        ("1.4", "nan", naming("start", "nan")),
+        ("1.4", f"1{'0' * 400}", naming("youngs_modulus", "start")),
+        ("start", "lower", naming("[parameters] youngs_modulus", "'lower'", "'low'")),
+        ("start", "begin", naming("'begin'", "start", "low", "high", "unit")),
+        ("file", "files", naming("[target]", "file", "levels")),
+        ("record.csv", "nowhere.csv", naming("nowhere.csv")),
         (
             "[target]",
             "[targets]",
-            r"'targets' is not known .did you mean 'target'..; allowed: name, case, fixed",
+            naming("'targets'", "'target'", "case", "fixed"),
         ),
-        ("[target]", "case = 'no.nml'\n[target]", r"no.nml: there is no such file"),
-        ("[target]", "starts = 1.5\n[target]", r"starts = 1.5 is not allowed; allowed: whole"),
-        ("[target]", "seed = -1\n[target]", r"seed = -1 is not allowed"),
-        ("[target]", "confidence = 2\n[target]", r"confidence = 2 is not allowed; allowed: 0"),
-        ("[target]", "level = 0.9\n[target]", r"'level' is now 'confidence'; allowed: name"),
-        ("[target]", "base = 'no.nml'\n[target]", r"'base' is now 'case'; allowed: name"),
-        ("[target]", "fixed.mass = -1\n[target]", r"\[fixed\]: &ball: mass = -1.0 is not allowed"),
-        ("[target]", "fixed.density = -1\n[target]", r"\[fixed\]: &ball: mass = .* is not allowed"),
+        ("[target]", "case = 'no.nml'\n[target]", naming("no.nml")),
+        ("[target]", "starts = 1.5\n[target]", naming("starts", 1.5, 1)),
+        ("[target]", "seed = -1\n[target]", naming("seed", -1, 0)),
+        ("[target]", "confidence = 2\n[target]", naming("confidence", 2, 0, 1)),
+        ("[target]", "level = 0.9\n[target]", naming("'level'", "'confidence'")),
+        ("[target]", "base = 'no.nml'\n[target]", naming("'base'", "'case'")),
+        ("[target]", "fixed.mass = -1\n[target]", naming("[fixed]", "&ball: mass", -1.0)),
+        ("[target]", "fixed.density = -1\n[target]", naming("[fixed]", "&ball: mass", "kg")),
         (
             "[target]",
             "fixed.youngs_modulus = 1\n[target]",
-            r"\[fixed\] youngs_modulus has no use beside \[parameters\]",
+            naming("[fixed]", "youngs_modulus", "[parameters]"),
         ),
-        ("[target]", "[target", r"study.toml: .*; allowed: TOML"),
-        ("[target]", "[target]\nnoise = 0", r"noise = 0 is not allowed"),
-        ("[target]", "[target]\ntime_shift = 1", r"time_shift = 1 is not allowed; allowed: true"),
-        ("[target]", "[target]\nwindow = 3", r"window = 3 is not allowed"),
+        ("[target]", "[target", naming("study.toml", "TOML")),
+        ("[target]", "[target]\nnoise = 0", naming("noise", 0)),
+        ("[target]", "[target]\ntime_shift = 1", naming("time_shift", 1, "true", "false")),
+        ("[target]", "[target]\nwindow = 3", naming("window", 3)),
         (
             'file = "record.csv"',
             "levels = [39]",
-            r"levels = \[39\] is not allowed; allowed: 5 real",
+            naming("levels", [39], 5),
         ),
-        ('file = "record.csv"', "levels = []\nbands = []", r"bands = \[\]"),
+        ('file = "record.csv"', "levels = []\nbands = []", naming("bands", [])),
         (
             'file = "record.csv"',
             "levels = [1]\nfrequencies = 3",
-            r"frequencies = 3 is not allowed; allowed: 1 real",
+            naming("frequencies", 3, 1),
         ),
         (
             'file = "record.csv"',
             "levels = [39, 31, 23, 17, 12]\ncontact_time = 20",
-            r"contact_time = 20 is not allowed; allowed: a table of value",
+            naming("contact_time", 20, "value"),
         ),
         (
             'file = "record.csv"',
             "levels = [39, 31, 23, 17, 12]\ncontact_time = {value=20, uncertainty=1, unit='m'}",
-            r"contact_time: unit 'm' does not fit; allowed: s, ms, us",
+            naming("contact_time", "'m'", "s", "ms", "us"),
         ),
     ],
 )
@@ -231,13 +225,12 @@ def test_bad_studies_are_reported(
     assert cli.main(["fit", "study.toml"]) == 1
     error = capsys.readouterr().err
     assert len(error.strip().splitlines()) == 1
-    assert "; allowed: " in error or "no such file" in error
     assert re.search(words, error), error
 
 
 def test_study_that_is_not_there_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["fit", "nowhere.toml"]) == 1
-    assert "nowhere.toml: No such file or directory; allowed: " in capsys.readouterr().err
+    assert "nowhere.toml" in capsys.readouterr().err
 
 
 def test_targets_are_those_of_their_script(
@@ -270,8 +263,8 @@ def test_results_of_another_record_or_case_are_not_touched(
             before = (tmp_path / "found/fit.json").read_bytes()
             continue
         assert cli.main(fit) == 1
-        told = "&ball: mass = 2.5 is now 2.4" if mass == 2.4 else "numbers of [target] = "
-        assert f"another version of this study: {told}" in capsys.readouterr().err
+        words = naming("&ball: mass", 2.5, 2.4) if mass == 2.4 else naming("numbers", "[target]")
+        assert re.search(words, capsys.readouterr().err)
         assert (tmp_path / "found/fit.json").read_bytes() == before
 
 
@@ -283,7 +276,7 @@ def test_fits_take_a_directory_one_at_a_time(
     (tmp_path / "found").mkdir()
     descriptor = lock(tmp_path / "found", tmp_path / "found/fit.json")
     assert cli.main(fit) == 1
-    assert "fit.json is being computed; allowed: wait, or another" in capsys.readouterr().err
+    assert "found/fit.json" in capsys.readouterr().err
     os.close(descriptor)
     assert cli.main(fit) == 0
 
@@ -324,5 +317,5 @@ youngs_modulus = { start = 1400, unit = "kPa" }
     study = {"fixed": density, "target": {"levels": [39, 31, 23, 17, 12]}}
     found = thud.read_study({**study, "parameters": {"youngs_modulus": {}}}, "fit")
     assert found.case.ball.mass == pytest.approx(1e3 * 4 / 3 * np.pi * (0.089**3 - 0.057**3))
-    with pytest.raises(thud.InputError, match="density is not allowed beside a geometry"):
+    with pytest.raises(thud.InputError, match=naming("density", "geometry")):
         thud.read_study({**study, "parameters": {"wall_thickness": {}}}, "fit")

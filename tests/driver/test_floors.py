@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 
@@ -111,7 +112,7 @@ def test_results_on_a_floor_are_read_back(
 
 
 def test_models_of_the_blocked_force_say_so() -> None:
-    with pytest.warns(thud.PlausibilityWarning, match="does not move under the model 'measured_m"):
+    with pytest.warns(thud.PlausibilityWarning, match=naming("'measured_modes'", "floor")):
         impact = thud.solve(model=MODES, floor=LIGHT)
     assert impact.on_floor is None
 
@@ -131,25 +132,25 @@ def test_points_of_a_plate_move(
     assert under == pytest.approx(found.floor_velocity, abs=0.02 * scale)
     assert far == pytest.approx(found.velocity_at(1.0, 0.5), abs=1e-12)
     assert 0 < abs(far).max() < scale
-    with pytest.raises(thud.InputError, match=r"&plate: .*allowed"):
+    with pytest.raises(thud.InputError, match=naming("&plate", "5.0 m")):
         thud.solve(floor=thud.Plate(point_x=[9.0], point_y=[1.0]))
-    with pytest.raises(thud.InputError, match="point_x has 2 values and point_y 1; allowed: as"):
+    with pytest.raises(thud.InputError, match=naming("point_x", 2, "point_y", 1)):
         thud.solve(floor=thud.Plate(point_x=[1.0, 2.0], point_y=[1.0]))
 
 
 def test_points_are_of_floors_with_sides(moved: thud.FloorImpact) -> None:
-    with pytest.raises(thud.InputError, match="no points but that under the source"):
+    with pytest.raises(thud.InputError, match=naming("points")):
         moved.velocity_at(1.0, 1.0)
-    with pytest.raises(thud.InputError, match="no points but that under the source"):
+    with pytest.raises(thud.InputError, match=naming("points")):
         thud.mobility(LIGHT, [50.0], (1.0, 1.0))
 
 
 @pytest.mark.parametrize(
     ("floor", "words"),
     [
-        (thud.InfinitePlate(0.0), "&infinite_plate: resistance = 0.0 is not allowed"),
-        (thud.Oscillator(stiffness=-1.0), "&oscillator: stiffness = -1.0 is not allowed"),
-        ("plate", "floor = 'plate' is not allowed"),
+        (thud.InfinitePlate(0.0), naming("&infinite_plate: resistance", 0.0)),
+        (thud.Oscillator(stiffness=-1.0), naming("&oscillator: stiffness", -1.0)),
+        ("plate", naming("floor", "'plate'")),
     ],
 )
 def test_floors_that_cannot_be_are_refused(floor: thud.FloorOptions, words: str) -> None:
@@ -175,13 +176,13 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
 
 @pytest.mark.parametrize("point", [0, (1.0,), (1, 2, 3), "ab", (1j, 1), (None, 1), (np.nan, 1)])
 def test_points_that_are_no_pair_are_refused(point: Any) -> None:  # noqa: ANN401
-    with pytest.raises(thud.InputError, match="point"):
+    with pytest.raises(thud.InputError, match=naming("point")):
         thud.mobility(thud.Plate(), [31.5], point)
 
 
 @pytest.mark.parametrize("frequency", [np.nan, np.inf])
 def test_mobility_at_no_frequency_is_refused(frequency: float) -> None:
-    with pytest.raises(thud.InputError, match="not finite"):
+    with pytest.raises(thud.InputError, match=naming("frequency", "finite")):
         thud.mobility(thud.Plate(), [31.5, frequency])
 
 

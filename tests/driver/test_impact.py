@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 from thud.contact_time import contact_span
@@ -96,21 +97,21 @@ def test_threads_do_not_disturb_each_other() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"model": "cube"}, r"&model: name = 'cube' is not known; allowed: 'hollow_sphere'"),
-        ({"momentum_flux": "some"}, r"&hollow_sphere: momentum_flux = 'some' .* 'momentum_bal"),
-        ({"stiffness": 1.0}, r"&hollow_sphere: 'stiffness' is a key of HuntCrossley and Osc"),
-        ({"sample_rate": 0.0}, r"&sampling: sample_rate = 0.0"),
-        ({"duration": 0.01}, r"&sampling: duration = 0.01 s ends while"),
-        ({"substeps": 0}, r"&sampling: substeps = 0 is not allowed; allowed: 1 <= substeps"),
-        ({"ball": thud.Ball(poisson_ratio=0.7)}, r"&ball: poisson_ratio = 0.7"),
-        ({"drop": thud.Drop(height=-1.0)}, r"&drop: height = -1.0"),
-        ({"ball": 1}, r"ball = 1 is not allowed; allowed: an object of Ball"),
-        ({"ball": {}}, r"ball = {} is not allowed; allowed: an object of Ball"),
-        ({"drop": 0.0}, r"drop = 0.0 is not allowed; allowed: an object of Drop"),
-        ({"ball": thud.Ball(mass=10**5000)}, r"&ball: mass = a very large number"),
+        ({"model": "cube"}, naming("&model: name", "'cube'", "'hollow_sphere'")),
+        ({"momentum_flux": "some"}, naming("&hollow_sphere: momentum_flux", "'some'", "'none'")),
+        ({"stiffness": 1.0}, naming("'stiffness'", "HuntCrossley", "Oscillator")),
+        ({"sample_rate": 0.0}, naming("&sampling: sample_rate", 0.0, 2000)),
+        ({"duration": 0.01}, naming("&sampling: duration", "0.01 s")),
+        ({"substeps": 0}, naming("&sampling: substeps", 0, 1, 10000)),
+        ({"ball": thud.Ball(poisson_ratio=0.7)}, naming("&ball: poisson_ratio", 0.7, 0.5)),
+        ({"drop": thud.Drop(height=-1.0)}, naming("&drop: height", "-1.0")),
+        ({"ball": 1}, naming("ball", 1, "Ball")),
+        ({"ball": {}}, naming("ball", {}, "Ball")),
+        ({"drop": 0.0}, naming("drop", 0.0, "Drop")),
+        ({"ball": thud.Ball(mass=10**5000)}, naming("&ball: mass")),
         (
             {"ball": thud.Ball(youngs_modulus=7e10), "substeps": 64},
-            r"&sampling: sample_rate = .* too few samples",
+            naming("&sampling: sample_rate", "44100.0 Hz", "74657.91175803794 Hz"),
         ),
     ],
 )
@@ -120,14 +121,14 @@ def test_bad_arguments_are_told(arguments: dict[str, object], words: str) -> Non
 
 
 def test_numerical_failures_are_told() -> None:
-    with pytest.raises(thud.NumericalError, match=r"&drop: height = 1000.0 m closes the shell"):
+    with pytest.raises(thud.NumericalError, match=naming("&drop: height", "1000.0 m", "114.00 mm")):
         thud.solve(drop=thud.Drop(1000.0))
-    with pytest.raises(thud.NumericalError, match=r"&sampling: substeps is too low"):
+    with pytest.raises(thud.NumericalError, match=naming("&sampling: substeps")):
         thud.solve(thud.Ball(youngs_modulus=1e10))
 
 
 def test_unknown_force_is_told() -> None:
-    with pytest.raises(thud.InputError, match="'elastic', 'floor'"):
+    with pytest.raises(thud.InputError, match=naming("'total'", "'elastic'", "'floor'")):
         thud.solve().levels(force="total")
 
 
@@ -168,7 +169,7 @@ def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
     found = thud.solve_case(more)
     assert found.case == more
     assert (found.floor_force == default.floor_force).all()
-    with pytest.raises(thud.InputError, match="&model is missing"):
+    with pytest.raises(thud.InputError, match=naming("&model")):
         thud.solve_case(replace(more, model=None))
 
 
@@ -189,5 +190,5 @@ def test_part_that_a_model_has_not_is_told() -> None:
     impact = thud.solve()
     for name in ("shell_force", "gas_force", "flux_force"):
         assert getattr(impact, name) is impact.parts[name]
-    with pytest.raises(AttributeError, match="has no gas_force"):
+    with pytest.raises(AttributeError, match=naming("gas_force")):
         _ = thud.solve(model="hunt_crossley", contact_time=0.02).gas_force

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
@@ -25,7 +25,7 @@ def test_every_kind_follows_from_its_line(name: str) -> None:
 
 
 def test_unknown_kind_is_reported() -> None:
-    with pytest.raises(thud.InputError, match="kind = 'cube' is not known; allowed: 'sweep'"):
+    with pytest.raises(thud.InputError, match=naming("kind", "'cube'", "'sweep'")):
         thud.read_study({}, "cube")
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 from thud.criteria import Conformity, Criterion
@@ -63,11 +64,11 @@ def test_threads_share_plans() -> None:
 @pytest.mark.parametrize(
     ("record", "rate", "words"),
     [
-        ([], 44100, "force has no samples"),
-        ([1.0, np.nan], 44100, "not finite"),
-        (PULSE, 0.0, "sample_rate = 0.0 is not allowed; allowed: sample_rate > 0"),
-        (PULSE, -1.0, "sample_rate = -1.0 is not allowed"),
-        (PULSE, np.nan, "sample_rate = nan is not allowed"),
+        ([], 44100, naming("force", "samples")),
+        ([1.0, np.nan], 44100, naming("force", "finite")),
+        (PULSE, 0.0, naming("sample_rate", 0.0)),
+        (PULSE, -1.0, naming("sample_rate", -1.0)),
+        (PULSE, np.nan, naming("sample_rate", "nan")),
     ],
 )
 def test_peaks_of_useless_records_are_not_counted(record: object, rate: float, words: str) -> None:
@@ -89,29 +90,33 @@ def test_anything_like_an_array_is_a_record() -> None:
 @pytest.mark.parametrize(
     ("record", "options", "words"),
     [
-        ([], {}, "0 samples; allowed: 1 to"),
-        ([0.0, 0.0], {}, "zero throughout"),
-        ([1.0, np.nan], {}, "not finite, first at sample 2"),
-        ([1.0, np.inf], {}, "not finite"),
-        ([[1.0]], {}, "2 dimensions"),
-        (1.0, {}, "0 dimensions"),
-        ([1j, 2j], {}, "real numbers"),
-        (["a"], {}, "not an array of real numbers"),
-        ([[1.0], [2.0, 3.0]], {}, "not an array of numbers"),
-        ([None, 1.0], {}, "not an array of real numbers"),
-        ([10**400], {}, "not an array of real numbers"),
-        (np.ma.masked_greater([1.0, 2.0], 1.5), {}, "masked entries"),
-        ([1e-160] * 10, {}, "zero throughout, or next to it"),
-        (PULSE, {"sample_rate": 10**400}, "sample_rate = a very large number is not a number"),
-        (PULSE, {"bands": np.array(["octave", "third"])}, "bands = array"),
-        (PULSE, {"method": "é\ud800"}, "is not known"),
-        (None, {}, "force"),
-        ([1e200], {}, "too large"),
-        (PULSE, {"sample_rate": 1000.0}, "sample_rate = 1000.0 Hz is not allowed"),
-        (PULSE, {"sample_rate": np.nan}, "sample_rate = NaN"),
-        (PULSE, {"sample_rate": "fast"}, "sample_rate = 'fast' is not a number"),
-        (PULSE, {"bands": "fifth"}, "bands = 'fifth' is not known; allowed: 'octave', 'third'"),
-        (PULSE, {"method": "guess"}, "'guess' is not known; allowed: 'exact', 'fft'"),
+        ([], {}, naming("force", 0, 1, 100000000)),
+        ([0.0, 0.0], {}, naming("force", "zero")),
+        ([1.0, np.nan], {}, naming("force", "finite", "sample 2")),
+        ([1.0, np.inf], {}, naming("force", "finite", "sample 2")),
+        ([[1.0]], {}, naming("force", "2 dimensions")),
+        (1.0, {}, naming("force", "0 dimensions")),
+        ([1j, 2j], {}, naming("force", "real")),
+        (["a"], {}, naming("force", "real")),
+        ([[1.0], [2.0, 3.0]], {}, naming("force", "numbers")),
+        ([None, 1.0], {}, naming("force", "real")),
+        ([10**400], {}, naming("force", "real")),
+        (np.ma.masked_greater([1.0, 2.0], 1.5), {}, naming("force", "masked")),
+        ([1e-160] * 10, {}, naming("force", "zero")),
+        (PULSE, {"sample_rate": 10**400}, naming("sample_rate", "number")),
+        (PULSE, {"bands": np.array(["octave", "third"])}, naming("bands", "['octave', 'third']")),
+        (PULSE, {"method": "é\ud800"}, naming("method", "'exact'")),
+        (None, {}, naming("force")),
+        ([1e200], {}, naming("force", "N")),
+        (
+            PULSE,
+            {"sample_rate": 1000.0},
+            naming("sample_rate", "1000.0 Hz", "1415.8915687682759 Hz"),
+        ),
+        (PULSE, {"sample_rate": np.nan}, naming("sample_rate", "NaN", "1415.8915687682759 Hz")),
+        (PULSE, {"sample_rate": "fast"}, naming("sample_rate", "'fast'")),
+        (PULSE, {"bands": "fifth"}, naming("bands", "'fifth'", "'octave'", "'third'")),
+        (PULSE, {"method": "guess"}, naming("method", "'guess'", "'exact'", "'fft'")),
     ],
 )
 def test_useless_records_are_refused(
@@ -131,21 +136,23 @@ def test_silence_between_bands_has_the_level_of_rounding() -> None:
 
 
 def test_verdict_needs_five_levels() -> None:
-    with pytest.raises(thud.InputError, match=r"shape \(4,\)"):
+    with pytest.raises(thud.InputError, match=naming("levels", "(4,)", "(5,)")):
         thud.judge([1, 2, 3, 4], 0.02, 0.8, 1, 2.5, 1.0)
-    with pytest.raises(thud.InputError, match="'rubber_ball', 'tyre'"):
+    with pytest.raises(
+        thud.InputError, match=naming("source", "'hammer'", "'rubber_ball'", "'tyre'")
+    ):
         thud.judge([1, 2, 3, 4, 5], 0.02, 0.8, 1, 2.5, 1.0, source="hammer")
 
 
 @pytest.mark.parametrize("peaks", [1.9, -1, None, "x", np.nan, 2**32 + 1], ids=repr)
 def test_peaks_are_counted_in_whole_numbers(peaks: object) -> None:
-    with pytest.raises(thud.InputError, match=r"peaks = .* is not allowed; allowed: 0 <= peaks"):
+    with pytest.raises(thud.InputError, match=naming("peaks", repr(peaks), 0, 2147483648)):
         thud.judge([39, 31, 23, 17, 12.5], 0.02, 0.8, peaks, 2.5, 1.0)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("value", [[0.02, 3], 1j, "soon", None, 10**400], ids=type)
 def test_criteria_are_single_numbers(value: object) -> None:
-    with pytest.raises(thud.InputError, match=r"contact_time = .* is not a number"):
+    with pytest.raises(thud.InputError, match=naming("contact_time", "number")):
         thud.judge([39, 31, 23, 17, 12.5], value, 0.8, 1, 2.5, 1.0)  # type: ignore[arg-type]
 
 
@@ -225,7 +232,7 @@ def test_most_peaks_are_those_of_a_whole_number_of_four_bytes() -> None:
     levels = [39, 31, 23, 17, 12.5]
     assert not thud.judge(levels, 0.02, 0.8, 2**31 - 1, 2.5, 1.0)
     assert thud.judge(levels, 0.02, 0.8, np.int64(1), 2.5, 1.0)
-    with pytest.raises(thud.InputError, match="peaks = "):
+    with pytest.raises(thud.InputError, match=naming("peaks", 2**31)):
         thud.judge(levels, 0.02, 0.8, 2**31, 2.5, 1.0)
-    with pytest.raises(thud.InputError, match="sample_rate = inf"):
+    with pytest.raises(thud.InputError, match=naming("sample_rate", "inf")):
         peak_count(PULSE, np.inf)

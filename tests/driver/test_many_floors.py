@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 
@@ -69,7 +71,7 @@ def test_blocked_drop_is_kept_only_while_it_is_the_same(many: thud.Ensemble) -> 
 def test_failed_floors_have_a_reason_and_no_numbers() -> None:
     found = thud.solve_many({"thickness": [0.1, -1.0]}, CASE)
     assert found.status.tolist() == [0, 1]
-    assert "&plate: thickness = -1.0 is not allowed" in found.reason[1]
+    assert re.search(naming("&plate: thickness", "-1.0"), found.reason[1])
     assert found.room_level is not None
     assert np.isnan(found.room_level[1]).all()
     assert np.isfinite(found.room_level[0]).all()
@@ -84,7 +86,7 @@ def test_keys_of_one_name_are_told_apart_by_their_group() -> None:
     assert bare.peak_force[0] < 0.99 * named.peak_force[0]
     assert named.floor_work[0] > 1.1 * bare.floor_work[0]
     for name in ("plate.mass", "oscillator.volume", ".mass", "oscillator."):
-        with pytest.raises(thud.InputError, match=r"is not a key of hollow_sphere and oscillator"):
+        with pytest.raises(thud.InputError, match=naming(name, "hollow_sphere", "oscillator")):
             thud.solve_many({name: [1.0]}, case)
 
 
@@ -136,5 +138,5 @@ def test_surrogates_refuse_floors(tmp_path: Path) -> None:
     path = tmp_path / "case.nml"
     path.write_text(TEXT, encoding="utf-8")
     study = {"case": str(path), "parameters": {"height": {"low": 0.5, "high": 1.0, "count": 3}}}
-    with pytest.raises(thud.InputError, match="knows no floors"):
+    with pytest.raises(thud.InputError, match=naming("surrogate", "floor")):
         thud.sweep({**study, "surrogate": {}})

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import pickle
+import re
 import subprocess
 import sys
 import tomllib
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import soundfile
-from conftest import REPOSITORY, recorded
+from conftest import REPOSITORY, naming, recorded
 from synthetic import make_recording
 
 import thud
@@ -101,11 +102,11 @@ def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["missing.wav"], "missing.wav"),
-        (["kilo.csv"], "kilo.csv"),
-        (["drop.wav", "--height", "-1"], "height = -1"),
-        (["drop.wav", "--config", "no.toml"], "no.toml"),
-        (["drop.wav", "--channel", "9"], "drop.wav"),
+        (["missing.wav"], naming("missing.wav")),
+        (["kilo.csv"], naming("kilo.csv", "kN")),
+        (["drop.wav", "--height", "-1"], naming("height", -1)),
+        (["drop.wav", "--config", "no.toml"], naming("no.toml")),
+        (["drop.wav", "--channel", "9"], naming("drop.wav", "channel", 9)),
     ],
 )
 def test_bad_recordings_get_one_sentence(
@@ -122,9 +123,7 @@ def test_bad_recordings_get_one_sentence(
     np.savetxt("kilo.csv", np.c_[np.arange(len(force)) / impact.sample_rate, force])
     assert cli.main(["measure", *arguments, "--calibration", "5000 N/FS", "-q"]) == 1
     errors = capsys.readouterr().err
-    assert errors.startswith("thud-driver: ")
-    assert words in errors
-    assert "; allowed: " in errors
+    assert re.search(words, errors)
     assert errors.count("\n") == 1
     assert not (tmp_path / "outputs").exists()
 
@@ -158,9 +157,9 @@ def test_dropout_that_rang_in_the_correction_of_a_plate(tmp_path: Path) -> None:
     soundfile.write(tmp_path / "lost.wav", values, rate, "PCM_24")
     whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "lost.wav", tmp_path)
     np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
-    assert any("1 dropouts of 0.125 ms" in step for step in filled.steps)
-    assert any("the contact has 1 dropouts" in remark for remark in filled.remarks)
-    assert not any("dropouts" in remark for remark in whole.remarks)
+    assert any(re.search(naming("dropout", "0.125 ms"), step) for step in filled.steps)
+    assert any("dropout" in remark for remark in filled.remarks)
+    assert not any("dropout" in remark for remark in whole.remarks)
 
 
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
@@ -225,7 +224,7 @@ def test_uncertainty_of_the_calibration_that_counted_as_zero_or_was_dropped() ->
         assert known.calibration_uncertainty == 0.005
         assert not any("calibration" in remark for remark in known.remarks)
         assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
-    with pytest.raises(thud.InputError, match="calibration_uncertainty = -1 is not allowed"):
+    with pytest.raises(thud.InputError, match=naming("calibration_uncertainty", -1)):
         thud.read_recording(table, calibration_uncertainty=-1)
 
 
@@ -279,14 +278,14 @@ def test_restitution_of_a_slower_bounce_that_was_judged() -> None:
     assert np.isnan(recording.restitution)
     (decision,) = [d for d in recording.conformity().decisions if d.name == "restitution"]
     assert decision.verdict == "cannot be decided"
-    assert sum("of the first bounce is 0.8" in remark for remark in recording.remarks) == 3
+    assert sum(bool(re.search(r"bounce.* 0\.8", remark)) for remark in recording.remarks) == 3
 
 
 def test_drops_without_a_restitution_are_told() -> None:
     config = replace(read_config(FOLDER / "lab.toml"), mass=None)
     files = [FOLDER / "drop_1.wav", FOLDER / "three_drops.flac"]
     recording = thud.read_recording(files, config=config)
-    assert "the restitution is known of 3 of 4 drops" in recording.remarks
+    assert any(re.search(naming("restitution", 3, 4), one) for one in recording.remarks)
 
 
 def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> None:
@@ -301,7 +300,7 @@ def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> Non
             check=False,
         )
     assert done.returncode == 1
-    assert done.stderr.count("standard output: ") == 1
+    assert done.stderr.count("standard output") == 1
     assert (tmp_path / "out/report.json").exists()
 
 
@@ -428,9 +427,9 @@ def test_low_pass_and_plate_are_those_of_the_configuration(tmp_path: Path) -> No
     drop = found.drops[0]
     np.testing.assert_array_equal(found.levels(), measure_levels([drop], low_pass=True)[0].level)
     assert not np.array_equal(found.levels(), usual.levels())
-    assert any("low-pass, -3 dB at 1.25 kHz" in step for step in found.steps)
+    assert any(re.search(naming("low-pass", "1.25 kHz"), step) for step in found.steps)
     assert [one.met for one in found.config.plate_checks] == [False, True, False, True]
-    told = [remark for remark in found.remarks if remark.startswith("force plate: ")]
+    told = [remark for remark in found.remarks if "force plate" in remark]
     assert len(told) == 2
     assert "0.2 Hz" in told[0]
     assert "4000 N" in told[1]
@@ -451,6 +450,6 @@ def test_calibration_record_gives_lines_of_a_configuration(
     assert found["calibration_uncertainty"] == pytest.approx(0.002, rel=0.05)
     assert not said.err
     assert cli.main(arguments) == 0
-    assert "not counted" in capsys.readouterr().err
+    assert "uncertainty" in capsys.readouterr().err
     assert cli.main(arguments[:2]) == 1
-    assert "force in N or mass in kg" in capsys.readouterr().err
+    assert re.search(naming("force", "mass"), capsys.readouterr().err)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 from thud.cli import main
@@ -93,8 +95,9 @@ def test_universal_files_say_what_they_hold(tmp_path: Path, response: int, power
     found = thud.fit_mobility(path, order=8)
     # Five digits of text.
     np.testing.assert_allclose(found.mobility(FREQUENCY), MOBILITY, rtol=1e-4)
-    with pytest.raises(thud.InputError, match="but the file holds"):
-        thud.fit_mobility(path, quantity="mobility" if power else "receptance")
+    other = "mobility" if power else "receptance"
+    with pytest.raises(thud.InputError, match=naming("point.uff", "quantity", f"'{other}'")):
+        thud.fit_mobility(path, quantity=other)
 
 
 def test_opposite_directions_change_the_sign(tmp_path: Path) -> None:
@@ -110,43 +113,43 @@ def test_direction_that_is_not_stated_keeps_the_sign(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "sentence"),
+    ("header", "words"),
     [
-        ({"func_type": 1}, "holds 0 frequency responses"),
-        ({"orddenom_spec_data_type": 12}, "response of type 11 over one of type 12"),
+        ({"func_type": 1}, naming("point.uff", 0)),
+        ({"orddenom_spec_data_type": 12}, naming("point.uff", "type 11", "type 12")),
     ],
 )
 def test_other_universal_files_are_refused(
-    tmp_path: Path, words: dict[str, int], sentence: str
+    tmp_path: Path, header: dict[str, int], words: str
 ) -> None:
-    path = write_universal(tmp_path / "point.uff", 11, MOBILITY, **words)
-    with pytest.raises(thud.InputError, match=sentence):
+    path = write_universal(tmp_path / "point.uff", 11, MOBILITY, **header)
+    with pytest.raises(thud.InputError, match=words):
         thud.fit_mobility(path)
 
 
 @pytest.mark.parametrize(
-    ("frequency", "values", "sentence"),
+    ("frequency", "values", "words"),
     [
-        (FREQUENCY, -MOBILITY, "mean of its real part is -"),
-        (FREQUENCY[::-1], MOBILITY, "line 2 at .* rising"),
-        (FREQUENCY, np.where(S.imag > 900, np.nan, MOBILITY), "finite|not 0"),
-        (FREQUENCY, np.where(S.imag > 900, 0, MOBILITY), "is 0; allowed: finite, not 0"),
-        (FREQUENCY[:1], MOBILITY[:1], "1 lines above 0 Hz"),
-        (FREQUENCY, MOBILITY[:5], "one value for each"),
-        (-FREQUENCY[::-1], MOBILITY, "line 1"),
-        (1e5 * FREQUENCY, MOBILITY, "frequency = .* <= 1.0e7 Hz"),
+        (FREQUENCY, -MOBILITY, naming("mobility", "real")),
+        (FREQUENCY[::-1], MOBILITY, naming("line 2", "Hz")),
+        (FREQUENCY, np.where(S.imag > 900, np.nan, MOBILITY), naming("Hz", "finite")),
+        (FREQUENCY, np.where(S.imag > 900, 0, MOBILITY), naming("Hz", 0)),
+        (FREQUENCY[:1], MOBILITY[:1], naming(1, "0 Hz")),
+        (FREQUENCY, MOBILITY[:5], naming(300, 5)),
+        (-FREQUENCY[::-1], MOBILITY, naming("line 1", "Hz")),
+        (1e5 * FREQUENCY, MOBILITY, naming("pole_frequency", "1.0e7 Hz")),
     ],
 )
 def test_tables_of_no_floor_are_refused(
-    frequency: np.ndarray, values: np.ndarray, sentence: str
+    frequency: np.ndarray, values: np.ndarray, words: str
 ) -> None:
-    with pytest.raises(thud.InputError, match=sentence):
+    with pytest.raises(thud.InputError, match=words):
         thud.fit_mobility((frequency, values), order=4)
 
 
 def test_values_that_overflow_end_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
     values = np.where(np.arange(FREQUENCY.size) == 40, 1e308, MOBILITY)
-    with pytest.raises(thud.ThudError, match="no passive function of 8 poles"):
+    with pytest.raises(thud.ThudError, match=naming("8 poles")):
         thud.fit_mobility((FREQUENCY, values), order=8)
     # The linear algebra says nothing of its own.
     assert capfd.readouterr() == ("", "")
@@ -167,35 +170,33 @@ def test_orders_that_fail_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> No
 
     def fails(name: str, f: np.ndarray, values: np.ndarray, order: int) -> thud.MobilityFit:
         if order != 2 * len(MODES):
-            message = "no passive function"
+            message = "no fit"
             raise thud.NumericalError(message)
         return usual(name, f, values, order)
 
     monkeypatch.setattr(mobility_fit, "_fit", fails)
     assert thud.fit_mobility((FREQUENCY, MOBILITY)).error < 1e-6
     monkeypatch.setattr(mobility_fit, "_ORDERS", (2, 4))
-    with pytest.raises(thud.NumericalError, match="measurement: no passive function"):
+    with pytest.raises(thud.NumericalError, match=naming("measurement", "no fit")):
         thud.fit_mobility((FREQUENCY, MOBILITY))
 
 
 @pytest.mark.parametrize("order", [0, 65, 300])
 def test_orders_that_cannot_be_are_refused(order: int) -> None:
-    with pytest.raises(thud.InputError, match=r"order = .* from 1 to 64"):
+    with pytest.raises(thud.InputError, match=naming("order", order, 1, 64)):
         thud.fit_mobility((FREQUENCY, MOBILITY), order=order)
 
 
 def test_titles_are_needed(tmp_path: Path) -> None:
     table = write_table(tmp_path / "t.csv", "frequency,real", FREQUENCY, MOBILITY.real)
-    with pytest.raises(
-        thud.InputError, match="the columns are 'frequency, real'; allowed: a table"
-    ):
+    with pytest.raises(thud.InputError, match=naming("t.csv", "'frequency, real'", "imaginary")):
         thud.fit_mobility(table)
 
 
 def test_negative_lines_are_remarked_and_left_out() -> None:
     values = MOBILITY - 2 * MOBILITY.real * (np.arange(300) % 10 == 0)
     found = thud.fit_mobility((FREQUENCY, values), order=8)
-    assert "negative at 10 % of the lines" in found.remarks[0]
+    assert re.search(naming("negative", "10 %"), found.remarks[0])
     assert found.mobility(np.geomspace(0.1, 1e6, 5000)).real.min() >= 0
 
 
@@ -236,7 +237,7 @@ def test_ball_feels_a_noisy_measured_floor_as_the_floor() -> None:
     noise = 0.03 * np.random.default_rng(2).normal(size=(496, 2)).dot([1, 1j])
     values = thud.mobility(joists, frequency) * (1 + noise)
     measured = thud.fit_mobility((frequency, values), order=32)
-    with pytest.warns(thud.PlausibilityWarning, match="joist_floor: above 134 Hz"):
+    with pytest.warns(thud.PlausibilityWarning, match=naming("joist_floor", "134 Hz")):
         expected = thud.solve(floor=joists).on_floor
     found = thud.solve(floor=measured.floor).on_floor
     assert expected is not None
@@ -249,20 +250,20 @@ def test_ball_feels_a_noisy_measured_floor_as_the_floor() -> None:
 def test_refusals_of_what_a_file_holds_name_the_file(tmp_path: Path) -> None:
     path = tmp_path / "point.csv"
     write_table(path, "frequency,real,imaginary", FREQUENCY, -MOBILITY.real, MOBILITY.imag)
-    with pytest.raises(thud.InputError, match=f"^{path}: the mobility: the mean of its real part"):
+    with pytest.raises(thud.InputError, match=naming(path, "mobility", "real")):
         thud.fit_mobility(path, order=4)
 
 
 @pytest.mark.parametrize(
     ("titles", "words"),
     [
-        ("frequency_kHz,real,imaginary", "SI units"),
-        ("frequency,real (mm/Ns),imaginary (mm/Ns)", "SI units"),
-        ("frequency,magnitude,phase (rad)", "SI units"),
-        ("frequency,magnitude (dB),phase", "SI units"),
-        ("frequency,,imaginary", "the columns are"),
-        ("frequency,real,real", "more than one column of real"),
-        ("frequency,real", "2 titles over 3 columns"),
+        ("frequency_kHz,real,imaginary", naming("frequency_kHz")),
+        ("frequency,real (mm/Ns),imaginary (mm/Ns)", naming("real (mm/Ns)")),
+        ("frequency,magnitude,phase (rad)", naming("phase (rad)")),
+        ("frequency,magnitude (dB),phase", naming("magnitude (dB)")),
+        ("frequency,,imaginary", naming("'frequency, , imaginary'")),
+        ("frequency,real,real", naming("point.csv", "real")),
+        ("frequency,real", naming("point.csv", 2, "3 columns")),
     ],
 )
 def test_titles_of_other_units_or_twice_are_refused(
@@ -278,19 +279,19 @@ def test_quantity_in_the_titles_counts(tmp_path: Path, exact: thud.MobilityFit) 
     titles = "frequency,real accelerance,imaginary accelerance"
     path = write_table(tmp_path / "point.csv", titles, *columns)
     assert thud.fit_mobility(path).mobility([100.0]) == pytest.approx(exact.mobility([100.0]))
-    with pytest.raises(thud.InputError, match="holds 'accelerance'"):
+    with pytest.raises(thud.InputError, match=naming("point.csv", "'mobility'", "'accelerance'")):
         thud.fit_mobility(path, quantity="mobility")
 
 
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        (([], []), "0 lines"),
-        ((["a"], ["b"]), "real numbers"),
-        ((FREQUENCY, MOBILITY, MOBILITY), "a tuple of 3"),
-        (([10, 20, 30], [1, np.nan, 1]), "value at 20 Hz is not finite"),
-        (None, "table = None"),
-        (7, "table = 7"),
+        (([], []), naming("measurement", 0)),
+        ((["a"], ["b"]), naming("frequency", "real")),
+        ((FREQUENCY, MOBILITY, MOBILITY), naming("tuple", 3)),
+        (([10, 20, 30], [1, np.nan, 1]), naming("measurement", "20 Hz", "finite")),
+        (None, naming("table", None)),
+        (7, naming("table", 7)),
     ],
 )
 def test_tables_that_are_none_are_refused(table: Any, words: str) -> None:  # noqa: ANN401
@@ -300,7 +301,7 @@ def test_tables_that_are_none_are_refused(table: Any, words: str) -> None:  # no
 
 @pytest.mark.parametrize("order", [0, 2.5, "a", True, 65])
 def test_orders_that_are_none_are_refused(order: Any) -> None:  # noqa: ANN401
-    with pytest.raises(thud.InputError, match="order = "):
+    with pytest.raises(thud.InputError, match=naming("order", repr(order), 1, 64)):
         thud.fit_mobility((FREQUENCY, MOBILITY), order=order)
 
 

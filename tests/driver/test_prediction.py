@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, recorded
+from conftest import REPOSITORY, naming, recorded
 
 import thud
 from thud.cli import main
@@ -65,11 +65,11 @@ def test_executable_tells_of_a_floor_that_gives_way(
     blocked = text.replace("&model /", model)
     done = run(case_file(blocked), "-o", "out")
     assert done.returncode == 0, done.stderr
-    assert ("gives way" in done.stdout) == told
+    assert ("rigid floor" in done.stdout) == told
     assert "blocked force" in done.stdout
-    assert "does not move under the model 'measured_modes'" in done.stderr
+    assert re.search(naming("'measured_modes'", "floor"), done.stderr)
     done = run(case_file(text), "-o", "moving")
-    assert "gives way" not in done.stdout
+    assert "rigid floor" not in done.stdout
     assert "contact force" in done.stdout
 
 
@@ -106,7 +106,7 @@ def test_floor_that_gives_way_is_remarked(impact: thud.Impact, thickness: float)
     board = thud.Plate(thickness=thickness, density=650.0, wave_speed=2300.0)
     record = recorded(impact, mass=2.5, height=1.0)
     found = thud.predict_level(record, board, thud.Room())
-    assert any("gives way" in remark for remark in found.remarks)
+    assert any("rigid floor" in remark for remark in found.remarks)
     # Integrate M F'' + (M k/Z) F' + k F = 0 of the same mass and contact time.
     assert found.force == "blocked"
     stiffness = 2.5 * (np.pi / record.contact_time) ** 2
@@ -119,7 +119,7 @@ def test_floor_that_gives_way_is_remarked(impact: thud.Impact, thickness: float)
         20 * np.log10(peak / np.sqrt(stiffness * 2.5)), abs=0.01
     )
     heavy = thud.predict_level(record, thud.Plate(thickness=0.3), thud.Room())
-    assert not any("gives way" in remark for remark in heavy.remarks)
+    assert not any("rigid floor" in remark for remark in heavy.remarks)
 
 
 def test_recording_is_predicted_as_the_impact_that_it_records(impact: thud.Impact) -> None:
@@ -135,7 +135,7 @@ def test_prediction_is_held_against_measured_levels(impact: thud.Impact) -> None
     measured = thud.read_room_levels(FLOORS / "field_levels.csv", volume=41.4)
     assert found.difference(measured) == pytest.approx(measured.level - found.level)
     octaves = thud.RoomLevels("o", "octave", np.array([63.0, 125, 250, 500]), np.full((1, 4), 60.0))
-    with pytest.raises(thud.InputError, match="octaves; allowed: thirds"):
+    with pytest.raises(thud.InputError, match=naming("octave", "third")):
         found.difference(octaves)
 
 
@@ -150,27 +150,27 @@ def test_inputs_of_floors_are_cases(name: str) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("&model /\n&room /\n", "&room is given without &floor"),
-        (RIGID_CASE.replace(PLATE, ""), "no plate that radiates"),
-        (RIGID_CASE, "&plate in line 5 does nothing with &floor: name = 'rigid'"),
-        (ROOM_CASE.replace("'plate'", "'plat'"), "did you mean 'plate'"),
-        ("&model /\n&plate /\n", "&plate in line 2 does nothing without &floor"),
-        (ROOM_CASE.replace("0.2", "-0.2"), r"&plate: thickness = -0\.2"),
-        (ROOM_CASE.replace("volume = 40", "volume = 0"), "&room: volume = 0"),
+        ("&model /\n&room /\n", naming("&room", "&floor")),
+        (RIGID_CASE.replace(PLATE, ""), naming("&floor: name", "plate")),
+        (RIGID_CASE, naming("&plate", "line 5", "&floor: name", "'rigid'")),
+        (ROOM_CASE.replace("'plate'", "'plat'"), naming("'plat'", "'plate'")),
+        ("&model /\n&plate /\n", naming("&plate", "line 2", "&floor")),
+        (ROOM_CASE.replace("0.2", "-0.2"), naming("&plate: thickness", -0.2)),
+        (ROOM_CASE.replace("volume = 40", "volume = 0"), naming("&room: volume", 0.0)),
         (
             ROOM_CASE.replace("volume = 40", "wall_lengths = 9, 9.5"),
-            "wall_lengths are 18.5 m together",
+            naming("wall_lengths", "18.5 m"),
         ),
         (
             ROOM_CASE.replace("volume = 40", "volume = 10, ceiling_mass = 9, ceiling_depth = 0.6"),
-            "ceiling_depth = 0.6 m is more than",
+            naming("ceiling_depth", "0.6 m"),
         ),
-        (ROOM_CASE.replace("volume = 40", "wall_junction = 'x'"), "wall_junction = 'x'"),
+        (ROOM_CASE.replace("volume = 40", "wall_junction = 'x'"), naming("wall_junction", "'x'")),
         (
             ROOM_CASE.replace("volume = 40", "reverberation_times = 1, 2"),
-            "has 2 values; allowed: 12",
+            naming("reverberation_times", 2, 12),
         ),
-        (ROOM_CASE.replace("thickness", "thicknes"), "did you mean 'thickness'"),
+        (ROOM_CASE.replace("thickness", "thicknes"), naming("thicknes", "'thickness'")),
     ],
 )
 def test_floors_and_rooms_that_cannot_be_are_refused(
@@ -182,13 +182,12 @@ def test_floors_and_rooms_that_cannot_be_are_refused(
     done = run(case_file(text))
     assert done.returncode == 1
     assert re.search(words, done.stderr), done.stderr
-    assert "allowed: " in done.stderr
 
 
 def test_prediction_without_floor_or_room_is_refused(impact: thud.Impact) -> None:
-    with pytest.raises(thud.InputError, match="floor is not given"):
+    with pytest.raises(thud.InputError, match=naming("floor")):
         thud.predict_level(impact)
-    with pytest.raises(thud.InputError, match="&plate: thickness"):
+    with pytest.raises(thud.InputError, match=naming("&plate: thickness", 0.0)):
         thud.predict_level(impact, thud.Plate(thickness=0.0), thud.Room())
 
 
@@ -246,7 +245,7 @@ def test_impact_on_the_floor_itself_is_of_the_contact_force() -> None:
 
 
 def test_tapping_level_of_an_orthotropic_plate_is_refused() -> None:
-    with pytest.raises(thud.InputError, match="isotropic"):
+    with pytest.raises(thud.InputError, match=naming("isotropic")):
         thud.tapping_level(thud.Plate(stiffness_ratio=0.1))
 
 

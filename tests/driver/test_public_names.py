@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, get_origin
 
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import impact, units
@@ -185,49 +185,52 @@ def test_names_whose_packages_are_missing_say_so_when_called() -> None:
                 print(error)
     """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    sentence = "xarray is not installed; allowed: pip install h5netcdf h5py SALib xarray zarr\n"
-    assert done.stdout == 4 * sentence, done.stderr
+    needed = naming("xarray", "pip install h5netcdf h5py SALib xarray zarr")
+    assert [bool(re.match(needed, line)) for line in done.stdout.splitlines()] == 4 * [True]
 
 
 @pytest.mark.parametrize(
-    ("call", "sentence"),
+    ("call", "words"),
     [
-        (lambda: thud.solve(height=1.0), "&hollow_sphere: 'height' is a key of Drop; allowed: "),
-        (lambda: thud.solve(bounces=2), "'bounces' is a key of FiniteElement; allowed: "),
-        (lambda: thud.solve(loss_factor=1), "is a key of .*FiniteElement and Plate"),
-        (lambda: thud.solve(force="floor"), "'force' is a key of Levels; allowed: "),
-        (lambda: thud.solve_many({}, mass=2.0), r"solve_many\(\): 'mass' is a key of Ball and Osc"),
-        (lambda: thud.free_modes(mass=2.0), r"free_modes\(\): 'mass' is a key of Ball and Osc"),
-        (lambda: thud.Ball(height=1.0), r"Ball\(\): 'height' is a key of Drop; allowed: Drop"),
-        (lambda: thud.Ball(drop=1.0), r"Ball\(\): 'drop' is a key of Case; allowed: Case"),
-        (lambda: thud.Ball(mas=1.0), r"'mas' is not known \(did you mean 'mass'\?\); allowed: "),
-        (lambda: thud.Case(levles=0), r"not known \(did you mean 'levels'\?\); allowed: name, "),
-        (lambda: thud.solve(model="Hollow_Sphere"), r"did you mean 'hollow_sphere'\?\); allowed"),
-        (lambda: thud.solve_many({"heigth": 1}), r"sphere \(did you mean 'height'\?\); allowed"),
-        (lambda: thud.get_bands("octav"), r"\(did you mean 'octave'\?\); allowed: 'octave', 'th"),
-        (lambda: thud.solve().conformity("rubberball"), r"\(did you mean 'rubber_ball'\?\); all"),
-        (lambda: thud.fit(thud.solve(), ["mas"]), r"be fitted \(did you mean 'mass'\?\); allow"),
-        (lambda: thud.read_study({}, "swep"), r"\(did you mean 'sweep'\?\); allowed: 'sweep'"),
+        (lambda: thud.solve(height=1.0), naming("hollow_sphere", "'height'", "Drop")),
+        (lambda: thud.solve(bounces=2), naming("'bounces'", "FiniteElement")),
+        (lambda: thud.solve(loss_factor=1), naming("loss_factor", "FiniteElement", "Plate")),
+        (lambda: thud.solve(force="floor"), naming("'force'", "Levels")),
+        (
+            lambda: thud.solve_many({}, mass=2.0),
+            naming("solve_many()", "'mass'", "Ball", "Oscillator"),
+        ),
+        (lambda: thud.free_modes(mass=2.0), naming("free_modes()", "'mass'", "Ball", "Oscillator")),
+        (lambda: thud.Ball(height=1.0), naming("Ball()", "'height'", "Drop")),
+        (lambda: thud.Ball(drop=1.0), naming("Ball()", "'drop'", "Case")),
+        (lambda: thud.Ball(mas=1.0), naming("'mas'", "'mass'")),
+        (lambda: thud.Case(levles=0), naming("'levles'", "'levels'", "name")),
+        (lambda: thud.solve(model="Hollow_Sphere"), naming("'Hollow_Sphere'", "'modal_ball'")),
+        (lambda: thud.solve_many({"heigth": 1}), naming("'heigth'", "'height'")),
+        (lambda: thud.get_bands("octav"), naming("'octav'", "'octave'", "'third'")),
+        (lambda: thud.solve().conformity("rubberball"), naming("'rubberball'", "'rubber_ball'")),
+        (lambda: thud.fit(thud.solve(), ["mas"]), naming("mas", "'mass'")),
+        (lambda: thud.read_study({}, "swep"), naming("'swep'", "'sweep'")),
         (
             lambda: thud.sweep({"parameters": {"height": {"vales": [1]}}}),
-            r"height: 'vales' is not known \(did you mean 'values'\?\); allowed: values, low",
+            naming("height", "'vales'", "'values'", "low"),
         ),
-        (lambda: thud.sweep({}, worker=2), r"'worker' is not known \(did you mean 'workers'\?\)"),
+        (lambda: thud.sweep({}, worker=2), naming("'worker'", "'workers'")),
         (
             lambda: thud.solve(model=thud.FiniteElement(), bounces=2),
-            "an object of FiniteElement beside bounces; allowed: options in the object",
+            naming("FiniteElement", "bounces"),
         ),
     ],
 )
-def test_misplaced_and_misspelt_words_are_told(call: Callable[[], object], sentence: str) -> None:
-    with pytest.raises(thud.InputError, match=sentence):
+def test_misplaced_and_misspelt_words_are_told(call: Callable[[], object], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
         call()
 
 
 def test_misspelt_names_are_told() -> None:
-    with pytest.raises(AttributeError, match=r"attribute 'slove' \(did you mean 'solve'\?\)$"):
+    with pytest.raises(AttributeError, match=naming("'slove'", "'solve'")):
         thud.slove  # noqa: B018
-    with pytest.raises(AttributeError, match=r"attribute 'cube'$"):
+    with pytest.raises(AttributeError, match=naming("'cube'")):
         thud.cube  # noqa: B018
 
 
@@ -259,20 +262,20 @@ def test_quantity_is_in_si_units(text: str, value: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "sentence"),
+    ("text", "words"),
     [
-        ("32", "quantity = '32': unit is missing; allowed: m, cm, mm, "),
-        ("32 MM", r"unit 'MM' is not known \(did you mean 'mm'\?\); allowed: m, cm, "),
-        ("5 inch", "quantity = '5 inch': unit 'inch' is not known; allowed: m, "),
-        ("5 m m", "unit 'm m' is not known"),
-        ("mm", "quantity = 'mm' is not a number and its unit; allowed: such as '32 mm'"),
-        ("1e999 m", "is not a number and its unit"),
-        ("nan m", "is not a number and its unit"),
-        (0.032, "quantity = 0.032 is not allowed; allowed: an object of str"),
+        ("32", naming("'32'", "unit", "cm", "mm")),
+        ("32 MM", naming("'MM'", "'mm'", "cm")),
+        ("5 inch", naming("'5 inch'", "'inch'", "cm")),
+        ("5 m m", naming("'m m'", "cm")),
+        ("mm", naming("'mm'", "'32 mm'")),
+        ("1e999 m", naming("'1e999 m'")),
+        ("nan m", naming("'nan m'")),
+        (0.032, naming("quantity", 0.032, "str")),
     ],
 )
-def test_quantity_does_not_guess(text: str, sentence: str) -> None:
-    with pytest.raises(thud.InputError, match=sentence):
+def test_quantity_does_not_guess(text: str, words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
         thud.quantity(text)
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 
 import thud
 from thud.columns import read_table
@@ -27,7 +28,9 @@ def test_rounded_times_are_even(form: str, begin: float) -> None:
     time = begin + np.arange(500) / RATE
     written = np.array([float(format(value, form)) for value in time])
     if form == ".6e" and begin > 1:
-        with pytest.raises(thud.InputError, match="not evenly spaced"):  # 0.1 ms are four steps
+        with pytest.raises(
+            thud.InputError, match=naming("record", "row", "s")
+        ):  # 0.1 ms are four steps
             read_record(np.column_stack([written, FORCE]))
         return
     record = read_record(np.column_stack([written, FORCE]))
@@ -42,20 +45,20 @@ def test_rounded_times_are_even(form: str, begin: float) -> None:
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        (np.where(np.arange(500) < 300, 0, 1 / RATE), r"row 30[01], 0\.20\d+ s, is 0\.\d+ steps"),
-        (np.where(np.arange(500) == 7, 3e-6, 0), r"row 8, 0\.20016\d+ s, is 0\.13 steps of 2\.268"),
-        (np.random.default_rng(1).uniform(-2e-6, 2e-6, 500), r"to 0\.001 steps"),
+        (np.where(np.arange(500) < 300, 0, 1 / RATE), r"row 30[01]\b"),
+        (np.where(np.arange(500) == 7, 3e-6, 0), naming("row 8", "0.20016173 s", 0.13)),
+        (np.random.default_rng(1).uniform(-2e-6, 2e-6, 500), naming("row", 0.001)),
     ],
     ids=["gap", "outlier", "jitter"],
 )
 def test_uneven_times_are_told(fault: np.ndarray, words: str) -> None:
-    with pytest.raises(thud.InputError, match=f"not evenly spaced: .*{words}"):
+    with pytest.raises(thud.InputError, match=words):
         read_record(np.column_stack([(TIME + fault).round(9), FORCE]))
 
 
 def test_gap_is_told_however_the_times_are_rounded() -> None:
     time = np.delete(TIME, 100).round(5)
-    with pytest.raises(thud.InputError, match=r"not evenly spaced: row \d+, .* to 0\.25 steps"):
+    with pytest.raises(thud.InputError, match=naming("row", 0.25)):
         read_record(np.column_stack([time, FORCE[:-1]]))
 
 
@@ -131,64 +134,63 @@ def test_decimal_mark_is_that_of_the_whole_table(
 
 @pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize(
-    ("last", "words"),
+    ("last", "parts"),
     [
-        ("0,5;0.5", "'0.5' is not a number with the decimal comma of line 9"),
-        ("0.5;1,57", "'1,57' is not a number with the decimal point of line 9"),
-        ("0.5;0,575", "'0,575' is not a number with the decimal point of line 9"),
-        ("0.5;1575,000", "'1575,000' is not a number"),
-        ("0.5;1,575,00", "'1,575,00' is not a number"),
-        ("0,5;1.575.00", "'1.575.00' is not a number"),
-        ("0,5;1.575'000", '"1.575\'000" is not a number'),
-        ("0.5;1 57", "'1 57' is not a number"),
-        ("0.5;1_575", "'1_575' is not a number"),
-        ("2;1,575", "'1,575' may be 1575 or 1.575"),
-        ("2;1.575", "'1.575' may be 1.575 or 1575"),
-        ("2.125;1,575", "'2.125' may be 2.125 or 2125"),
+        ("0,5;0.5", ["'0.5'", "comma"]),
+        ("0.5;1,57", ["'1,57'", "point"]),
+        ("0.5;0,575", ["'0,575'", "point"]),
+        ("0.5;1575,000", ["'1575,000'"]),
+        ("0.5;1,575,00", ["'1,575,00'"]),
+        ("0,5;1.575.00", ["'1.575.00'"]),
+        ("0,5;1.575'000", ['"1.575\'000"']),
+        ("0.5;1 57", ["'1 57'"]),
+        ("0.5;1_575", ["'1_575'"]),
+        ("2;1,575", ["'1,575'", 1575, 1.575]),
+        ("2;1.575", ["'1.575'", 1575, 1.575]),
+        ("2.125;1,575", ["'2.125'", 2125, 2.125]),
     ],
 )
 def test_numbers_that_may_be_two_are_refused(
-    read: Callable[[Path], np.ndarray], last: str, words: str, tmp_path: Path
+    read: Callable[[Path], np.ndarray], last: str, parts: list[object], tmp_path: Path
 ) -> None:
     path = tmp_path / "plate.csv"
     path.write_text("".join(f"{i};{i % 3}\n" for i in range(8)) + last + "\n")
     line = 9 if read is read_table else 10
-    words = words.replace("line 9", f"line {line}")
-    with pytest.raises(thud.InputError, match=rf"plate\.csv: line {line}: {words}"):
+    with pytest.raises(thud.InputError, match=naming("plate.csv", f"line {line}", *parts)):
         read(path)
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "cannot be read .no numbers"),
-        ("time,force\n", "no numbers"),
-        ("a,b\nc,d\n", "no numbers"),
-        ("time;force\n0;0\n1;2 N\n", "line 3: '2 N' is not a number"),
-        ("0,001,5,2\n0,002,5\n", "line 2: 3 columns, 4 above it"),
-        ("1,0\n2,\n", "line 2: '' is not a number"),
-        ("0,1\n1,2\0\n", "zero bytes"),
-        ("0,1\n" + "1" * 70_000 + ",2\n", "longer than 65536 characters"),
-        ("0,1\n1,2\n", "2 rows of 2 numbers"),
-        ("".join(f"{i},1,2\n" for i in range(9)), "9 rows of 3 numbers"),
-        ("".join(f"{i},nan\n" for i in range(9)), "not finite"),
-        ("".join(f"{i**2},1\n" for i in range(9)), "not evenly spaced"),
-        ("".join(f"{-i},1\n" for i in range(9)), "times rise by -1 s"),
-        ("".join("0,1\n" for _ in range(9)), "times rise by 0 s"),
-        ("".join(f"{i},0\n" for i in range(9)), "nowhere positive"),
-        ("".join(f"{i},1e200\n" for i in range(9)), "peak of 1e\\+200 N"),
+        ("", naming("time", "force")),
+        ("time,force\n", naming("time", "force")),
+        ("a,b\nc,d\n", naming("time", "force")),
+        ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
+        ("0,001,5,2\n0,002,5\n", naming("line 2", 3, 4)),
+        ("1,0\n2,\n", naming("line 2", "''")),
+        ("0,1\n1,2\0\n", naming("zero")),
+        ("0,1\n" + "1" * 70_000 + ",2\n", naming("65536 characters")),
+        ("0,1\n1,2\n", naming("2 rows", 8)),
+        ("".join(f"{i},1,2\n" for i in range(9)), naming("9 rows", 3)),
+        ("".join(f"{i},nan\n" for i in range(9)), naming("finite")),
+        ("".join(f"{i**2},1\n" for i in range(9)), naming("row", "0.12")),
+        ("".join(f"{-i},1\n" for i in range(9)), naming("-1 s", "1000 s")),
+        ("".join("0,1\n" for _ in range(9)), naming("0 s", "1000 s")),
+        ("".join(f"{i},0\n" for i in range(9)), naming("force", "positive")),
+        ("".join(f"{i},1e200\n" for i in range(9)), naming("1e+200 N", "1e+12 N")),
     ],
 )
 def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None:
     (tmp_path / "plate.csv").write_text(text)
-    with pytest.raises(thud.InputError, match=rf"plate\.csv: .*({words}).*; allowed: ") as caught:
+    with pytest.raises(thud.InputError, match=words) as caught:
         read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
+    assert "plate.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert str(caught.value).count("allowed:") == 1
 
 
 def test_missing_record_is_told(tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match=r"no\.csv: cannot be read .*; allowed: columns"):
+    with pytest.raises(thud.InputError, match=naming("no.csv")):
         read_table(tmp_path / "no.csv")
 
 
@@ -196,8 +198,7 @@ def test_force_of_the_wrong_sign_is_told() -> None:
     # As a plate gives it that counts pulling positive: the noise before the impact is positive.
     impact = thud.solve(duration=0.03)
     force = np.random.default_rng(1).normal(size=1323) - impact.floor_force
-    words = r"target: the force is mostly negative, -1\d+ to \d\.\d+ N; allowed: .*change its sign"
-    with pytest.raises(thud.InputError, match=words):
+    with pytest.raises(thud.InputError, match=naming("target", "-1575", "sign")):
         thud.fit((impact.time, force), ["youngs_modulus"])
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy.stats import chi2
 from synthetic import band_limited, coloured_noise, half_sine, make_drop, make_recording
 
@@ -80,7 +82,7 @@ def test_offset_of_12_n_does_not_stretch_the_contact(finite_elements: thud.Impac
     force, _ = make_recording(pulse(finite_elements), rate, offset=12.0)
     (drop,) = drops(force, rate)
     assert drop.contact_time.value == pytest.approx(finite_elements.measured_contact_time, abs=1e-4)
-    assert "an offset of 12 N was removed" in drop.steps
+    assert any(re.search(naming("offset", "12 N"), step) for step in drop.steps)
 
 
 @pytest.mark.parametrize("gap", [0.03, 0.1, 3.0])
@@ -100,15 +102,15 @@ def test_two_impacts_that_meet_are_refused() -> None:
     force, _ = make_recording(
         HALF_SINE, FINE, rate=48e3, noise_db=50, drops=((0.0, 1.0), (0.021, 0.8))
     )
-    with pytest.raises(thud.InputError, match="two impacts"):
+    with pytest.raises(thud.InputError, match=naming("impacts", "N")):
         drops(force, 48e3)
 
 
 def test_kilonewtons_for_newtons_are_told() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=50)
-    with pytest.raises(thud.InputError, match=r"peak is 1\.5.* N; the unit is .* wrong, kN for N"):
+    with pytest.raises(thud.InputError, match=naming("peak", "N", "kN", 300, 15000)):
         thud.Recording.from_array(force / 1e3, 48e3)
-    with pytest.raises(thud.InputError, match=r"peak is 1\.5.*e\+06 N; .* wrong, mN for N"):
+    with pytest.raises(thud.InputError, match=naming("peak", "N", "mN", 300, 15000)):
         thud.Recording.from_array(force * 1e3, 48e3)
 
 
@@ -116,8 +118,8 @@ def test_small_peaks_that_one_check_remarked_and_another_refused() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
     found = thud.Recording.from_array(force / 10, 48e3)
     assert found.peak_force == pytest.approx(150, rel=0.01)
-    assert any("The peak is 150" in remark for remark in found.remarks)
-    with pytest.raises(thud.InputError, match="unit or calibration are wrong"):
+    assert any(re.search(r"peak\b.* 150", remark) for remark in found.remarks)
+    with pytest.raises(thud.InputError, match=naming("peak", "unit", "calibration", 300, 15000)):
         thud.Recording.from_array(force / 1e4, 48e3)
 
 
@@ -149,7 +151,7 @@ def test_sampled_half_sine_has_its_levels_at_every_rate(rate: float, shift: floa
     (drop,) = drops(half_sine(rate, start, int(0.25 * rate)) + 20.0, rate)
     sampling = aliased_levels(rate, start) - ORACLE
     np.testing.assert_allclose(levels(drop) - sampling, ORACLE, rtol=0, atol=1e-3)
-    told = any("half the rate" in remark for remark in drop.remarks)
+    told = any(f"{rate / 2:g} Hz" in remark for remark in drop.remarks)
     assert told or np.abs(sampling).max() < 0.2
     assert not told or rate < 10e3
 
@@ -188,7 +190,7 @@ def test_bounces_are_told_from_drops() -> None:
         assert abs(by.value - 0.8 * part - below) < 4 * by.uncertainty
     (without,) = drops(force[: int(5 * 24e3)], 24e3, height=None)  # type: ignore[arg-type]
     assert np.isnan(without.restitution.value)
-    assert any("of the first bounce is 0.800" in remark for remark in without.remarks)
+    assert any("0.800" in remark for remark in without.remarks)
 
 
 def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
@@ -203,12 +205,12 @@ def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
         named = {part.name: part.uncertainty for part in one.contributions}
         ways = [way.value for way in found.drops[0].restitutions.values()]
         assert ("impulse against bounces" in named) == differs
-        assert any("differ by" in remark for remark in found.remarks) == differs
+        assert any(re.search(naming("impulse", "bounce"), one) for one in found.remarks) == differs
         if differs:
             width = abs(np.subtract(*ways))
             assert named["impulse against bounces"] == pytest.approx(width / np.sqrt(3))
             assert one.value - one.expanded <= min(ways) < max(ways) <= one.value + one.expanded
-            assert any(f"mass is {fits:.3f} kg" in remark for remark in found.remarks)
+            assert any(f"{fits:.3f} kg" in remark for remark in found.remarks)
 
 
 def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
@@ -427,7 +429,7 @@ def test_noise_behind_a_drop_was_taken_for_its_bounce() -> None:
     )
     (drop,) = drops(force, 24e3)
     assert drop.restitution_by == "impulse"
-    assert any("it is no bounce from 1 m" in remark for remark in drop.remarks)
+    assert any(re.search(naming("bounce", "1 m"), remark) for remark in drop.remarks)
 
 
 def test_noise_that_ran_into_a_pulse_was_the_pulse() -> None:
@@ -449,7 +451,7 @@ def test_mass_that_is_not_stated_is_measured() -> None:
     expected = 1500 * 0.02 * 2 / np.pi / (SPEED * 1.75 + 9.81 * 0.02)
     assert mass.value == pytest.approx(expected, rel=1e-3)
     assert mass.uncertainty == pytest.approx(0.01 * mass.value, rel=1e-3)
-    assert "the mass is not given: the effective mass is judged" in found.remarks
+    assert any("effective mass" in remark for remark in found.remarks)
 
 
 def test_restitution_and_mass_follow_from_the_impulse() -> None:
@@ -474,15 +476,15 @@ def test_hum_and_drift_are_named_and_removed() -> None:
     )  # fmt: skip
     (drop,) = drops(force, 48e3)
     told = " ".join(drop.steps)
-    assert "hum of 60 Hz" in told
-    assert "drift of " in told
+    assert "60 Hz" in told
+    assert "drift" in told
     np.testing.assert_allclose(levels(drop)[:3], ORACLE[:3], rtol=0, atol=0.05)
     assert drop.impulse.value == pytest.approx(clean.sum() / 48e3, rel=2e-3)
 
 
 def test_clipping_is_refused() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
-    with pytest.raises(thud.InputError, match=r"clipped at 1200 N for"):
+    with pytest.raises(thud.InputError, match=naming("clip", "1200 N")):
         drops(np.minimum(force, 1200), 48e3)
 
 
@@ -497,10 +499,10 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     lost = force.copy()
     lost[5200:5215] = 0
     (drop,) = drops(lost, 48e3)
-    assert any("dropouts of 0.312 ms" in remark for remark in drop.remarks)
+    assert any(re.search(naming("dropout", "0.312 ms"), remark) for remark in drop.remarks)
     np.testing.assert_allclose(levels(drop)[:3], ORACLE[:3], rtol=0, atol=0.1)
     lost[5200:5300] = 0
-    with pytest.raises(thud.InputError, match="dropouts"):
+    with pytest.raises(thud.InputError, match=naming("dropout", "ms")):
         drops(lost, 48e3)
 
 
@@ -529,18 +531,18 @@ def test_held_samples_jump_by_a_part_of_the_peak_above_the_quiet(offset: float) 
 @pytest.mark.parametrize("part", [slice(4900, None), slice(None, 5600)])
 def test_cut_pulse_is_refused(part: slice) -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
-    with pytest.raises(thud.InputError, match="within the pulse"):
+    with pytest.raises(thud.InputError, match=naming("pulse", "1 ms")):
         drops(force[part], 48e3)
 
 
 @pytest.mark.parametrize("force", [np.zeros(5000), np.random.default_rng(1).normal(0, 9, 50000)])
 def test_quiet_has_no_impact(force: np.ndarray) -> None:
-    with pytest.raises(thud.InputError, match="no impact"):
+    with pytest.raises(thud.InputError, match=naming("pulse", "40 ms")):
         find_windows(Signal.from_array(force, 48e3))
 
 
 def test_low_rate_is_refused() -> None:
-    with pytest.raises(thud.InputError, match="1000 Hz is too low"):
+    with pytest.raises(thud.InputError, match=naming("sample_rate", "1000 Hz")):
         find_windows(Signal.from_array(half_sine(1e3, 0.1, 300), 1e3))
 
 

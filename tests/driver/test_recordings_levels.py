@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy import stats
 from scipy.optimize import brentq
 from scipy.signal import lsim, lti
@@ -271,7 +272,7 @@ def test_background_is_flagged_and_corrected_as_the_standards_say() -> None:
 
 
 def test_unknown_method_is_refused() -> None:
-    with pytest.raises(thud.InputError, match="method = 'welch' is not known"):
+    with pytest.raises(thud.InputError, match=naming("method", "'welch'")):
         measure_levels([make_drop()], method="welch")
 
 
@@ -294,9 +295,9 @@ def test_average_is_that_of_energies() -> None:
     np.testing.assert_allclose(single.uncertainty, found[0].uncertainty)
     assert np.isnan(single.spread).all()
     assert "repeatability" not in single.contributions
-    with pytest.raises(thud.InputError, match="there are none"):
+    with pytest.raises(thud.InputError, match=naming("drops")):
         average_levels([])
-    with pytest.raises(thud.InputError, match="differ in bands or method"):
+    with pytest.raises(thud.InputError, match=naming("bands", "method")):
         average_levels([found[0], *measure_levels(drops, "third")])
 
 
@@ -309,7 +310,7 @@ def test_drops_that_differ_are_marked_and_kept() -> None:
     assert {o.name for o in average.outliers} == {"odd"}
     assert "odd" in average.names
     assert len(average.drops) == 7
-    assert "standard deviations from the mean" in str(average.outliers[0])
+    assert "standard deviations" in str(average.outliers[0])
     # Equal drops differ by rounding.
     same = measure_levels([make_drop() for _ in range(5)])
     assert average_levels(same).outliers == ()
@@ -432,7 +433,7 @@ def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     # Aliases of what the plate measures fall by 24 dB per octave above its resonance.
     assert after.max() < 1e-3
     assert np.abs(corrected - half_sine(time)).max() < 0.01 * 1500
-    assert f"resonance of {plate.resonance:.4g} Hz" in sentence
+    assert f"{plate.resonance:.4g} Hz" in sentence
 
 
 def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
@@ -475,21 +476,21 @@ def test_uncertain_resonance_makes_levels_uncertain() -> None:
 
 
 def test_resonance_near_the_bands_is_refused() -> None:
-    with pytest.raises(thud.InputError, match=r"too near to the bands.*allowed: 1001 Hz or more"):
+    with pytest.raises(thud.InputError, match=naming("plate", "900 Hz", "1001 Hz")):
         correct_plate(np.ones(100), 25600.0, Plate(900, 30))
     # The added mass lowers it.
-    with pytest.raises(thud.InputError, match=r"resonance, 919\.2 Hz"):
+    with pytest.raises(thud.InputError, match=naming("plate", "919.2 Hz")):
         correct_plate(np.ones(100), 25600.0, Plate(1300, 30, mass=5, added_mass=5))
 
 
 @pytest.mark.parametrize(
     ("values", "words"),
     [
-        ((0.0, 30.0), "plate: frequency = 0.0 is not allowed"),
-        ((1600.0, -1.0), "plate: quality = -1.0"),
-        ((1600.0, 30.0, None, 1.0), "plate: mass = None"),
-        ((1600.0, 30.0, 5.0, -1.0), "plate: added_mass = -1.0"),
-        ((math.nan, 30.0), "plate: frequency = nan"),
+        ((0.0, 30.0), naming("plate", "frequency", 0.0)),
+        ((1600.0, -1.0), naming("plate", "quality", -1.0)),
+        ((1600.0, 30.0, None, 1.0), naming("plate", "mass", None)),
+        ((1600.0, 30.0, 5.0, -1.0), naming("plate", "added_mass", -1.0)),
+        ((math.nan, 30.0), naming("plate", "frequency", "nan")),
     ],
 )
 def test_impossible_plates_are_refused(values: tuple[Any, ...], words: str) -> None:
@@ -518,7 +519,7 @@ def test_plate_is_held_against_the_standard() -> None:
     assert straight[3].met
     assert check_plate(calibration=[(f, f * (1 + f / 5e4)) for f in forces])[3].met is False
     assert check_plate(calibration=[(f, f) for f in forces[:3]])[3].met is None
-    with pytest.raises(thud.InputError, match="two or more pairs"):
+    with pytest.raises(thud.InputError, match=naming("plate", "calibration", "pairs")):
         check_plate(calibration=[(0.0, 1.0)])
 
 
@@ -696,9 +697,9 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
     assert with_levels(Quantity(39.0)) == "conforms"
     assert with_levels(Quantity(39.0), mass=math.nan) == "cannot be decided"
     assert with_levels(Quantity(39.0), restitution=0.95, mass=math.nan) == "does not conform"
-    with pytest.raises(thud.InputError, match="levels have the shape"):
+    with pytest.raises(thud.InputError, match=naming("levels", "(4,)", "(5,)")):
         decide(NOMINAL[:4])
-    with pytest.raises(thud.InputError, match="bowling_ball"):
+    with pytest.raises(thud.InputError, match=naming("'bowling_ball'", "'rubber_ball'")):
         decide(NOMINAL, source="bowling_ball")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import pickle
+import re
 import struct
 import time
 import tomllib
@@ -18,7 +19,7 @@ import numpy as np
 import pytest
 import scipy.io
 import soundfile
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 from recording_files import DURATION, PEAK, SOUND, WITH_UNIT, WRITERS, broadcast_chunk, half_sine
 
 from thud.errors import InputError
@@ -138,7 +139,7 @@ def test_pieces_are_those_of_the_whole(name: str, tmp_path: Path) -> None:
     signal, force = read_all(tmp_path / name, calibration=FULL_SCALE if integer else None)
     for start, stop in ((0, 1), (3, 3), (17, 130), (signal.n_sample - 1, signal.n_sample)):
         np.testing.assert_array_equal(signal.read(start, stop), force[start:stop])
-    with pytest.raises(InputError, match="samples 0 to 321; allowed: samples 0 to 320"):
+    with pytest.raises(InputError, match=naming("samples", 321, 320)):
         signal.read(0, 321)
     assert len(signal.checksum) == 64
 
@@ -159,10 +160,10 @@ def test_negative_compression_is_found_and_told(name: str, tmp_path: Path) -> No
     WRITERS[name](tmp_path / name, -exact, 8000.0, "N")
     signal, force = read_all(tmp_path / name)
     np.testing.assert_allclose(force, exact, atol=1e-6)
-    assert "The sign was changed: the largest excursion, -1500 N, is negative." in signal.steps
+    assert any(re.search(naming("sign", "-1500 N"), step) for step in signal.steps)
     _, given = read_all(tmp_path / name, polarity="negative")
     np.testing.assert_array_equal(given, force)
-    with pytest.raises(InputError, match="the peak is 0 N"):
+    with pytest.raises(InputError, match=naming(name, "peak", "0 N")):
         open_signals(tmp_path / name, polarity="positive")
 
 
@@ -184,7 +185,7 @@ def test_polarity_of_a_record_without_quiet(cut: float, tmp_path: Path) -> None:
 def test_unclear_polarity_is_refused(tmp_path: Path) -> None:
     noise = np.random.default_rng(1).normal(0, 300, 4000)
     path = write_sound(tmp_path / "noise.wav", noise)
-    with pytest.raises(InputError, match=r"the sign is not clear, the force goes .* polarity = "):
+    with pytest.raises(InputError, match=naming("noise.wav", "sign", "polarity")):
         open_signals(path)
     assert open_signals(path, polarity="positive")
 
@@ -193,32 +194,32 @@ def test_wrong_polarity_is_doubted(tmp_path: Path) -> None:
     force = np.concatenate([half_sine(8000.0), -0.25 * half_sine(8000.0)])
     path = write_sound(tmp_path / "plate.wav", force)
     (signal,) = open_signals(path, unit="N", polarity="negative")
-    assert signal.remarks[-1].endswith("the polarity may be wrong.")
+    assert "polarity" in signal.remarks[-1]
 
 
 @pytest.mark.parametrize(
     ("factor", "unit", "words"),
     [
-        (1e-3, "N", r"the peak is 1\.5 N; the unit is probably wrong, kN for N"),
-        (1e3, "N", r"the peak is 1\.5e\+06 N; the unit is probably wrong, mN for N"),
-        (1.0, "kN", r"the peak is 1\.5e\+06 N; the unit is probably wrong, mN for N"),
-        (1e-6, "N", r"the peak is 0\.0015 N; unit or calibration are wrong"),
-        (1e-3, None, r"the values are without a unit and reach 1\.5"),
-        (0.1, None, r"the values are without a unit and reach 150"),
+        (1e-3, "N", naming("peak", "1.5 N", "kN")),
+        (1e3, "N", naming("peak", "1.5e+06 N", "mN")),
+        (1.0, "kN", naming("peak", "1.5e+06 N", "mN")),
+        (1e-6, "N", naming("peak", "0.0015 N", "unit", "calibration")),
+        (1e-3, None, naming("unit", 1.5)),
+        (0.1, None, naming("unit", 150)),
     ],
 )
 def test_wrong_units_are_told(factor: float, unit: str | None, words: str, tmp_path: Path) -> None:
     path = write_sound(tmp_path / "plate.wav", factor * half_sine(8000.0))
-    with pytest.raises(InputError, match=rf"plate\.wav: {words}; allowed: 300 to 15000 N"):
+    with pytest.raises(InputError, match=words) as caught:
         open_signals(path, unit=unit)
+    assert re.search(naming("plate.wav", 300, "15000 N"), str(caught.value))
 
 
 def test_small_peaks_are_remarked(tmp_path: Path) -> None:
     path = write_sound(tmp_path / "plate.wav", 0.1 * half_sine(8000.0))
     (signal,) = open_signals(path, unit="N")
-    assert signal.remarks == (
-        "The peak is 150 N; usual are 300 to 15000 N for heavy/soft sources.",
-    )
+    (remark,) = signal.remarks
+    assert re.search(naming("peak", "150 N", 300, "15000 N"), remark)
 
 
 def test_units_and_rates_that_are_replaced_are_told(tmp_path: Path) -> None:
@@ -226,32 +227,37 @@ def test_units_and_rates_that_are_replaced_are_told(tmp_path: Path) -> None:
     signal, force = read_all(tmp_path / "plate.h5", unit="kN", sample_rate=8001.0)
     assert force.max() == pytest.approx(1500)
     assert signal.sample_rate == 8001
-    assert signal.steps == (
-        "The rate of the file, 8000 Hz, was replaced by 8001 Hz as given.",
-        "The unit of the file, N, was replaced by kN as given.",
-    )
+    rate, unit = signal.steps
+    assert re.search(naming("rate", "8000 Hz", "8001 Hz"), rate)
+    assert re.search(naming("unit", "N", "kN"), unit)
     assert signal.date == "2024-05-06"
 
 
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        ({"unit": "V"}, "integers, not values in V; allowed: calibration per full scale"),
-        ({}, "the values are in FS and no calibration is given"),
-        ({"calibration": "250 N/V"}, "'250 N/V' does not lead from FS to N by all its factors"),
-        ({"calibration": "10 V/FS"}, "does not lead from FS to N"),
-        ({"calibration": "10 X/FS"}, "unit = 'X' is not known"),
-        ({"calibration": "V/FS"}, "'V/FS' is not a number with units"),
-        ({"calibration": 0.0}, "calibration = 0.0 is not allowed"),
-        ({"calibration": math.nan}, "calibration = nan is not allowed"),
-        ({"calibration": True}, "calibration"),
-        ({"calibration": 5e3, "channel": 3}, "channel = 3 fits 0 channels; allowed: one of 1, 2"),
-        ({"calibration": 5e3}, "has 2 channels, none of them in a unit of force"),
-        ({"calibration": 5e3, "channel": 1, "polarity": "up"}, "polarity = 'up' is not known"),
-        ({"calibration": 5e3, "channel": 1, "unit": "dB"}, "unit = 'dB' is not known"),
-        ({"calibration": 5e3, "channel": 1, "sample_rate": 2000.0}, "the sample rate is 2000 Hz"),
-        ({"calibration": 5e3, "channel": 1, "sample_rate": math.nan}, "sample_rate = nan"),
-        ({"calibration": 5e3, "channel": 1, "sample_rate": "8 kHz"}, "sample_rate = '8 kHz'"),
+        ({"unit": "V"}, naming("V", "calibration")),
+        ({}, naming("FS", "calibration")),
+        ({"calibration": "250 N/V"}, naming("'250 N/V'", "FS", "N")),
+        ({"calibration": "10 V/FS"}, naming("'10 V/FS'", "FS", "N")),
+        ({"calibration": "10 X/FS"}, naming("unit", "'X'")),
+        ({"calibration": "V/FS"}, naming("'V/FS'")),
+        ({"calibration": 0.0}, naming("calibration", 0.0)),
+        ({"calibration": math.nan}, naming("calibration", "nan")),
+        ({"calibration": True}, naming("calibration", "True")),
+        ({"calibration": 5e3, "channel": 3}, naming("channel", 3, 1, 2)),
+        ({"calibration": 5e3}, naming("2 channels")),
+        (
+            {"calibration": 5e3, "channel": 1, "polarity": "up"},
+            naming("polarity", "'up'", "'positive'"),
+        ),
+        ({"calibration": 5e3, "channel": 1, "unit": "dB"}, naming("unit", "'dB'")),
+        ({"calibration": 5e3, "channel": 1, "sample_rate": 2000.0}, naming("rate", "2000 Hz")),
+        ({"calibration": 5e3, "channel": 1, "sample_rate": math.nan}, naming("sample_rate", "nan")),
+        (
+            {"calibration": 5e3, "channel": 1, "sample_rate": "8 kHz"},
+            naming("sample_rate", "'8 kHz'"),
+        ),
     ],
 )
 def test_what_does_not_fit_is_told(given: dict[str, Any], words: str, tmp_path: Path) -> None:
@@ -262,9 +268,8 @@ def test_what_does_not_fit_is_told(given: dict[str, Any], words: str, tmp_path: 
     if isinstance(given.get("calibration"), float) and math.isnan(given["calibration"]):
         channels = 1
     soundfile.write(tmp_path / "plate.wav", np.column_stack([force] * channels), 8000, "PCM_24")
-    with pytest.raises(InputError, match="; allowed: ") as caught:
+    with pytest.raises(InputError, match=words) as caught:
         open_signals(tmp_path / "plate.wav", **given)
-    assert words in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -307,9 +312,9 @@ def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:
         (signal,) = open_signals(tmp_path / "t.csv", channel=channel)
         assert signal.name == "t.csv, Fz"
         assert signal.steps == ()
-    with pytest.raises(InputError, match="'Fy' fits 0 channels; allowed: one of 2 'Fx', 3 'Fz', 4"):
+    with pytest.raises(InputError, match=naming("'Fy'", "2 'Fx'", "3 'Fz'", 4)):
         open_signals(tmp_path / "t.csv", channel="Fy")
-    with pytest.raises(InputError, match="the values are in V and no calibration is given"):
+    with pytest.raises(InputError, match=naming("V", "calibration")):
         open_signals(tmp_path / "t.csv", channel=4)
 
 
@@ -349,7 +354,7 @@ def test_headers_of_loggers(head: str, row: str, coding: str, end: str, tmp_path
 def test_rate_of_header_and_times_must_agree(tmp_path: Path) -> None:
     rows = "".join(f"{i / 8000:.6f},{v:g}\n" for i, v in enumerate(half_sine(8000.0)))
     (tmp_path / "t.csv").write_text("fs: 4000\ntime_s,force_N\n" + rows)
-    with pytest.raises(InputError, match="4000 Hz by its header and 8000 Hz by its times"):
+    with pytest.raises(InputError, match=naming("t.csv", "4000 Hz", "8000 Hz")):
         open_signals(tmp_path / "t.csv")
 
 
@@ -360,7 +365,7 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
     # Of 1764 times rounded to 1 us the slope is off by 1e-6 sqrt(1 / 1764**3) steps and more.
     assert signal.sample_rate == pytest.approx(44100, rel=4e-6)
     (step,) = signal.steps
-    assert step.startswith("The times, rounded to 1e-06 s, were replaced by an even grid of 44")
+    assert re.search(naming("times", "1e-06 s"), step)
 
 
 def test_date_of_a_broadcast_file(tmp_path: Path) -> None:
@@ -402,7 +407,7 @@ def test_scaling_that_is_no_number_is_refused(key: str, value: object, tmp_path:
     if (key, value) == ("add_offset", 0.0):
         assert read_all(path)[1].max() == pytest.approx(PEAK)
         return
-    assert f"plate.nc: force: {key} = " in refusal(path)
+    assert re.search(naming("plate.nc", "force", key), refusal(path))
 
 
 def test_empty_attributes_are_no_matter(tmp_path: Path) -> None:
@@ -419,7 +424,7 @@ def test_flac_without_a_length_is_refused(tmp_path: Path) -> None:
     data[21] &= 0xF0
     data[22:26] = bytes(4)
     path.write_bytes(data)
-    assert "no number of samples" in refusal(path)
+    assert "samples" in refusal(path)
 
 
 @pytest.mark.parametrize("shape", [(-1, 1), (1, -1), (-1, 2), (2, -1)])
@@ -461,7 +466,7 @@ def refusal(path: Path, **given: Any) -> str:  # noqa: ANN401
         open_signals(path, **given)
     assert time.monotonic() - begin < 5
     text = str(caught.value)
-    assert "; allowed: " in text
+    assert path.name[:40] in text or not path.name.isprintable()
     assert text.isprintable()
     return text
 
@@ -477,7 +482,7 @@ def test_cut_off_files_are_refused(name: str, share: float, tmp_path: Path) -> N
         try:
             open_signals(path)
         except InputError as error:
-            assert "; allowed: " in str(error)
+            assert name in str(error)
         return
     if name == "packed.mat" and share > 0.9:
         assert "cut off" in refusal(path)
@@ -502,22 +507,22 @@ def test_values_that_are_not_finite_are_refused(name: str, value: float, tmp_pat
         path.write_bytes(data.replace(old, new))
     else:
         path = write_pulse(tmp_path, name, force)
-    assert "sample 101 is not finite" in refusal(path)
+    assert re.search(naming("sample 101", "finite"), refusal(path))
 
 
 def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.wav")
     (tmp_path / "loop.wav").symlink_to(tmp_path / "loop.wav")
     (tmp_path / "empty.wav").touch()
-    assert "is a directory" in refusal(tmp_path)
-    assert "is no regular file" in refusal(tmp_path / "pipe.wav")
-    assert "is no regular file" in refusal(tmp_path.joinpath("/dev/zero"))
-    assert "symbolic links" in refusal(tmp_path / "loop.wav")
-    assert "No such file" in refusal(tmp_path / "none.wav")
-    assert "is empty" in refusal(tmp_path / "empty.wav")
-    assert "cannot be read" in refusal(tmp_path / "a\0b.wav")
-    assert "cannot be read" in refusal(tmp_path / ("a" * 5000))
-    with pytest.raises(InputError, match="recording = 7 is not allowed; allowed: an object of str"):
+    assert "directory" in refusal(tmp_path)
+    assert "pipe.wav" in refusal(tmp_path / "pipe.wav")
+    assert "/dev/zero" in refusal(tmp_path.joinpath("/dev/zero"))
+    assert "loop.wav" in refusal(tmp_path / "loop.wav")
+    assert "none.wav" in refusal(tmp_path / "none.wav")
+    assert "empty" in refusal(tmp_path / "empty.wav")
+    refusal(tmp_path / "a\0b.wav")
+    refusal(tmp_path / ("a" * 5000))
+    with pytest.raises(InputError, match=naming("recording", 7)):
         open_signals(7)  # type: ignore[arg-type]
 
 
@@ -546,28 +551,27 @@ def test_names_that_are_no_text(tmp_path: Path) -> None:
 def test_files_of_holes_are_refused_at_once(name: str, tmp_path: Path) -> None:
     path = write_pulse(tmp_path, name)
     os.truncate(path, 2**32)
-    assert "4096 MiB of which 0.0 MiB are stored" in refusal(path)
+    assert re.search(naming("4096 MiB", "0.0 MiB"), refusal(path))
 
 
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        (b"\0" * 10000, "is no WAV file by its first bytes"),
-        (b"time,force\n1,2\n", "is no WAV file by its first bytes"),
+        (b"\0" * 10000, "WAV"),
+        (b"time,force\n1,2\n", "WAV"),
         (b"CDF\x01" + bytes(100), "NetCDF 4"),
-        (b"PK\x03\x04" + bytes(100), "saved as CSV"),
-        (b"RIFF\xff\xff\xff\xffWAVE", "has no samples that can be found"),
-        (b"fLaC" + bytes(100), "cannot be read as"),
-        (b"TDSm" + bytes(100), "is cut off in the segment"),
-        (b"\x89HDF\r\n\x1a\n" + bytes(100), "cannot be read as HDF5"),
-        (b"MATLAB 5.0".ljust(124) + b"\0\1IM", "MATLAB|no vector"),
-        (b"    -1\n    58\n    -1\n", "cannot be read as universal|no time history"),
+        (b"PK\x03\x04" + bytes(100), "CSV"),
+        (b"RIFF\xff\xff\xff\xffWAVE", "samples"),
+        (b"fLaC" + bytes(100), "FLAC"),
+        (b"TDSm" + bytes(100), "cut off"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(100), "HDF5"),
+        (b"MATLAB 5.0".ljust(124) + b"\0\1IM", "MATLAB|vector"),
+        (b"    -1\n    58\n    -1\n", "universal|time history"),
     ],
 )
 def test_contents_are_told(content: bytes, words: str, tmp_path: Path) -> None:
     (tmp_path / "x.wav").write_bytes(content)
-    found = refusal(tmp_path / "x.wav")
-    assert any(word in found for word in words.split("|")), found
+    assert re.search(words, refusal(tmp_path / "x.wav"))
 
 
 def test_formats_are_found_by_content(tmp_path: Path) -> None:
@@ -580,42 +584,42 @@ def test_formats_are_found_by_content(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["ULAW", "ALAW", "IMA_ADPCM", "MS_ADPCM"])
 def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
     soundfile.write(tmp_path / "pcm.wav", half_sine(8000.0) / 5000, 8000, kind)
-    assert f"samples of the kind {kind}" in refusal(tmp_path / "pcm.wav")
+    assert kind in refusal(tmp_path / "pcm.wav")
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "is empty"),
-        ("a,b\nc,d\n", "no numbers"),
-        ("time;force\n0;0\n1;2 N\n", "line 3: '2 N' is not a number"),
-        ("0,001,5,2\n0,002,5\n", "line 2: 3 columns, 4 above it"),
-        ("1,0\n2,\n", "line 2: '' is not a number"),
-        ("0,1\n1,2\n", "2 rows of 2 numbers"),
-        ("".join(f"{i**2},1\n" for i in range(9)), "not evenly spaced"),
-        ("".join(f"{-i},1\n" for i in range(9)), "times rise by -1 s"),
-        ("".join("0,1\n" for _ in range(9)), "times rise by 0 s"),
-        ("".join(f"{i},1\n" for i in range(9)), "the sample rate is 1 Hz"),
-        ("".join(f"{i / 8000},7\n" for i in range(9)), "all samples are 7"),
-        ("F_N\n" + "".join(f"{i}\n" for i in range(9)), "the sample rate is not known"),
-        ("x" * 100_000, "longer than 65536 characters"),
-        ("head\n" * 3000 + "1,2\n", "no numbers"),
-        (",".join("1" * 400) + "\n", "400 columns"),
-        ("1,2\n\0\n", "is no text file"),
-        ("1e999,2\n" * 9, "not finite"),
+        ("", naming("empty")),
+        ("a,b\nc,d\n", naming("numbers")),
+        ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
+        ("0,001,5,2\n0,002,5\n", naming("line 2", 3, 4)),
+        ("1,0\n2,\n", naming("line 2", "''")),
+        ("0,1\n1,2\n", naming("2 rows")),
+        ("".join(f"{i**2},1\n" for i in range(9)), naming("row", 0.12)),
+        ("".join(f"{-i},1\n" for i in range(9)), naming("-1 s", "1000 s")),
+        ("".join("0,1\n" for _ in range(9)), naming("0 s", "1000 s")),
+        ("".join(f"{i},1\n" for i in range(9)), naming("rate", "1 Hz")),
+        ("".join(f"{i / 8000},7\n" for i in range(9)), naming("samples", 7)),
+        ("F_N\n" + "".join(f"{i}\n" for i in range(9)), naming("sample_rate")),
+        ("x" * 100_000, naming("65536 characters")),
+        ("head\n" * 3000 + "1,2\n", naming("numbers")),
+        (",".join("1" * 400) + "\n", naming("400 columns")),
+        ("1,2\n\0\n", naming("text")),
+        ("1e999,2\n" * 9, naming("finite")),
     ],
 )
 def test_useless_tables_are_told(text: str, words: str, tmp_path: Path) -> None:
     (tmp_path / "plate.csv").write_text(text)
-    assert words in refusal(tmp_path / "plate.csv")
+    assert re.search(words, refusal(tmp_path / "plate.csv"))
 
 
 def test_long_tables_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_pulse(tmp_path, "comma.csv")
     monkeypatch.setattr("thud.recordings.formats.text.MOST_NUMBERS", 600)
-    assert "million numbers as text" in refusal(path)
+    assert "numbers" in refusal(path)
     path.write_bytes(b"1,2\n" * 2**20 * 65)
-    assert "260 MiB of text, which is read as a whole" in refusal(path)
+    assert "260 MiB" in refusal(path)
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -637,11 +641,11 @@ def test_matlab_structures_are_read(packed: bool, tmp_path: Path) -> None:  # no
     many = np.zeros(2, dtype=[("Force", "O")])
     many["Force"][:] = [force, force]
     scipy.io.savemat(path, {"lab": many}, do_compression=packed)
-    assert "lab is an array of structures" in refusal(path)
+    assert re.search(naming("lab", "array", "structures"), refusal(path))
     for _ in range(9):
         lab = {"lab": lab}
     scipy.io.savemat(path, lab)
-    assert "structures in more than 8 structures" in refusal(path)
+    assert re.search(naming("structures", 8), refusal(path))
 
 
 def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
@@ -653,7 +657,7 @@ def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
     packed += packer.flush()
     path.write_bytes(path.read_bytes()[:128] + struct.pack("<II", 15, len(packed)) + packed)
     tracemalloc.start()
-    assert "unpack to more than 128 MiB" in refusal(path)
+    assert "128 MiB" in refusal(path)
     assert tracemalloc.get_traced_memory()[1] < 160e6
     tracemalloc.stop()
 
@@ -663,7 +667,7 @@ def test_matlab_variables_that_claim_too_much_are_refused(tmp_path: Path) -> Non
     data = bytearray(path.read_bytes())
     data[132:136] = struct.pack("<I", 2**31)
     path.write_bytes(data)
-    assert "a variable claims 2147483648 bytes" in refusal(path)
+    assert "2147483648 bytes" in refusal(path)
 
 
 def test_hdf5_that_claims_too_much_is_refused(tmp_path: Path) -> None:
@@ -672,10 +676,10 @@ def test_hdf5_that_claims_too_much_is_refused(tmp_path: Path) -> None:
         file.create_dataset("force", (2**40,), "f4", chunks=(2**10,), compression="gzip")[:1024] = (
             1.0
         )
-    assert "claims 4398046511104 bytes and holds" in refusal(tmp_path / "bomb.h5")
+    assert "4398046511104 bytes" in refusal(tmp_path / "bomb.h5")
     with h5py.File(tmp_path / "chunk.h5", "w") as file:
         file.create_dataset("force", (2**25,), "f4", chunks=(2**25,), compression="gzip")[:] = 1.0
-    assert "chunks of 128 MiB" in refusal(tmp_path / "chunk.h5")
+    assert "128 MiB" in refusal(tmp_path / "chunk.h5")
 
 
 def test_hdf5_links_are_not_followed_far(tmp_path: Path) -> None:
@@ -686,18 +690,18 @@ def test_hdf5_links_are_not_followed_far(tmp_path: Path) -> None:
     assert read_all(path)[1].max() > 1490
     with h5py.File(path, "a") as file:
         file["/".join(["deep"] * 40)] = np.arange(9.0)
-    assert "groups more than 32 deep" in refusal(path)
+    assert re.search(naming("groups", 32), refusal(path))
     with h5py.File(tmp_path / "link.h5", "w") as file:
         file["force"] = h5py.ExternalLink("/etc/passwd", "/")
-    assert "is a link to another file" in refusal(tmp_path / "link.h5")
+    assert "link" in refusal(tmp_path / "link.h5")
     with h5py.File(tmp_path / "outside.h5", "w") as file:
         file.create_dataset("force", (10,), "u1", external=[("/etc/passwd", 0, 10)])
-    assert "lies in another file" in refusal(tmp_path / "outside.h5")
+    assert "another file" in refusal(tmp_path / "outside.h5")
     layout = h5py.VirtualLayout((10,), "f8")
     layout[:] = h5py.VirtualSource("other.h5", "x", (10,))
     with h5py.File(tmp_path / "virtual.h5", "w") as file:
         file.create_virtual_dataset("force", layout)
-    assert "lies in another file" in refusal(tmp_path / "virtual.h5")
+    assert "another file" in refusal(tmp_path / "virtual.h5")
 
 
 @pytest.mark.parametrize("at", [12, 20])
@@ -759,14 +763,15 @@ def test_files_that_change_are_told(tmp_path: Path) -> None:
     path = write_pulse(tmp_path, "float.wav")
     (signal,) = open_signals(path)
     write_pulse(tmp_path, "float.wav", half_sine(8000.0)[:-50])
-    with pytest.raises(InputError, match=r"float\.wav: .*; allowed: "):
+    with pytest.raises(InputError, match=naming("float.wav")):
         signal.read(200, 320)
 
 
 def test_missing_packages_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_pulse(tmp_path, "plate.tdms")
     monkeypatch.setitem(__import__("sys").modules, "nptdms", None)
-    assert "TDMS files need the package nptdms, which is not installed" in refusal(path)
+    with pytest.raises(InputError, match=naming("TDMS", "nptdms", "pip install")):
+        open_signals(path)
 
 
 # --- the examples
@@ -810,7 +815,7 @@ def test_arrays_are_signals() -> None:
     assert (signal.name, signal.n_sample, signal.full_scale) == ("model", 3, None)
     assert signal.checksum == Signal.from_array([0, 1, 2], 8000).checksum
     for force, rate in (([[1.0]], 8000), ([np.nan], 8000), ([1.0], 0), ([1.0], np.inf), (["a"], 1)):
-        with pytest.raises(InputError, match="; allowed: "):
+        with pytest.raises(InputError, match=r"recording|sample_rate"):
             Signal.from_array(force, rate)
 
 
@@ -846,22 +851,25 @@ def test_calibration_record_of_a_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("values", "given", "words"),
     [
-        (np.zeros(1000), {"force": 10.0, "unit": "V"}, "has no clear step"),
-        (np.arange(1000.0), {"force": 10.0, "mass": 1.0, "unit": "V"}, "one of force and mass"),
-        (np.arange(1000.0), {"unit": "V"}, "one of force and mass"),
-        (np.arange(1000.0), {"force": -1.0, "unit": "V"}, "-1 N"),
-        (np.arange(1000.0), {"force": math.nan, "unit": "V"}, "nan"),
-        (np.arange(1000.0), {"force": 1.0}, "the unit is not given"),
-        (np.arange(3.0), {"force": 1.0, "unit": "V"}, "has no clear step"),
-        (np.random.default_rng(1).normal(size=9000), {"force": 1.0, "unit": "V"}, "step"),
+        (np.zeros(1000), {"force": 10.0, "unit": "V"}, naming("recording", "step")),
+        (np.arange(1000.0), {"force": 10.0, "mass": 1.0, "unit": "V"}, naming("force", "mass")),
+        (np.arange(1000.0), {"unit": "V"}, naming("force", "mass")),
+        (np.arange(1000.0), {"force": -1.0, "unit": "V"}, naming("force", "-1 N")),
+        (np.arange(1000.0), {"force": math.nan, "unit": "V"}, naming("force", "nan")),
+        (np.arange(1000.0), {"force": 1.0}, naming("unit")),
+        (np.arange(3.0), {"force": 1.0, "unit": "V"}, naming("recording", "step")),
+        (
+            np.random.default_rng(1).normal(size=9000),
+            {"force": 1.0, "unit": "V"},
+            naming("recording", "step"),
+        ),
     ],
 )
 def test_useless_calibration_records(
     values: NDArray[np.float64], given: dict[str, Any], words: str
 ) -> None:
-    with pytest.raises(InputError, match="; allowed: ") as caught:
+    with pytest.raises(InputError, match=words):
         calibrate(Signal.from_array(values, 5000.0), **given)
-    assert words in str(caught.value)
 
 
 LAB = """
@@ -900,27 +908,27 @@ def test_configuration_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("laboratory", "labratory", "'labratory' is not known, did you mean laboratory?"),
-        ("f0 = 950.0", "fo = 950.0", "plate: 'fo' is not known, did you mean f0?"),
-        ("Q = 30.0", "", "plate: Q is missing"),
-        ("octave_500", "octave_50", "did you mean octave_500?"),
-        ("[10.0, 15.0]", "[15.0, 10.0]", "minimum < maximum"),
-        ("[10.0, 15.0]", "12.0", "[minimum, maximum]"),
-        ("21.5", '"warm"', "temperature = 'warm' is not allowed"),
-        ("21.5", "nan", "temperature = nan is not allowed"),
-        ("0.005", "-0.1", "calibration_uncertainty = -0.1 is not allowed"),
-        ('"V"', '"W"', "unit = 'W' is not known"),
-        ('"4.1 pC/N, 10 mV/pC"', '"4.1 pC"', "is not a number with units"),
-        ('"4.1 pC/N, 10 mV/pC"', "true", "calibration = True is not allowed"),
-        ('"negative"', '"down"', "polarity = 'down' is not known"),
-        ("channel = 1", "channel = 0", "channel = 0 is not allowed"),
-        ("channel = 1", "channel = 1.5", "channel = 1.5 is not allowed"),
-        ('"RB-07"', "7", "serial = 7 is not allowed"),
-        ("= 2.5", "= ", "is no TOML"),
+        ("laboratory", "labratory", naming("'labratory'", "laboratory")),
+        ("f0 = 950.0", "fo = 950.0", naming("plate", "'fo'", "f0")),
+        ("Q = 30.0", "", naming("plate", "Q")),
+        ("octave_500", "octave_50", naming("octave_50", "octave_500")),
+        ("[10.0, 15.0]", "[15.0, 10.0]", naming("octave_500", "minimum", "maximum")),
+        ("[10.0, 15.0]", "12.0", naming("octave_500", "minimum", "maximum")),
+        ("21.5", '"warm"', naming("temperature", "'warm'")),
+        ("21.5", "nan", naming("temperature", "nan")),
+        ("0.005", "-0.1", naming("calibration_uncertainty", -0.1)),
+        ('"V"', '"W"', naming("unit", "'W'")),
+        ('"4.1 pC/N, 10 mV/pC"', '"4.1 pC"', naming("calibration", "'4.1 pC'")),
+        ('"4.1 pC/N, 10 mV/pC"', "true", naming("calibration", "True")),
+        ('"negative"', '"down"', naming("polarity", "'down'", "'negative'")),
+        ("channel = 1", "channel = 0", naming("channel", 0)),
+        ("channel = 1", "channel = 1.5", naming("channel", 1.5)),
+        ('"RB-07"', "7", naming("serial", 7)),
+        ("= 2.5", "= ", naming("TOML")),
         (
             "[plate]\nf0 = 950.0\nQ = 30.0\nf0_uncertainty = 0.01",
             "plate = 3",
-            "plate = 3 is not allowed",
+            naming("plate", 3),
         ),
     ],
 )
@@ -929,7 +937,6 @@ def test_configurations_that_are_wrong_are_told(
 ) -> None:
     assert old in LAB
     (tmp_path / "lab.toml").write_text(LAB.replace(old, new, 1))
-    with pytest.raises(InputError, match=r"(?s)lab\.toml: .*; allowed: |calibration") as caught:
+    with pytest.raises(InputError, match=words) as caught:
         read_config(tmp_path / "lab.toml")
-    assert words in str(caught.value)
     assert "\n" not in str(caught.value)

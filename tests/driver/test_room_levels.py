@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud.cli import main
@@ -70,16 +69,18 @@ def test_example_of_iso_717_2_is_rated(oracle: Callable[..., None]) -> None:
 @pytest.mark.parametrize("level", [1e308, -1e308, 1e5])
 def test_levels_that_are_none_are_not_rated(level: float) -> None:
     """1e308 dB went on for ever, 1e5 dB had the best class."""
-    with pytest.raises(thud.InputError, match=r"levels = .*; allowed: -1000 to 1000 dB"):
+    with pytest.raises(thud.InputError, match=naming("levels", level, -1000, 1000)):
         thud.rating([70.0, 70.0, 70.0, level])
 
 
-@pytest.mark.parametrize("title", ["frequency (kHz)", "T20 (ms)", "mean_Pa"])
-def test_columns_of_another_unit_are_refused(tmp_path: Path, title: str) -> None:
+@pytest.mark.parametrize(
+    ("title", "unit"), [("frequency (kHz)", "Hz"), ("T20 (ms)", "s"), ("mean_Pa", "dB")]
+)
+def test_columns_of_another_unit_are_refused(tmp_path: Path, title: str, unit: str) -> None:
     """50 ms were read as 50 s."""
     titles = {"f": "frequency", "T": "T20", "m": "mean"} | {title[0]: title}
     lines = [";".join(titles.values())] + [f"{f};0.5;70" for f in OCTAVES]
-    with pytest.raises(thud.InputError, match=f"'{re.escape(title)}' is not in "):
+    with pytest.raises(thud.InputError, match=naming("levels.csv", f"'{title}'", unit)):
         thud.read_room_levels(write(tmp_path, "\n".join(lines)))
 
 
@@ -113,33 +114,36 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "no numbers"),
-        ("63,60\n125,60\n250,60\n500,60\n", "0 titles over 2 columns"),
-        ("level,P1\n63,60\n", "no column of frequency"),
-        ("frequency,T\n63,1\n125,1\n250,1\n500,1\n", "no column of levels"),
-        ("frequency,P1\n63,60\n125,60\n250,60\n", "no level at 500 Hz"),
-        ("frequency,P1\n63,60\n63,60\n250,60\n500,6\n", "63 Hz is given twice"),
-        ("frequency,P1\n63,60\n125,60\n250,60\n470,60\n", "470 Hz is not a mid frequency"),
-        ("frequency,P1\n63,60\n125,600\n250,60\n500,60\n", "level = 600 dB"),
-        ("frequency,P1\n63,60\n125,nan\n250,60\n500,60\n", "level = nan dB"),
-        ("frequency,T,P1\n63,0,60\n125,1,60\n250,1,60\n500,1,60\n", "reverberation_time = 0 s"),
-        ("frequency,T,T20,P1\n63,1,1,60\n125,1,1,60\n", "more than one column of time"),
-        ("frequency,P1\n63,60\n125\n", "line 3: 1 columns, 2 above it"),
+        ("", naming("frequency", "Hz")),
+        ("63,60\n125,60\n250,60\n500,60\n", naming("2 columns")),
+        ("level,P1\n63,60\n", naming("frequency")),
+        ("frequency,T\n63,1\n125,1\n250,1\n500,1\n", naming("levels")),
+        ("frequency,P1\n63,60\n125,60\n250,60\n", naming("500 Hz")),
+        ("frequency,P1\n63,60\n63,60\n250,60\n500,6\n", naming("63 Hz")),
+        ("frequency,P1\n63,60\n125,60\n250,60\n470,60\n", naming("470 Hz")),
+        ("frequency,P1\n63,60\n125,600\n250,60\n500,60\n", naming("level", "600 dB", -50, 200)),
+        ("frequency,P1\n63,60\n125,nan\n250,60\n500,60\n", naming("level", "nan", -50, 200)),
+        (
+            "frequency,T,P1\n63,0,60\n125,1,60\n250,1,60\n500,1,60\n",
+            naming("reverberation_time", "0 s", 0.01),
+        ),
+        ("frequency,T,T20,P1\n63,1,1,60\n125,1,1,60\n", naming("time")),
+        ("frequency,P1\n63,60\n125\n", naming("line 3", 1, 2)),
     ],
 )
 def test_tables_that_cannot_be_rated_are_refused(tmp_path: Path, text: str, words: str) -> None:
-    with pytest.raises(thud.InputError, match=words) as refused:
+    with pytest.raises(thud.InputError, match=words) as caught:
         thud.read_room_levels(write(tmp_path, text))
-    assert "allowed: " in str(refused.value)
+    assert "levels.csv" in str(caught.value)
 
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (([60.0] * 3,), r"shape \(3,\); allowed: \(4,\)"),
-        (([60.0] * 4, "third"), r"allowed: \(12,\)"),
-        (([60.0] * 4, "fifth"), "bands = 'fifth' is not known"),
-        (([60.0, np.inf, 60.0, 60.0],), "not finite"),
+        (([60.0] * 3,), naming("levels", "(3,)", "(4,)")),
+        (([60.0] * 4, "third"), naming("levels", "(4,)", "(12,)")),
+        (([60.0] * 4, "fifth"), naming("bands", "'fifth'", "'third'")),
+        (([60.0, np.inf, 60.0, 60.0],), naming("levels", "finite")),
     ],
 )
 def test_levels_that_cannot_be_rated_are_refused(arguments: tuple[object, ...], words: str) -> None:
@@ -149,9 +153,10 @@ def test_levels_that_cannot_be_rated_are_refused(arguments: tuple[object, ...], 
 
 @pytest.mark.parametrize(("time", "volume"), [(0.0, 50.0), (-1.0, 50.0), (0.5, 0.0), (0.5, -3.0)])
 def test_rooms_that_cannot_be_are_refused(time: float, volume: float) -> None:
-    with pytest.raises(thud.InputError, match="> 0"):
+    name = "volume" if time > 0 else "reverberation_time"
+    with pytest.raises(thud.InputError, match=naming(name, 0)):
         thud.standardised_level([60.0], time, volume)
-    with pytest.raises(thud.InputError, match=f"reverberation_time = {min(time, 0.4):g}|volume ="):
+    with pytest.raises(thud.InputError, match=naming(name, 0)):
         thud.standardised_level([60.0, 61.0], [0.4, time], volume)
 
 
@@ -161,7 +166,7 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
     shown = capsys.readouterr()
     assert "47 (46.97)" in shown.out
     assert "46 (46.24)" in shown.out
-    assert "the background is not known" in shown.err
+    assert "background" in shown.err
     assert {path.name for path in folder.iterdir()} == {
         ".thud", "room_levels.csv", "room_levels.png", "room_levels.svg",
     }  # fmt: skip
@@ -174,7 +179,7 @@ def test_command_rates_a_table(tmp_path: Path, capsys: pytest.CaptureFixture[str
 def test_columns_of_no_position_are_refused(tmp_path: Path, title: str) -> None:
     rows = "".join(f"{f},60,55\n" for f in (63, 125, 250, 500))
     (tmp_path / "levels.csv").write_text(f"frequency,first,{title.replace(',', '')}\n{rows}")
-    with pytest.raises(thud.InputError, match="is no position"):
+    with pytest.raises(thud.InputError, match=naming("levels.csv", f"'{title.replace(',', '')}'")):
         thud.read_room_levels(tmp_path / "levels.csv")
 
 
@@ -277,14 +282,14 @@ def test_rows_of_a_table_may_have_any_order_and_further_bands(tmp_path: Path) ->
         # Titles within 3 % of a mid frequency mean it.
         ("61.2,60\n128,60\n250,60\n500,60\n", ""),
         ("64.8,60\n122,60\n250,60\n500,60\n", ""),
-        ("61,60\n125,60\n250,60\n500,60\n", "frequency = 61 Hz"),
+        ("61,60\n125,60\n250,60\n500,60\n", naming("frequency", "61 Hz")),
         ("1,60\n63,60\n125,60\n250,60\n500,60\n", ""),
         ("63,60\n125,60\n250,60\n500,60\n99000,60\n", ""),
-        ("0.99,60\n63,60\n125,60\n250,60\n500,60\n", "frequency = 0.99 Hz"),
-        ("63,60\n125,60\n250,60\n500,60\n100000,60\n", "frequency = 100000 Hz"),
+        ("0.99,60\n63,60\n125,60\n250,60\n500,60\n", naming("frequency", "0.99 Hz")),
+        ("63,60\n125,60\n250,60\n500,60\n100000,60\n", naming("frequency", "100000 Hz")),
         ("63,200\n125,-50\n250,60\n500,60\n", ""),
-        ("63,200.1\n125,60\n250,60\n500,60\n", "level = 200.1 dB"),
-        ("63,60\n125,-50.1\n250,60\n500,60\n", "level = -50.1 dB"),
+        ("63,200.1\n125,60\n250,60\n500,60\n", naming("level", "200.1 dB")),
+        ("63,60\n125,-50.1\n250,60\n500,60\n", naming("level", "-50.1 dB")),
     ],
 )
 def test_bounds_of_a_table_are_those_that_are_stated(tmp_path: Path, rows: str, words: str) -> None:
@@ -299,7 +304,7 @@ def test_bounds_of_a_table_are_those_that_are_stated(tmp_path: Path, rows: str, 
 @pytest.mark.parametrize(
     ("column", "words"),
     [
-        ("T", "reverberation_time = 0.009 s"),
+        ("T", naming("reverberation_time", "0.009 s")),
         ("background", ""),
     ],
 )

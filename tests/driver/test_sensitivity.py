@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
@@ -84,7 +84,7 @@ def test_samples_without_results_are_left_out() -> None:
     assert 0 < result.left_out < 64
     assert np.isfinite(result.indices["total"].sel(output="peak force")).all()
     study["parameters"]["mass"] = {"low": -3.0, "high": -2.0}
-    with pytest.raises(thud.InputError, match=r"only 0 of 128 base samples .*mass.*; allowed: ran"):
+    with pytest.raises(thud.InputError, match=naming(0, 128, "mass")):
         thud.sensitivity(study)
 
 
@@ -132,12 +132,12 @@ def test_command_writes_indices(tmp_path: Path, capsys: pytest.CaptureFixture[st
 
 
 def test_useless_designs_are_reported() -> None:
-    with pytest.raises(thud.InputError, match="kind = 'grid' is not allowed; allowed: saltelli"):
+    with pytest.raises(thud.InputError, match=naming("kind", "'grid'", "saltelli")):
         thud.sensitivity({**LUMPED, "design": {"kind": "grid"}})
-    with pytest.raises(thud.InputError, match="such as 64 or 128"):
+    with pytest.raises(thud.InputError, match=naming("size", 100, 64, 128)):
         thud.sensitivity({**LUMPED, "design": {"size": 100}})
     for size in (1, 2):
-        with pytest.raises(thud.InputError, match=rf"size = {size} is not .* numbers from 4"):
+        with pytest.raises(thud.InputError, match=naming("size", size, 4)):
             thud.sensitivity({**LUMPED, "design": {"size": size}})
 
 

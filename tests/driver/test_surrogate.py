@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import naming
 from scipy.stats import binom, norm
 
 import thud
@@ -190,10 +192,7 @@ def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     study = {**LUMPED, "surrogate": {"size": 128}}
     assert thud.surrogate(study).worst[1] < 0.01
     monkeypatch.setattr(evaluation, "solve_many", jump)
-    words = (
-        r"surrogate's error of the floor level 500 Hz is 0\.\d+ dB with 64, .* with 128 drops; "
-        r"allowed: up to 0\.1 dB \(\[surrogate\] error\): narrower"
-    )
+    words = naming("floor level 500 Hz", 64, 128, "0.1 dB", "[surrogate] error")
     with pytest.raises(thud.NumericalError, match=words):
         thud.surrogate(study)
 
@@ -216,7 +215,7 @@ def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     from thud.studies import evaluation  # noqa: PLC0415 - to be changed
 
     monkeypatch.setattr(evaluation, "peak_count", lambda force, _: 1 + (force.max() > 1500))
-    with pytest.raises(thud.InputError, match=r"number of peaks differs .*1 in \d+, 2 in \d+"):
+    with pytest.raises(thud.InputError, match=naming("peaks", 1, 2)):
         thud.surrogate(LUMPED)
 
 
@@ -226,8 +225,9 @@ def test_points_outside_the_region_are_refused(trained: thud.Surrogate) -> None:
     study["fixed"] = {**study["fixed"], "wall_thickness": 0.0305}
     found = thud.sweep(study, surrogate=trained)
     assert found["status"].values.tolist() == [1, 0]
-    words = "height = 0.9 is outside the region of the surrogate; allowed: 0.98 <= height <= 1.02"
-    assert found["reason"].values.tolist() == [words, ""]
+    reasons = found["reason"].values.tolist()
+    assert re.search(naming("height", 0.9, 0.98, 1.02), reasons[0])
+    assert not reasons[1]
     assert np.isnan(found["floor_level"].values[0]).all()
     assert np.isnan(found["contact_time"].values[0])
     assert not found["conforms"].values[0]
@@ -236,15 +236,15 @@ def test_points_outside_the_region_are_refused(trained: thud.Surrogate) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"fixed": {**FIXED, "loss_factor": 0.1}}, "loss_factor = 0.1: the surrogate was trained"),
-        ({"fixed": {"model": "hollow_sphere"}}, "trained on another model"),
-        ({"parameters": {"mass": {"low": 2.4, "high": 2.6}}}, "mass: the surrogate was not"),
+        ({"fixed": {**FIXED, "loss_factor": 0.1}}, naming("loss_factor", 0.1, "surrogate")),
+        ({"fixed": {"model": "hollow_sphere"}}, naming("surrogate", "model")),
+        ({"parameters": {"mass": {"low": 2.4, "high": 2.6}}}, naming("mass", "surrogate")),
         (
             {
                 "fixed": {"model": "modal_ball"},
                 "parameters": {"damping_law": {"values": ["rising"]}},
             },
-            "damping_law: the surrogate was not trained on it; allowed: parameters among height",
+            naming("damping_law", "surrogate", "height"),
         ),
     ],
 )
@@ -253,7 +253,7 @@ def test_other_cases_are_refused(
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
         thud.uncertainty({**TOLERANCES, **change}, surrogate=trained)
-    with pytest.raises(thud.InputError, match="mass: the surrogate was not trained on it"):
+    with pytest.raises(thud.InputError, match=naming("mass", "surrogate")):
         trained.predict(trained.case, {"mass": np.array([2.5])})
 
 
@@ -280,7 +280,7 @@ def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:
     (tmp_path / "pickle.npz").write_bytes(b"")
     np.savez(tmp_path / "pickle.npz", header=np.array([object()]), allow_pickle=True)
     for name in ("damaged.npz", "pickle.npz", "missing.npz"):
-        with pytest.raises(thud.InputError, match=rf"{name} (cannot be read|is damaged)"):
+        with pytest.raises(thud.InputError, match=naming(name)):
             thud.read_surrogate(tmp_path / name)
     for parts in (
         {"weights": trained.weights[:3]}, {"mean": trained.mean + np.inf}, {"identity": {}},
@@ -288,7 +288,7 @@ def test_files_hold_everything(trained: thud.Surrogate, tmp_path: Path) -> None:
         {"residuals": trained.residuals[:0]},
     ):  # fmt: skip
         replace(trained, **parts).save(tmp_path / "foreign.npz")
-        with pytest.raises(thud.InputError, match=r"foreign.npz (cannot be read|is damaged)"):
+        with pytest.raises(thud.InputError, match=naming("foreign.npz")):
             thud.read_surrogate(tmp_path / "foreign.npz")
     changed = replace(trained, mean=trained.mean + 0.1)
     assert changed.digest != trained.digest
@@ -322,7 +322,7 @@ def test_training_resumes_and_results_are_kept(
     # Another region needs other drops, and the old ones are not removed without a word.
     path.write_text(path.read_text().replace("high=3", "high=4"))
     assert cli.main(command) == 1
-    assert "belongs to another version" in capsys.readouterr().err
+    assert "lumped" in capsys.readouterr().err
     assert cli.main([*command, "--replace"]) == 0
     assert thud.read_surrogate(folder / "lumped_surrogate.npz").region.max() == 4
 
@@ -336,7 +336,7 @@ def test_results_that_are_written_hold_the_errors(trained: thud.Surrogate, tmp_p
         other["floor_level"].attrs["surrogate_error"], trained.error_of("floor_level")
     )
     # The model itself has other results.
-    with pytest.raises(thud.InputError, match="belongs to another version"):
+    with pytest.raises(thud.InputError, match=naming("tolerances.nc", "surrogate")):
         thud.uncertainty(TOLERANCES, tmp_path)
 
 
@@ -385,12 +385,12 @@ def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
 @pytest.mark.parametrize(
     ("table", "words"),
     [
-        ({"error": 0}, r"\[surrogate\] error = 0 is not allowed; allowed: numbers above 0"),
-        ({"error": "x"}, r"\[surrogate\] error = 'x' is not allowed; allowed: finite numbers"),
-        ({"size": 10}, r"\[surrogate\] size = 10 is not allowed; .*from 64"),
-        ({"drops": 100}, r"\[surrogate\]: 'drops' is not known"),
-        ({"file": "none.npz"}, r"none\.npz cannot be read: No such file"),
-        ({"file": "none.npz", "size": 64}, r"\[surrogate\] with file: 'size' is not known"),
+        ({"error": 0}, naming("[surrogate] error", 0)),
+        ({"error": "x"}, naming("[surrogate] error", "'x'")),
+        ({"size": 10}, naming("[surrogate] size", 10, 64)),
+        ({"drops": 100}, naming("[surrogate]", "'drops'")),
+        ({"file": "none.npz"}, naming("none.npz")),
+        ({"file": "none.npz", "size": 64}, naming("[surrogate]", "file", "'size'")),
     ],
 )
 def test_tables_are_checked(table: dict[str, Any], words: str) -> None:
@@ -403,15 +403,15 @@ def test_only_real_parameters_are_learned() -> None:
     rate = {"sample_rate": {"values": [20000.0, 44100.0]}}
     laws = {"damping_law": {"values": ["rising", "constant"]}}
     for name, parameters in (("sample_rate", rate), ("damping_law", laws)):
-        with pytest.raises(thud.InputError, match=rf"cannot learn {name}; allowed: parameters of"):
+        with pytest.raises(thud.InputError, match=naming("surrogate", name)):
             thud.sweep({**study, "fixed": {"model": "modal_ball"}, "parameters": parameters})
-    with pytest.raises(thud.InputError, match="height is not a range of a surrogate; allowed: low"):
+    with pytest.raises(thud.InputError, match=naming("height", "low", "high")):
         thud.surrogate({**REGION, "parameters": {"height": {"std": 0.1}}})
 
 
 def test_drops_without_result_are_refused() -> None:
     study = {**LUMPED, "parameters": {**LUMPED["parameters"], "mass": {"low": -1, "high": 3}}}
-    with pytest.raises(thud.InputError, match=r"\d+ of 64 drops .*have no result \(.*mass.*\)"):
+    with pytest.raises(thud.InputError, match=naming(64, "&ball: mass")):
         thud.surrogate(study)
 
 
@@ -425,7 +425,7 @@ def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
         impact.levels().tolist(), 0.05, contact_time=(impact.exact_contact_time, 2e-5)
     )
     starts = {"youngs_modulus": 1.85e6, "wall_thickness": 0.0307}
-    with pytest.warns(thud.FitWarning, match="errors of the surrogate are up to"):
+    with pytest.warns(thud.FitWarning, match=naming("errors", "surrogate")):
         found = thud.fit(target, starts, replace(case, ball=thud.Ball()), surrogate=trained)
     assert found.converged
     for name, value in truth.items():
@@ -441,13 +441,13 @@ def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
 def test_fits_refuse_what_a_surrogate_does_not_know(trained: thud.Surrogate) -> None:
     case = trained.case
     levels = thud.LevelTarget([39, 31, 23, 17, 12.5], 0.5)
-    with pytest.raises(thud.InputError, match="surrogate is not allowed for a force"):
+    with pytest.raises(thud.InputError, match=naming("surrogate", "force")):
         thud.fit(thud.solve_case(case), {"height": 1.0}, case, surrogate=trained)
-    with pytest.raises(thud.InputError, match="mass: the surrogate was not trained on it"):
+    with pytest.raises(thud.InputError, match=naming("mass", "surrogate")):
         thud.fit(levels, {"mass": 2.5}, case, surrogate=trained)
-    with pytest.raises(thud.InputError, match=r"height: start = 0\.9 is outside the region"):
+    with pytest.raises(thud.InputError, match=naming("height", "start", 0.9, 0.98)):
         thud.fit(levels, {"height": 0.9}, case, surrogate=trained)
-    with pytest.raises(thud.InputError, match="has no file; allowed: file"):
+    with pytest.raises(thud.InputError, match=naming("[surrogate]", "file")):
         thud.read_study(
             {
                 "fixed": FIXED,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import os
+import re
 import resource
 import shutil
 import subprocess
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 import scipy
 import xarray as xr
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.stats import qmc
@@ -308,8 +309,8 @@ def test_failing_sets_say_why_and_disturb_no_other() -> None:
     found = thud.sweep({"parameters": {"height": {"values": [1.0, -1.0, 1000.0]}}})
     assert found["status"].values.tolist() == [0, 1, 2]
     assert found["reason"].values[0] == ""
-    assert "&drop: height = -1.0" in str(found["reason"].values[1])
-    assert "closes the shell" in str(found["reason"].values[2])
+    assert re.search(naming("&drop: height", "-1.0"), str(found["reason"].values[1]))
+    assert re.search(naming("&drop: height", "1000.0 m"), str(found["reason"].values[2]))
     assert found["peak_force"].values[0] == pytest.approx(thud.solve().peak_force, rel=1e-9)
     assert np.isnan(found["elastic_level"].values[1:]).all()
 
@@ -369,13 +370,11 @@ def test_blocks_take_about_half_a_second() -> None:
 def test_many_sets_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
-    with pytest.raises(
-        thud.InputError, match=r"a: 200000 sets of hollow_sphere, about \d\d MB .*yes"
-    ):
+    with pytest.raises(thud.InputError, match=naming("a", 200000, "hollow_sphere", "MB", "yes")):
         thud.sweep(many, tmp_path)
     spread = {"low": 1, "high": 2, "count": 10**6}
     many = {"name": "a", "parameters": dict.fromkeys(("height", "mass", "gravity"), spread)}
-    with pytest.raises(thud.InputError, match="are free; allowed: fewer sets"):
+    with pytest.raises(thud.InputError, match=naming("a.zarr", "3.99e+14 MB")):
         thud.sweep(many, tmp_path, yes=True)
     assert not (tmp_path / "a.partial").exists()
 
@@ -383,128 +382,140 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", r"\[parameters\] is empty; allowed: one"),
-        ("[parameters]\n[parameters]", "allowed: TOML"),
-        ("sets = 3", "'sets' is not known; allowed: name, case"),
-        (f"{'12' * 50} = 3", "the study: a text of 100 characters is not known; allowed: name"),
+        ("", naming("[parameters]")),
+        ("[parameters]\n[parameters]", naming("TOML")),
+        ("sets = 3", naming("'sets'", "name", "case")),
+        (f"{'12' * 50} = 3", naming("100 characters", "name", "case")),
         (
             "parameters.temperature.values = [19]\ntemperature.c1 = 8\ntemperature.c2 = 120",
-            r"\[temperature\] has no reference; allowed: reference with coefficient, or",
+            naming("[temperature]", "reference", "coefficient"),
         ),
         (
             'case = "\\n"\nparameters.height.values = [1]',
-            r"\?: there is no such file; allowed: the path of a namelist",
+            naming("file", "namelist"),
         ),
-        ("parameters = 3", r"parameters = 3 .*allowed: a table"),
-        ("name = 'a/b'\nparameters.height.values = [1]", "name = 'a/b'.*without folders"),
-        ("name = '..'\nparameters.height.values = [1]", r"name = '\.\.' .*without folders"),
-        ("format = 'csv'\nparameters.height.values = [1]", "allowed: 'auto', 'netcdf', 'zarr'"),
-        ("case = 'no.nml'\nparameters.height.values = [1]", "no.nml.*"),
-        ("parameters.hight.values = [1]", "'hight' is not a key of hollow_sphere .did you mean"),
-        ("parameters.loss_factor.values = [1]", "allowed: keys of &ball, &drop, &hollow_sphere"),
-        ("fixed.mass = {}\nparameters.height.values = [1]", "mass has no value; allowed: value"),
-        (f"name = {'[' * 10_000}", "allowed: TOML"),
-        ("name = '\udcff'", "byte 9 is not of UTF-8; allowed: TOML"),
-        ("parameters.height = 1", r"height = 1 is not a table; allowed: values, low"),
-        ("parameters.height.values = []", r"values = \[\] is empty"),
-        ("parameters.height.values = ['high']", "values = 'high' is not allowed; allowed: finite"),
-        ("parameters.height.values = [inf]", "allowed: finite numbers"),
-        ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}", "allowed: finite numbers"),
-        ("parameters.height = {values=[1], unit='s'}", "unit 's' does not fit; allowed: m, cm, mm"),
-        ("parameters.height = {values=[1], unit=['m']}", "does not fit; allowed: m, cm"),
-        ("parameters.height = {values=[1], count=2}", "'count' is not known; allowed: values, u"),
-        ("parameters.height = {low=1, high=2}", "no values for a grid design; allowed: values"),
-        ("parameters.height = {low=1}", "no high end; allowed: high"),
-        ("parameters.height = {low=2, high=1, count=3}", "low = 2 is not allowed; allowed: low <"),
-        ("parameters.height = {low=0, high=1, count=3, scale='log'}", "allowed: low < high, 0"),
-        ("parameters.height = {low=1, high=2, count=1}", "count = 1 is not .*whole numbers from 2"),
+        ("parameters = 3", naming("parameters", 3, "table")),
+        ("name = 'a/b'\nparameters.height.values = [1]", naming("name", "'a/b'")),
+        ("name = '..'\nparameters.height.values = [1]", naming("name", "'..'")),
+        ("format = 'csv'\nparameters.height.values = [1]",
+         naming("format", "'csv'", "'auto'", "'netcdf'", "'zarr'")),
+        ("case = 'no.nml'\nparameters.height.values = [1]", naming("no.nml")),
+        ("parameters.hight.values = [1]", naming("'hight'", "hollow_sphere", "'height'")),
+        ("parameters.loss_factor.values = [1]",
+         naming("'loss_factor'", "&ball", "&drop", "&hollow_sphere")),
+        ("fixed.mass = {}\nparameters.height.values = [1]", naming("mass", "value")),
+        (f"name = {'[' * 10_000}", naming("TOML")),
+        ("name = '\udcff'", naming("byte 9", "UTF-8", "TOML")),
+        ("parameters.height = 1", naming("height", 1, "values", "low")),
+        ("parameters.height.values = []", naming("height", "values", [])),
+        ("parameters.height.values = ['high']", naming("height", "values", "'high'")),
+        ("parameters.height.values = [inf]", naming("height", "values", "finite")),
+        ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}",
+         naming("youngs_modulus", "values", "finite")),
+        ("parameters.height = {values=[1], unit='s'}",
+         naming("height", "unit", "'s'", "m", "cm", "mm")),
+        ("parameters.height = {values=[1], unit=['m']}", naming("height", "unit", ["m"], "cm")),
+        ("parameters.height = {values=[1], count=2}",
+         naming("height", "'count'", "values", "unit")),
+        ("parameters.height = {low=1, high=2}", naming("height", "values", "grid")),
+        ("parameters.height = {low=1}", naming("height", "high")),
+        ("parameters.height = {low=2, high=1, count=3}", naming("height", "low", 2)),
+        ("parameters.height = {low=0, high=1, count=3, scale='log'}", naming("height", "low", 0)),
+        ("parameters.height = {low=1, high=2, count=1}", naming("height", "count", 1, 2)),
         (
             "parameters.height = {low=1, high=2, count=1000000000000}",
-            "count = 1000000000000 is not allowed; allowed: whole numbers from 2 to 1073741824",
+            naming("height", "count", 10**12, 2, 1073741824),
         ),
         (
             f"parameters.height = {{low=1, high=2, count=1{'0' * 400}}}",
-            "count = a very large number is not allowed",
+            naming("height", "count"),
         ),
-        ("parameters.substeps = {low=1, high=3, count=4}", "allowed: whole numbers from 2 to 3"),
+        ("parameters.substeps = {low=1, high=3, count=4}", naming("substeps", "count", 4, 2, 3)),
         (
             "parameters.substeps = {low=1, high=1e9, count=3}",
-            r"low = 1 and high = 1e\+09 are not allowed; allowed: 1 <= low < high <= 10000",
+            naming("substeps", "low", "high", "1e+09", 1, 10000),
         ),
         (
             "parameters = {height=$, mass=$, gravity=$}".replace(
                 "$", "{low=1, high=2, count=10_000_000}"),
-            r"make too many sets; allowed: up to 2\^63 - 1 in a grid",
+            naming("sets", "2^63 - 1", "grid"),
         ),
-        (f"design.seed = 1{'0' * 5000}", "allowed: TOML"),
-        ("parameters.height = {std=1}", "no values for a grid design"),
-        ("parameters.substeps.values = [1.5]", "values = 1.5 is not allowed; allowed: whole"),
-        ("parameters.substeps = {std=1}", "allowed: values"),
-        ("parameters.momentum_flux.values = ['some']", "allowed: 'momentum_balance', 'retarding'"),
-        ("parameters.momentum_flux = {low=1, high=2}", "is not a number; allowed: values"),
-        ("parameters.bands.values = ['third']", r"allowed: bands in \[fixed\]"),
-        ("fixed.mass = -2\nparameters.height.values = [1]", r"\[fixed\]: &ball: mass = -2.0 is "),
+        (f"design.seed = 1{'0' * 5000}", naming("TOML")),
+        ("parameters.height = {std=1}", naming("height", "values", "grid")),
+        ("parameters.substeps.values = [1.5]", naming("substeps", "values", 1.5)),
+        ("parameters.substeps = {std=1}", naming("substeps", "values")),
+        ("parameters.momentum_flux.values = ['some']",
+         naming("momentum_flux", "'some'", "'momentum_balance'")),
+        ("parameters.momentum_flux = {low=1, high=2}", naming("momentum_flux", "values")),
+        ("parameters.bands.values = ['third']", naming("bands", "[fixed]")),
+        ("fixed.mass = -2\nparameters.height.values = [1]", naming("[fixed]", "&ball: mass", -2.0)),
         (
             "fixed.wall_thickness = 0.1\nparameters.height.values = [1]",
-            r"\[fixed\]: &ball: wall_thickness = 0.1 is not allowed; allowed: 0 < .* = 0.089 m",
+            naming("[fixed]", "&ball: wall_thickness", 0.1, "0.089 m"),
         ),
-        ("base = 'a.nml'\nparameters.height.values = [1]", "'base' is now 'case'; allowed: name"),
-        ("parameters.height = {lower=1, upper=2}", "height: 'lower' is now 'low'; allowed: val"),
-        ("parameters.height = {start=1}", "height: 'start' is not known; allowed: values, low"),
-        ("fixed.hight = 1\nparameters.mass.values = [1]", "'hight' is not a key"),
-        ("fixed.model = 'cube'\nparameters.mass.values = [1]", "allowed: 'hollow_sphere', 'modal"),
-        ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]", "allowed: m, cm"),
-        ("fixed = {mass=1, density=1000}\nparameters.height.values = [1]", "mass and density"),
-        ("fixed.density = 1000\nparameters.mass.values = [1]", "mass and density are both given"),
-        ("fixed.mass = 2\nparameters.density.values = [1000]", "mass and density are both given"),
-        ("fixed.mass = 2\nparameters.mass.values = [1]", r"\[fixed\] mass has no use beside \[par"),
+        ("base = 'a.nml'\nparameters.height.values = [1]", naming("'base'", "'case'")),
+        ("parameters.height = {lower=1, upper=2}", naming("height", "'lower'", "'low'")),
+        ("parameters.height = {start=1}", naming("height", "'start'", "values", "low")),
+        ("fixed.hight = 1\nparameters.mass.values = [1]", naming("'hight'", "'height'")),
+        ("fixed.model = 'cube'\nparameters.mass.values = [1]", naming("'cube'", "'hollow_sphere'")),
+        ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]",
+         naming("height", "'Pa'", "cm")),
+        ("fixed = {mass=1, density=1000}\nparameters.height.values = [1]",
+         naming("mass", "density")),
+        ("fixed.density = 1000\nparameters.mass.values = [1]", naming("mass", "density")),
+        ("fixed.mass = 2\nparameters.density.values = [1000]", naming("mass", "density")),
+        ("fixed.mass = 2\nparameters.mass.values = [1]", naming("[fixed]", "mass", "[parameters]")),
         (
             "fixed.density = 900\nparameters.density.values = [1000]",
-            r"\[fixed\] density has no use beside \[parameters\] density; allowed: one",
+            naming("[fixed]", "density", "[parameters]"),
         ),
         (
             "fixed.mass = 2\ndesign = {kind='random', size=9}\nparameters.mass={std=1, mean=3}",
-            r"allowed: one of them, or std without mean",
+            naming("mass", "std", "mean"),
         ),
-        ("fixed.temperature = 1\nparameters.mass.values = [1]", r"temperature in \[parameters\]"),
-        ("parameters.temperature.values = [1]", "allowed: reference, degC, and coefficient"),
-        ("temperature.reference = 1\nparameters.temperature.values = [1]", "has no coefficient"),
+        ("fixed.temperature = 1\nparameters.mass.values = [1]",
+         naming("temperature", "[parameters]")),
+        ("parameters.temperature.values = [1]", naming("reference", "degC", "coefficient")),
+        ("temperature.reference = 1\nparameters.temperature.values = [1]",
+         naming("[temperature]", "coefficient")),
         (
             "temperature = {reference=1, c1=8}\nparameters.temperature.values = [1]",
-            r"\[temperature\] has no c2",
+            naming("[temperature]", "c2"),
         ),
         (
             "temperature = {reference=1, c1=8, c2=-1}\nparameters.temperature.values = [1]",
-            r"\[temperature\] c2 = -1 .*0 < c2",
+            naming("[temperature]", "c2", -1, 0),
         ),
         (
             "temperature = {reference=1, c1=8, c2=100}\nparameters.temperature.values = [1]",
-            r"c1 cannot shift the loss of hollow_sphere",
+            naming("c1", "hollow_sphere"),
         ),
         (
             "fixed.model = 'modal_ball'\ntemperature = {reference=1, c1=8, c2=100}\n"  # noqa: ISC004
             "parameters = {temperature.values=[1], damping_law.values=['rising']}",
-            r"c1 has no use where damping_law varies",
+            naming("c1", "damping_law"),
         ),
-        ("design.kind = 'cube'\nparameters.mass.values = [1]", "allowed: grid, list, random"),
-        ("design.size = 3\nparameters.mass.values = [1]", "'size' is not known; allowed: kind"),
-        ("design.kind = 'random'\nparameters.mass.values = [1]", "size = 0 .*numbers from 1"),
-        ("design = {kind='sobol', size=100}\nparameters.mass.values = [1]", "as 64 or 128"),
+        ("design.kind = 'cube'\nparameters.mass.values = [1]",
+         naming("cube", "grid", "list", "random")),
+        ("design.size = 3\nparameters.mass.values = [1]", naming("'size'", "kind")),
+        ("design.kind = 'random'\nparameters.mass.values = [1]", naming("size", 0, 1)),
+        ("design = {kind='sobol', size=100}\nparameters.mass.values = [1]",
+         naming("size", 100, 64, 128)),
         (
             "design = {kind='random', size=9}\nparameters.mass = {low=1, high=2, count=3}",
-            "count has no use in a random design; allowed: low, high and scale",
+            naming("mass", "count", "random", "low", "high", "scale"),
         ),
         (
             "design.kind = 'list'\nparameters.mass.values = [1]\nparameters.height.values = [1, 2]",
-            "differ in their number of values; allowed: the same",
+            naming("[parameters]", "values"),
         ),
         (
             "fixed.model = 'measured_modes'\nparameters.frequency.values = [1]",
-            r"frequency is a list; allowed: one entry of it, such as 'frequency\(1\)'",
+            naming("frequency", "list", "'frequency(1)'"),
         ),
         (
             "fixed = {model='measured_modes', frequency=[1], 'frequency(2)'=3}\nparameters.mass={}",
-            r"frequency\(2\) does not exist; allowed: entries 1 to 1 of the case",
+            naming("frequency(2)", 1),
         ),
     ],
 )  # fmt: skip
@@ -515,8 +526,7 @@ def test_bad_studies_are_reported(
     path.write_bytes(text.encode(errors="surrogateescape"))
     assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 1
     errors = capsys.readouterr().err
-    assert errors.startswith(f"thud-driver: {path}: ")
-    assert "allowed: " in errors
+    assert str(path) in errors
     with pytest.raises(thud.InputError, match=words):
         thud.read_study(path)
     assert list(tmp_path.iterdir()) == [path]
@@ -530,7 +540,7 @@ def test_exploding_designs_are_reported_before_they_are_made(
 ) -> None:
     spread = {"low": 1, "high": 2, "count": 10**9}
     study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
-    with pytest.raises(thud.InputError, match=r"000 sets of hollow_sphere.*; allowed: up to"):
+    with pytest.raises(thud.InputError, match=naming("sets", "hollow_sphere")):
         compute(study)
 
 
@@ -544,9 +554,9 @@ def test_numbers_of_numpy_are_numbers() -> None:
 @pytest.mark.parametrize(
     ("study", "words"),
     [
-        ({"fixed": {"mass": np.ones((9, 9))}}, r"mass = an object of list is not allowed"),
-        ({"fixed": {"mass": {1, 2}}}, r"not a text \(an object of set\); allowed: tables"),
-        ({"fixed": {"mass": 10**5000}}, r"not a text .*; allowed: tables"),
+        ({"fixed": {"mass": np.ones((9, 9))}}, naming("mass", "list")),
+        ({"fixed": {"mass": {1, 2}}}, naming("set", "tables")),
+        ({"fixed": {"mass": 10**5000}}, naming("tables")),
     ],
 )
 def test_bad_tables_are_reported(study: dict[str, Any], words: str) -> None:
@@ -557,8 +567,8 @@ def test_bad_tables_are_reported(study: dict[str, Any], words: str) -> None:
 
 def test_missing_study_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["sweep", str(tmp_path / "no.toml")]) == 1
-    assert "no.toml: No such file or directory; allowed: a file" in capsys.readouterr().err
-    with pytest.raises(thud.InputError, match="study = 3 is not allowed"):
+    assert "no.toml" in capsys.readouterr().err
+    with pytest.raises(thud.InputError, match=naming("study", 3)):
         thud.sweep(3)  # type: ignore[arg-type]
 
 
@@ -585,7 +595,7 @@ def test_any_damage_to_a_study(
         study = thud.read_study(path)
     except thud.InputError as error:
         assert "\n" not in str(error)
-        assert "allowed: " in str(error)
+        assert str(path) in str(error)
     else:
         assert study.count > 0
 
@@ -599,7 +609,7 @@ def test_command_writes_figure_and_table(
     names = [".thud", "sweep.nc", "sweep.png", "sweep.svg"]
     assert sorted(path.name for path in folder.iterdir()) == names
     printed = capsys.readouterr()
-    assert "80 sets of hollow_sphere, about 0.085 MB on disk" in printed.err
+    assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
     assert "peak_force, N" in printed.out
     assert "Results: outputs/sweep" in printed.out
 
@@ -610,13 +620,13 @@ def test_study_without_results_is_a_failure(
     path = tmp_path / "high.toml"
     path.write_text("parameters.height.values = [1000, 2000]")
     assert cli.main(["sweep", "-q", str(path), "-o", str(tmp_path)]) == 2
-    assert "2 of 2 sets have no results, such as: " in capsys.readouterr().err
+    assert re.search(naming(2, "&drop: height", "1000.0 m"), capsys.readouterr().err)
 
 
 def test_study_of_another_kind_is_reported() -> None:
     study = thud.read_study(HEIGHTS)
     for function in (thud.sensitivity, thud.design_map, thud.uncertainty):
-        with pytest.raises(thud.InputError, match="python is a sweep study; allowed: a "):
+        with pytest.raises(thud.InputError, match=naming("python", "sweep")):
             function(study)
 
 
@@ -625,8 +635,9 @@ def test_missing_packages_are_reported(tmp_path: Path) -> None:
     command = [sys.executable, "-c", code, "sweep", "study.toml"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    sentence = "xarray is not installed; allowed: pip install h5netcdf h5py SALib xarray zarr"
-    assert done.stderr == f"thud-driver: {sentence}\n"
+    needed = naming("xarray", "pip install h5netcdf h5py SALib xarray zarr")
+    assert re.search(needed, done.stderr)
+    assert done.stderr.count("\n") == 1
 
 
 def test_import_stays_light() -> None:
@@ -644,7 +655,7 @@ def test_fixed_values_may_suit_parameters_only() -> None:
 
 
 def test_unknown_keywords_are_reported() -> None:
-    with pytest.raises(thud.InputError, match="keywords: 'threads' is not known; allowed: backend"):
+    with pytest.raises(thud.InputError, match=naming("'threads'", "backend")):
         thud.sweep(HEIGHTS, threads=2)
 
 
@@ -678,8 +689,7 @@ def test_design_that_exceeds_the_memory_is_told(
     )
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
-    assert f"[design] size = {size}" in line
-    assert "; allowed: " in line
+    assert re.search(naming("[design] size", size), line)
 
 
 def test_sets_that_exceed_the_memory_are_told_before_they_are_computed() -> None:

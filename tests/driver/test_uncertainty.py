@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import REPOSITORY
+from conftest import REPOSITORY, naming
 from scipy.stats import norm
 
 import thud
@@ -88,9 +88,7 @@ def test_sets_without_results_are_counted_apart() -> None:
     assert result.computed + result.failed == 50
     assert result.levels.shape == (result.computed, 5)
     study["parameters"] = {"height": {"low": -2, "high": -1}}
-    with pytest.raises(
-        thud.InputError, match=r"only 0 of 50 sets .*height.*; allowed: two or more"
-    ):
+    with pytest.raises(thud.InputError, match=naming(0, 50, "height")):
         thud.uncertainty(study)
 
 
@@ -123,7 +121,7 @@ def test_command_writes_figure_and_table(
 
 
 def test_only_independent_sets_are_taken() -> None:
-    with pytest.raises(thud.InputError, match="kind = 'sobol' is not allowed; allowed: random"):
+    with pytest.raises(thud.InputError, match=naming("kind", "'sobol'", "random")):
         thud.uncertainty({**SMALL, "design": {"kind": "sobol", "size": 8}})
 
 
@@ -131,7 +129,7 @@ def test_only_independent_sets_are_taken() -> None:
 def test_limits_are_alike_for_all_sets(name: str) -> None:
     values = {"source": ["rubber_ball", "tyre"], "force": ["elastic", "floor"]}[name]
     study = {"design": {"size": 4}, "parameters": {name: {"values": values}, "mass": {"std": 0.1}}}
-    with pytest.raises(thud.InputError, match=rf"{name} is not allowed, .*{name} in \[fixed\]"):
+    with pytest.raises(thud.InputError, match=naming(name, "[fixed]")):
         thud.uncertainty(study)
 
 
