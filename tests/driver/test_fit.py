@@ -13,7 +13,7 @@ from scipy import stats
 
 import thud
 from thud.studies.fitting import misfit
-from thud.studies.fitting.inference import infer, worst_directions
+from thud.studies.fitting.inference import infer, pair_sentences, statement, worst_directions
 from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges, with_values
 
 RATE = 44100.0
@@ -168,6 +168,33 @@ def test_worst_directions_are_axes_of_the_ellipsoid() -> None:
     for (_, direction), axis in zip(found, turn.T, strict=False):
         assert abs(direction[[0, 2, 3]] @ axis) == pytest.approx(1)
         assert direction[1] == 0
+
+
+def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
+    sizes = np.array(
+        [[1, 0.9987, 0.95, 0.2], [0, 1, -0.99996, 0.899], [0, 0, 1, 0.901], [0, 0, 0, 1]]
+    )
+    found = pair_sentences("abcd", np.where(sizes, sizes, sizes.T), 0.9)
+    # The strongest first; above 0.998 no model tells them apart.
+    assert found == [
+        "b and c cannot be told apart: correlation −0.99996",
+        "a and b cannot be told apart: correlation 0.999",
+        "a and c are hard to tell apart: correlation 0.95",
+        "c and d are hard to tell apart: correlation 0.90",
+    ]
+
+
+def test_directions_are_compared_where_there_are_two() -> None:
+    assert statement(["a"], np.eye(1), np.eye(1), 1) == []
+    # Of standard errors of 6 and 2 %, the first along the first parameter.
+    (told,) = statement(["a", "b"], np.diag([0.06, 0.02]) ** 2, np.eye(2), 2)
+    assert re.search(r"least determined: a, standard error 6 %; .* 3 times as uncertain", told)
+
+
+def test_parameters_without_any_effect_are_all_lost() -> None:
+    known = infer(np.zeros((5, 2)), np.zeros((5, 2)), 1.0)
+    assert len(known.null) == 2
+    assert np.isinf(np.diag(known.covariance)).all()
 
 
 def test_parameters_are_lost_by_size_and_by_error_of_the_derivatives() -> None:

@@ -176,6 +176,26 @@ def test_quiet_counts_up_to_a_tenth_of_a_second() -> None:
     short = Quiet(quiet.force, RATE, (int(0.0105 * RATE), len(quiet.force)), 500.0)
     assert short.freedom == int(2 * 500 * int(0.0105 * RATE) / RATE) - 1
     assert not short.known
+    # Cells of a millisecond, one for each independent value of the band, next to the pulse.
+    (begins, ends), mean = quiet._means  # noqa: SLF001
+    width = int(RATE / 1000)
+    assert len(mean) == 2 * (int(0.1 * RATE) // width)
+    inner, outer = 0.01, 0.01 + int(0.1 * RATE) // width * width / RATE
+    for time in (np.abs(begins), np.abs(ends)):
+        assert time.min() == pytest.approx(inner, abs=1.5 * width / RATE)
+    assert np.abs([begins.min(), ends.max()]) == pytest.approx([outer] * 2, abs=1.5 / RATE)
+
+
+def test_pulse_is_found_in_means_of_a_millisecond() -> None:
+    time = np.arange(int(0.22 * RATE)) / RATE
+    inside = (time > 0.1) & (time < 0.12)
+    force = np.where(inside, 1500 * np.sin(np.pi * (time - 0.1) / 0.02), 0)
+    force += np.random.default_rng(2).normal(scale=400, size=len(time))
+    first, stop = find_pulse(force, RATE)
+    # A fifth of the peak is reached after 1.3 ms; 4 ms are left before it. Noise of 60 N, and a
+    # millisecond of the means.
+    assert first / RATE == pytest.approx(0.1 + 0.0013 - 0.004, abs=1.2e-3)
+    assert stop / RATE == pytest.approx(0.12 - 0.0013 + 0.004, abs=1.2e-3)
 
 
 def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:

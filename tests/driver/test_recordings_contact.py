@@ -14,7 +14,7 @@ from synthetic import half_sine, make_drop
 from thud.levels import record_force
 from thud.recordings import calibration, contact, drops, estimates, flanks
 from thud.recordings.contact import Contact, cells_between, even_edges
-from thud.recordings.plate import Plate
+from thud.recordings.plate import Plate, correct_plate
 from thud.recordings.signal import Signal
 
 RATE = 25600.0
@@ -65,6 +65,18 @@ def test_flank_cells_are_fine_around_the_touch() -> None:
     away = np.maximum(np.abs(at - 0.0102) - 2e-4, 0)
     expected = np.maximum(2e-5, 0.15 * away)
     np.testing.assert_array_equal(np.rint(width * 96_000), np.floor(expected * 96_000 + 1e-9))
+
+
+def test_response_of_a_correction_is_that_of_a_long_record() -> None:
+    plate = Plate(1600.0, 30.0)
+    found = contact._response(plate, RATE)  # noqa: SLF001
+    reach = len(found) // 2
+    unit = np.zeros(4001)
+    unit[2000] = 1
+    # Two periods of the resonance on both sides of its sample.
+    assert len(found) == 2 * int(2 * RATE / 1600) + 1
+    long = correct_plate(unit, RATE, plate)[2000 - reach : 2000 + reach + 1]
+    np.testing.assert_allclose(found, long, atol=1e-3 * np.abs(long).max())
 
 
 def with_covariance(seed: int = 1) -> Contact:
@@ -260,6 +272,9 @@ def test_walks_scatter_with_the_steps_of_their_flank() -> None:
         np.testing.assert_allclose(spread[7:], expected)
         assert tuple(spread[:2]) == (kind.jump, kind.filtered)
         assert spread[6] == kind.parabola
+        # What is added to begin and end: 5 us for lines and jumps, 20 us for all other kinds.
+        is_line = not kind.rough and kind.mean[1] == kind.mean[2] == 0
+        assert kind.left[2] == (5e-6 if is_line else 20e-6)
     # What is likely at touch and at release.
     np.testing.assert_allclose(np.exp(flanks.PRIOR).sum(axis=0), 1)
 

@@ -25,6 +25,7 @@ from recording_files import DURATION, PEAK, SOUND, WITH_UNIT, WRITERS, broadcast
 from thud.errors import InputError
 from thud.levels import force_exposure_levels, get_bands
 from thud.recordings.calibration import calibrate
+from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
 from thud.recordings.reading import open_signals
 from thud.recordings.signal import Signal
@@ -711,6 +712,23 @@ def test_absurd_lengths_of_tdms_are_refused(at: int, claimed: int, tmp_path: Pat
     data[at : at + 8] = struct.pack("<Q", claimed)
     path.write_bytes(data)
     refusal(path)
+
+
+def test_pieces_of_a_file_are_no_longer_than_what_is_left(tmp_path: Path) -> None:
+    content = bytes(range(256)) * 2**14
+    (tmp_path / "long.bin").write_bytes(content)
+    with (tmp_path / "long.bin").open("rb") as raw:
+        file = BoundedFile(raw, "long.bin")
+        assert file.read(3 * 2**20) == content[: 3 * 2**20]
+        # Up to a mebibyte more than is left is the end of the file.
+        assert file.read(2**20) == content[3 * 2**20 :]
+        assert file.read(2**20) == b""
+        with pytest.raises(InputError, match=r"a piece of 2 MiB, 0 MiB are left"):
+            file.read(2**21)
+        raw.seek(2**20)
+        assert file.read() == content[2**20 :]
+        raw.seek(10**9)
+        assert file.read() == b""
 
 
 def test_absurd_counts_of_tdms_are_refused(tmp_path: Path) -> None:

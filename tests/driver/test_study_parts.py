@@ -21,6 +21,7 @@ from thud.studies.design_map import DesignMap, _mark
 from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region
 from thud.studies.emulation.plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
 from thud.studies.emulation.surrogate import Surrogate
+from thud.studies.emulation.training import regress
 from thud.studies.emulation.verdict import judge_many
 from thud.studies.parameter import MAX_VALUES, Parameter, varied
 from thud.studies.sensitivity import sobol_indices
@@ -525,3 +526,32 @@ def test_answers_are_the_verdict_of_what_is_predicted() -> None:
         answer = one.predict(case, {"height": np.array([1.0])})["restitution"]
         assert np.isfinite(answer).all() == known
         assert one.withheld == ([] if known else ["restitution"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"bound": 0.0}, {"bound": -0.1}, {"peaks": 1.5}, {"identity": {}}, {"length": np.zeros(2)},
+        {"region": np.array([[1.1, 0.9], [2.0, 3.0]])}, {"length": np.ones(3)},
+        {"case": thud.Case(model=None)}, {"outputs": {"elastic_level": 5, "peak_force": 7}},
+        *({name: np.full(shape, np.nan)} for name, shape in (
+            ("points", (64, 2)), ("length", 2), ("weights", (64, 12)), ("mean", 12),
+            ("residuals", (64, 12)))),
+    ],
+)  # fmt: skip
+def test_surrogate_whose_parts_do_not_fit_is_not_whole(change: dict[str, Any]) -> None:
+    assert answering().is_whole
+    assert not replace(answering(), **change).is_whole
+
+
+def test_quantity_that_varies_by_rounding_only_is_its_mean() -> None:
+    pytest.importorskip("sklearn", reason="the extra surrogate is not installed")
+    points = np.random.default_rng(1).random((20, 2))
+    varying = 30 + points.sum(axis=1)
+    values = np.column_stack([varying, 7 + 1e-12 * points[:, 0], np.full(20, np.nan)])
+    found = regress(points, values, np.array([True, False, False]))
+    assert found["mean"][:2] == pytest.approx([varying.mean(), 7])
+    assert found["scale"][:2] == pytest.approx([varying.std(), 0], abs=0)
+    assert not found["residuals"][:, 1].any()
+    assert found["residuals"][:, 0].any()
+    assert np.isnan(found["residuals"][:, 2]).all()

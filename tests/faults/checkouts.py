@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 from campaign import Finding
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Iterable
+
+    from campaign import Tries
 
 REPOSITORY = Path(__file__).parents[2]
 NAMES = ("a b", "äöü", "a b ü 'q'\"x", "$HOME", "a & b", "#1", "(a)", "[a] b]", "a;b")
@@ -22,7 +23,7 @@ _MADE = shutil.ignore_patterns(
 )
 
 
-def check_checkouts(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_checkouts(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Run `./bootstrap run` in a copy of the checkout; it brings its Python packages."""
     for number, _ in tries:
         place = folder / NAMES[number]

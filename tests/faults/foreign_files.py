@@ -14,9 +14,10 @@ from scenarios import NEW, OUT, SCENARIOS, make
 from thud.files import MANIFEST, PART
 
 if TYPE_CHECKING:
-    import random
     from collections.abc import Callable, Iterable
     from pathlib import Path
+
+    from campaign import Tries
 
 NAMES = [name for name, one in SCENARIOS.items() if one.weight]
 MINE = b"of the user\n"
@@ -24,7 +25,7 @@ MINE = b"of the user\n"
 READ = (MANIFEST, PART, "effective.nml", "sets.nml", "sweep.partial", "zarr.partial", "sweep.zarr")
 
 
-def check_foreign(tries: list[tuple[int, random.Random]], folder: Path) -> Iterable[Finding]:
+def check_foreign(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Put a foreign file under a name that a command reads or writes."""
     for number, chance in tries:
         name = NAMES[number % len(NAMES)]
@@ -50,9 +51,7 @@ def check_foreign(tries: list[tuple[int, random.Random]], folder: Path) -> Itera
         if is_input and kind in ("hard link", "link") and chance.random() < 0.5:
             words.append("--replace")
         done = forks().run(Order(words, str(place)))
-        word = judge_end(done)
-        if not word and done.code and not (done.said.splitlines() or [""])[-1].startswith("thud"):
-            word = "crashed"
+        word = judge_end(done).partition(":")[0]
         # A temporary name is the program's own.
         if path.name != PART and _state(path) != before:
             word = word or "lost"

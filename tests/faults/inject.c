@@ -101,34 +101,18 @@ int close(int descriptor)
    return NEXT(int, close, int)(descriptor);
 }
 
-static int open_new(const char *name, const char *path, int flags, mode_t mode)
-{
-   if ((flags & O_ACCMODE) != O_RDONLY && fault("open", path)) return -1;
-   return ((int (*)(const char *, int, mode_t))dlsym(RTLD_NEXT, name))(path, flags, mode);
-}
-
-int open(const char *path, int flags, ...)
-{
-   va_list rest;
-   mode_t mode;
-
-   va_start(rest, flags);
-   mode = va_arg(rest, mode_t);
-   va_end(rest);
-   return open_new("open", path, flags, mode);
-}
-
-int open64(const char *path, int flags, ...)
-{
-   va_list rest;
-   mode_t mode;
-
-   va_start(rest, flags);
-   mode = va_arg(rest, mode_t);
-   va_end(rest);
-   return open_new("open64", path, flags, mode);
-}
-
+#define ON_OPEN(name)                                                     \
+   int name(const char *path, int flags, ...)                             \
+   {                                                                      \
+      va_list rest;                                                       \
+      mode_t mode;                                                        \
+                                                                          \
+      va_start(rest, flags);                                              \
+      mode = va_arg(rest, mode_t);                                        \
+      va_end(rest);                                                       \
+      if ((flags & O_ACCMODE) != O_RDONLY && fault(#name, path)) return -1; \
+      return NEXT(int, name, const char *, int, ...)(path, flags, mode);  \
+   }
 #define ON_PATH(name)                                                     \
    int name(const char *path)                                             \
    {                                                                      \
@@ -148,6 +132,8 @@ int open64(const char *path, int flags, ...)
       return NEXT(int, name, int)(descriptor);                            \
    }
 
+ON_OPEN(open)
+ON_OPEN(open64)
 ON_PATH(unlink)
 ON_PATH(remove)
 ON_PATH(rmdir)

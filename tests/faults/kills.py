@@ -62,15 +62,13 @@ def prepare(place: Path, name: str, *, old: bool) -> None:
 def check_kills(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Kill a command at a random time, then run it again."""
     names = [name for name, one in SCENARIOS.items() for _ in range(one.weight)]
-    for _, chance in tries:
-        yield _check(chance.choice(names), chance, folder / "kill")
+    return (_check(chance.choice(names), chance, folder / "kill") for _, chance in tries)
 
 
 def check_slow_kills(tries: Tries, folder: Path) -> Iterable[Finding]:
     """Do the same with commands that draw, or start processes of their own."""
     names = [name for name, one in SCENARIOS.items() if not one.weight]
-    for number, chance in tries:
-        yield _check(names[number % len(names)], chance, folder / "kill")
+    return (_check(names[number % len(names)], chance, folder / "kill") for number, chance in tries)
 
 
 def _check(name: str, chance: random.Random, place: Path) -> Finding:
@@ -103,7 +101,7 @@ def judge(  # noqa: PLR0913 - what was disturbed, and how
     name: str, place: Path, done: Done, what: str, *, old: bool, killed: bool = False
 ) -> Finding:
     """Return the finding of a command that was disturbed, after it has run again undisturbed."""
-    word = _judge_end(done, killed=killed)
+    word = judge_end(done, killed=killed)
     word = word or _judge_files(name, place, old=old, done=done.code == 0)
     again = forks().run(order(name, place))
     word, _, why = (word or _judge_again(name, place, again, old=old)).partition(": ")
@@ -111,7 +109,7 @@ def judge(  # noqa: PLR0913 - what was disturbed, and how
     return Finding(word or f"{name} {'done' if done.code == 0 else 'stopped'}", detail)
 
 
-def _judge_end(done: Done, *, killed: bool) -> str:
+def judge_end(done: Done, *, killed: bool = False) -> str:
     """Return the fault in how a command has ended, if any: a word and what it is about."""
     if done.code == -signal.SIGALRM or done.left:
         return "hung"
