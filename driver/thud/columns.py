@@ -36,12 +36,16 @@ ALLOWED = (
 
 
 def _numbers(decimal: str) -> re.Pattern[str]:
-    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits."""
+    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits.
+
+    A comma that ends a number, as in ``0, 1.5``, separates columns: digits follow a decimal comma.
+    """
     mark = re.escape(decimal)
+    fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
     grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
     return re.compile(
-        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:e[-+]?\d+)?"
-        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*(?:{mark}\d*)?)",
+        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:e[-+]?\d+)?"
+        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*{fraction})",
         re.ASCII | re.IGNORECASE,
     )
 
@@ -153,15 +157,17 @@ def find_separator(line: str) -> str | None:
     """Return what separates the columns of a line, None for blanks.
 
     >>> find_separator("0,1 1,5")
+    >>> find_separator("0, 1.5")
+    ','
     >>> find_separator('"0,1","1,5"')
     ','
     """
     bare = QUOTED.sub("0", line)
-    separator = next((one for one in SEPARATORS if one in bare), None)
-    words = re.split("[ \t]+", bare)
-    if separator == "," and len(words) > 1 and all(map(is_number, words)):
-        return "," if any(word.startswith(",") for word in words) else None
-    return separator
+    separator = next((mark for mark in SEPARATORS if mark in bare), None)
+    words = re.split(" +", bare)
+    # A comma beside a blank is no decimal comma.
+    are_numbers = all(is_number(word) and not word.startswith(",") for word in words)
+    return None if separator == "," and len(words) > 1 and are_numbers else separator
 
 
 def split_line(line: str, separator: str | None) -> list[str]:

@@ -133,6 +133,57 @@ def test_decimal_mark_is_that_of_the_whole_table(
 
 
 @pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("separator", [", ", ",  ", " ,", " , ", "; ", " ;", "\t ", " \t", "   "])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_blanks_beside_separators_change_no_number(
+    read: Callable[[Path], np.ndarray], separator: str, decimal: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    quote = '"' if decimal in separator else ""
+    rows = [(3 * i % 5, i / 8 + 2, 7 * i % 4) for i in range(8)]
+    form = separator.join(["{}", f"{quote}{{:.4f}}{quote}", "{}"])
+    lines = [form.format(*row).replace(".", decimal) for row in rows]
+    path.write_text("\n".join(["force, moment, count", *lines]) + "\n")
+    np.testing.assert_array_equal(read(path), rows)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("end", ["", ";", " ;", "\t", " "])
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("7, 0.250", (7, 0.25)),
+        ("7, 12 347.25", (7, 12347.25)),
+        ("1,5;12 347,5", (1.5, 12347.5)),
+    ],
+)
+def test_ends_of_lines_change_no_number(
+    read: Callable[[Path], np.ndarray],
+    line: str,
+    end: str,
+    expected: tuple[float, float],
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "plate.csv"
+    path.write_text(f"{line}{end}\n" * 8)
+    np.testing.assert_array_equal(read(path), [expected] * 8)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [("0 1,5", "2, 1,5"), ("0;1,5", "2,;1,5"), ("0 1", "2, 1.500")],
+)
+def test_comma_that_ends_a_number_is_refused_as_decimal_comma(
+    read: Callable[[Path], np.ndarray], first: str, last: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    path.write_text(f"{first}\n" * 8 + last + "\n")
+    with pytest.raises(thud.InputError, match=naming("plate.csv", "line")):
+        read(path)
+
+
+@pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize(
     ("last", "parts"),
     [

@@ -52,8 +52,11 @@ MOST_COLUMNS = 256
 # Lines that are converted at once.
 BLOCK = 2**14
 SHORTEST = 8
-# What lines have that are split and converted one by one.
-UNUSUAL = re.compile(rf'["#{GROUPING.strip(" ")}]')
+# What lines have that are split and converted one by one, by their decimal mark.
+UNUSUAL = {
+    ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
+    ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
+}
 # Between names and values of a header; lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
 MOST_TITLES = 3
@@ -194,7 +197,7 @@ def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
         counts = {len(line.split()) for line in block}
     else:
         counts = {line.count(separator) + 1 for line in block}
-    if counts != {table.width} or UNUSUAL.search(joined) or (decimal == "," and "." in joined):
+    if counts != {table.width} or UNUSUAL[decimal].search(joined):
         return None
     lines = joined.replace(",", ".").split("\n") if decimal == "," else block
     try:
