@@ -26,9 +26,8 @@ SEPARATORS = ("\t", ";", ",")
 MARKS = {".": "point", ",": "comma"}
 GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
 QUOTED = re.compile(r'"[^"]*"')
-# Maximum length of a line, and characters that are read at once.
+# Maximum length of a line.
 LONGEST = 2**16
-PIECE = 2**20
 ALLOWED = (
     "columns of time, s, and force, N, separated by commas, semicolons, tabs or "
     "blanks (decimal commas with semicolons, tabs and blanks, or in quotes)"
@@ -139,13 +138,20 @@ def read_titled(
 
 
 def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
-    """Yield the lines of a text without their ends; raise InputError where one is too long."""
-    while piece := text.read(PIECE):
-        lines = (piece + text.readline(LONGEST + 1)).removesuffix("\n").split("\n")
-        if max(map(len, lines)) > LONGEST or "\0" in piece:
-            what = "holds zero bytes" if "\0" in piece else f"is longer than {LONGEST} characters"
-            refuse(f"{name}: a line {what}", allowed)
-        yield from lines
+    """Yield the lines of a text without their ends.
+
+    Raises
+    ------
+    InputError
+        Names the line that is too long or holds zero bytes.
+    """
+    for number, ended in enumerate(iter(lambda: text.readline(LONGEST + 1), ""), start=1):
+        line = ended.removesuffix("\n")
+        if "\0" in line:
+            refuse(f"{name}: line {number} holds zero bytes", allowed)
+        if len(line) > LONGEST:
+            refuse(f"{name}: line {number} is longer than {LONGEST} characters", allowed)
+        yield line
 
 
 def strip_comment(line: str) -> str:

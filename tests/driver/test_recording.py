@@ -220,8 +220,8 @@ def test_numbers_that_may_be_two_are_refused(
         ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
         ("0,001,5,2\n0,002,5\n", naming("line 2", 3, 4)),
         ("1,0\n2,\n", naming("line 2", "''")),
-        ("0,1\n1,2\0\n", naming("zero")),
-        ("0,1\n" + "1" * 70_000 + ",2\n", naming("65536 characters")),
+        ("0,1\n1,2\0\n", naming("line 2", "zero")),
+        ("0,1\n" + "1" * 70_000 + ",2\n", naming("line 2", "65536 characters")),
         ("0,1\n1,2\n", naming("2 rows", 8)),
         ("".join(f"{i},1,2\n" for i in range(9)), naming("9 rows", 3)),
         ("".join(f"{i},nan\n" for i in range(9)), naming("finite")),
@@ -238,6 +238,20 @@ def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None
         read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
     assert "plate.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_zero_bytes_are_refused_wherever_they_stand(
+    read: Callable[[Path], np.ndarray], tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    lines = ["1;2;3", *["0;1;2#" + "x" * (2**13 - 7)] * 2**7]
+    header = len("fs: 8000\n") if read is read_channels_of else 0
+    at = 2**20 - header  # the first character behind 2**20 of the file
+    text = "\n".join(lines)
+    path.write_text(text[:at] + "\0" + text[at + 1 :])
+    with pytest.raises(thud.InputError, match=naming("plate.csv", "line", "zero")):
+        read(path)
 
 
 def test_missing_record_is_told(tmp_path: Path) -> None:

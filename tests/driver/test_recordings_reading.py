@@ -613,7 +613,7 @@ def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
         ("".join(f"{i},1\n" for i in range(9)), naming("rate", "1 Hz")),
         ("".join(f"{i / 8000},7\n" for i in range(9)), naming("samples", 7)),
         ("F_N\n" + "".join(f"{i}\n" for i in range(9)), naming("sample_rate")),
-        ("x" * 100_000, naming("65536 characters")),
+        ("x" * 100_000, naming("line 1", "65536 characters")),
         ("head\n" * 3000 + "1,2\n", naming("numbers")),
         (",".join("1" * 400) + "\n", naming("400 columns")),
         ("1,2\n\0\n", naming("text")),
