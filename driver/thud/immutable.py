@@ -107,22 +107,22 @@ def _fields(of: object) -> list[object]:
 
 def _equal(one: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
     """Return whether two values are equal, NaN to NaN."""
+    if np.isscalar(one) and np.isscalar(other):
+        return bool(one == other) or bool(one != one and other != other)  # noqa: PLR0124 - NaN
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         has_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
         return np.array_equal(one, other, equal_nan=has_nan)
     if type(one) is not type(other):
-        return not isinstance(one, np.ndarray | tuple | dict) and bool(one == other)
+        return False
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(_equal(one[key], other[key]) for key in one)
     if isinstance(one, tuple):
         return len(one) == len(other) and all(map(_equal, one, other))
-    if hasattr(one, "equals"):
-        return bool(one.equals(other))
-    return bool(one == other) or bool(one != one and other != other)  # noqa: PLR0124 - NaN
+    return bool(one.equals(other) if hasattr(one, "equals") else one == other)
 
 
 def _hashed(value: object) -> object:
     """Return what has the same hash for equal values: the hash of NaN is that of the object."""
     if isinstance(value, tuple):
         return tuple(map(_hashed, value))
-    return "nan" if isinstance(value, float) and value != value else value  # noqa: PLR0124
+    return "nan" if np.isscalar(value) and value != value else value  # noqa: PLR0124

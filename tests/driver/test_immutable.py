@@ -198,6 +198,31 @@ def test_nan_equals_nan() -> None:
     assert many[0] == many[1]
 
 
+@dataclasses.dataclass(frozen=True, eq=False)
+class Holder(immutable.Immutable):
+    """Holds anything."""
+
+    value: Any
+
+
+def test_nan_equals_nan_of_other_types_of_numbers() -> None:
+    kinds = (float, np.float64, np.float32, complex)
+    for one, other in combinations([Holder(kind("nan")) for kind in kinds], 2):
+        assert one == other
+        assert hash(one) == hash(other)
+    assert Holder(np.nan) != Holder(1.0)
+    assert Holder(2) == Holder(np.float64(2))
+    assert Holder((1, np.nan)) == Holder((1.0, np.float32("nan")))
+
+
+def test_values_of_different_kinds_are_not_equal() -> None:
+    values = [1.0, None, "1", np.ones(1), np.ones(2), (1.0,), (1.0, 1.0), {1.0: 1.0}]
+    values += [xr.Dataset({"x": ("y", [1.0])}), thud.Drop(height=1.0)]
+    for one, other in combinations(map(Holder, values), 2):
+        assert (one == other) is False
+        assert (other == one) is False
+
+
 def test_changed_levels_change_no_verdict() -> None:
     recording = recorded(thud.solve(), height=1.0, mass=2.5)
     before = recording.conformity()
