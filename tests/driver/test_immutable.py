@@ -188,6 +188,32 @@ def test_read_only_view_of_a_callers_array_is_copied() -> None:
     assert bands.centre.tolist() == [0.0, 1.0, 2.0]
 
 
+def test_read_only_array_of_a_caller_is_copied() -> None:
+    time = np.arange(3.0)
+    time.setflags(write=False)
+    bands = dataclasses.replace(thud.get_bands(), centre=time)
+    time.setflags(write=True)
+    time += 1
+    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_arrays_of_results_are_copied_once() -> None:
+    many = thud.solve_many({"height": [0.5, 1.0]}, forces=True)
+    assert many.elastic_force.base is many.floor_force.base
+    other = dataclasses.replace(many)
+    assert other.floor_force is many.floor_force
+    assert dataclasses.replace(many, floor_force=many.floor_force[:, 1:]).floor_force.base is (
+        many.floor_force.base
+    )
+
+
+def test_unlocked_array_of_a_result_is_copied() -> None:
+    impact = thud.solve()
+    impact.floor_force.setflags(write=True)
+    other = dataclasses.replace(impact)
+    assert not np.shares_memory(other.floor_force, impact.floor_force)
+
+
 def test_nan_equals_nan() -> None:
     criteria = [thud.judge([39, 31, 23, 17, 12], 0.02, float("nan"), 1, 2.5, 1.0) for _ in range(2)]
     assert criteria[0] == criteria[1]
