@@ -76,6 +76,8 @@ def _attempt_notation(chance: random.Random) -> tuple[str, str]:
     shape = chance.randrange(8, 30), chance.randrange(1 + alike, 5)
     width = chance.choice([0, 0, 16])
     digits = [chance.choice([0, 2, 3, 3, 6]) for _ in range(shape[1])]
+    if mark == decimal:  # without quotes, numbers have decimal points
+        digits[0] = digits[0] or 2
     table = np.empty(shape)
     rows = []
     for values in table:
