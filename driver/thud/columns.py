@@ -26,9 +26,8 @@ SEPARATORS = ("\t", ";", ",")
 MARKS = {".": "point", ",": "comma"}
 GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
 QUOTED = re.compile(r'"[^"]*"')
-# Maximum length of a line, and characters that are read at once.
+# Maximum length of a line.
 LONGEST = 2**16
-PIECE = 2**20
 ALLOWED = (
     "columns of time, s, and force, N, separated by commas, semicolons, tabs or "
     "blanks (decimal commas with semicolons, tabs and blanks, or in quotes)"
@@ -36,12 +35,16 @@ ALLOWED = (
 
 
 def _numbers(decimal: str) -> re.Pattern[str]:
-    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits."""
+    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits.
+
+    A comma that ends a number, as in ``0, 1.5``, separates columns: digits follow a decimal comma.
+    """
     mark = re.escape(decimal)
+    fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
     grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
     return re.compile(
-        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+(?:{mark}\d*)?|{mark}\d+)(?:e[-+]?\d+)?"
-        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*(?:{mark}\d*)?)",
+        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:e[-+]?\d+)?"
+        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*{fraction})",
         re.ASCII | re.IGNORECASE,
     )
 
@@ -49,28 +52,25 @@ def _numbers(decimal: str) -> re.Pattern[str]:
 NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
 
 
-class Layout(NamedTuple):
-    """How a table separates its columns and writes its numbers.
+class DecimalMark(NamedTuple):
+    """The decimal mark of all numbers of a table.
 
     Attributes
     ----------
-    separator : str or None
-        Between the columns; None for blanks.
-    decimal : str
-        Decimal mark of all numbers.
+    mark : str
+        Point or comma.
     line : int
-        Number of the line that shows the decimal mark; 0 where none has to.
+        Number of the line that shows it; 0 where none has to.
     """
 
-    separator: str | None
-    decimal: str = "."
+    mark: str = "."
     line: int = 0
 
     def wrong(self, cell: str) -> str:
         """Return what is wrong with a cell that is not a number."""
         reason = f"{cell[:40]!r} is not a number"
         if is_number(cell) and self.line:
-            reason += f" with the decimal {MARKS[self.decimal]} of line {self.line}"
+            reason += f" with the decimal {MARKS[self.mark]} of line {self.line}"
         return reason
 
 
@@ -87,7 +87,7 @@ def read_titled(
     The titles are the cells of the line above the first number, none where there is no such line.
 
     Commas, semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells
-    may stand in quotes. The decimal mark is that of the whole table, see `find_layout`. Empty
+    may stand in quotes. The decimal mark is that of the whole table, see `find_decimal`. Empty
     lines, comments after ``#`` and lines above the first number are skipped.
 
     Raises
@@ -121,13 +121,13 @@ def read_titled(
     rows = [(number, split_line(line, separator)) for number, line in filled]
     if not rows:
         refuse(f"{path}: cannot be read (no numbers)", allowed)
-    layout = find_layout(rows, separator, str(path))
+    decimal = find_decimal(rows, separator, str(path))
     width = len(rows[0][1])
     table = np.empty((len(rows), width))
     for row, (number, cells) in zip(table, rows, strict=True):
-        values = [to_number(cell, layout.decimal) for cell in cells]
+        values = [to_number(cell, decimal.mark) for cell in cells]
         if None in values:
-            refuse(f"{path}: line {number}: {layout.wrong(cells[values.index(None)])}", allowed)
+            refuse(f"{path}: line {number}: {decimal.wrong(cells[values.index(None)])}", allowed)
         if len(cells) != width:
             refuse(f"{path}: line {number}: {len(cells)} columns, {width} above it", allowed)
         row[:] = values
@@ -135,13 +135,20 @@ def read_titled(
 
 
 def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
-    """Yield the lines of a text without their ends; raise InputError where one is too long."""
-    while piece := text.read(PIECE):
-        lines = (piece + text.readline(LONGEST + 1)).removesuffix("\n").split("\n")
-        if max(map(len, lines)) > LONGEST or "\0" in piece:
-            what = "holds zero bytes" if "\0" in piece else f"is longer than {LONGEST} characters"
-            refuse(f"{name}: a line {what}", allowed)
-        yield from lines
+    """Yield the lines of a text without their ends.
+
+    Raises
+    ------
+    InputError
+        Names the line that is too long or holds zero bytes.
+    """
+    for number, ended in enumerate(iter(lambda: text.readline(LONGEST + 1), ""), start=1):
+        line = ended.removesuffix("\n")
+        if "\0" in line:
+            refuse(f"{name}: line {number} holds zero bytes", allowed)
+        if len(line) > LONGEST:
+            refuse(f"{name}: line {number} is longer than {LONGEST} characters", allowed)
+        yield line
 
 
 def strip_comment(line: str) -> str:
@@ -153,15 +160,17 @@ def find_separator(line: str) -> str | None:
     """Return what separates the columns of a line, None for blanks.
 
     >>> find_separator("0,1 1,5")
+    >>> find_separator("0, 1.5")
+    ','
     >>> find_separator('"0,1","1,5"')
     ','
     """
     bare = QUOTED.sub("0", line)
-    separator = next((one for one in SEPARATORS if one in bare), None)
-    words = re.split("[ \t]+", bare)
-    if separator == "," and len(words) > 1 and all(map(is_number, words)):
-        return "," if any(word.startswith(",") for word in words) else None
-    return separator
+    separator = next((mark for mark in SEPARATORS if mark in bare), None)
+    words = re.split(" +", bare)
+    # A comma beside a blank is no decimal comma.
+    are_numbers = all(is_number(word) and not word.startswith(",") for word in words)
+    return None if separator == "," and len(words) > 1 and are_numbers else separator
 
 
 def split_line(line: str, separator: str | None) -> list[str]:
@@ -197,8 +206,10 @@ def is_number(cell: str) -> bool:
     return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
 
 
-def find_layout(rows: Iterable[tuple[int, list[str]]], separator: str | None, name: str) -> Layout:
-    """Return the layout of a table from the numbers and cells of its lines.
+def find_decimal(
+    rows: Iterable[tuple[int, list[str]]], separator: str | None, name: str
+) -> DecimalMark:
+    """Return the decimal mark of a table from the numbers and cells of its lines.
 
     The first number that can be read with one of the decimal marks only decides for all: ``0,5``,
     ``1.234,5`` and ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
@@ -215,7 +226,7 @@ def find_layout(rows: Iterable[tuple[int, list[str]]], separator: str | None, na
                 continue
             marks = [mark for mark, pattern in NUMBERS.items() if pattern.fullmatch(cell)]
             if len(marks) == 1:
-                return Layout(separator, marks[0], line)
+                return DecimalMark(marks[0], line)
             # Where commas separate columns, numbers without quotes have decimal points.
             if len(marks) > 1 and doubtful is None and not (separator == "," and "." in cell):
                 doubtful = line, cell
@@ -227,4 +238,4 @@ def find_layout(rows: Iterable[tuple[int, list[str]]], separator: str | None, na
             f"{name}: line {line}: {cell!r} may be {both}, and no number of the table decides",
             f"tables with a number that shows the decimal mark, such as {cell}0 for {own:.15g}",
         )
-    return Layout(separator)
+    return DecimalMark()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, TypeVar
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -15,6 +16,9 @@ if TYPE_CHECKING:
 
 
 Array = TypeVar("Array", bound="NDArray[Any]")
+
+# Arrays that were frozen here, by their identity: the read-only arrays of others may change.
+_FROZEN: WeakValueDictionary[int, NDArray[Any]] = WeakValueDictionary()
 
 
 class Immutable:
@@ -60,23 +64,22 @@ class Plain(Immutable):
 
 
 def freeze(array: Array) -> Array:
-    """Return an array that was made read-only, with the arrays that it is a view of."""
+    """Return an own array that was made read-only, with the arrays that it is a view of.
+
+    Objects keep it, and views of it, without a copy.
+    """
     part: object = array
     while isinstance(part, np.ndarray):
         part.setflags(write=False)
+        _FROZEN[id(part)] = part
         part = part.base
     return array
 
 
 def _is_frozen(array: NDArray[Any]) -> bool:
-    """Return whether an array and those that it is a view of are read-only."""
-    part: object = array
-    while isinstance(part, np.ndarray):
-        if part.flags.writeable:
-            return False
-        part = part.base
-    # What has another owner, such as a file in memory, may change.
-    return part is None
+    """Return whether an array, or the one that it is a view of, was frozen here."""
+    owner = array if array.base is None else array.base
+    return _FROZEN.get(id(owner)) is owner and not (array.flags.writeable or owner.flags.writeable)
 
 
 def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
@@ -107,22 +110,22 @@ def _fields(of: object) -> list[object]:
 
 def _equal(one: Any, other: Any) -> bool:  # noqa: ANN401 - values of any kind
     """Return whether two values are equal, NaN to NaN."""
+    if np.isscalar(one) and np.isscalar(other):
+        return bool(one == other) or bool(one != one and other != other)  # noqa: PLR0124 - NaN
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         has_nan = one.dtype.kind in "fc" and other.dtype.kind in "fc"
         return np.array_equal(one, other, equal_nan=has_nan)
     if type(one) is not type(other):
-        return not isinstance(one, np.ndarray | tuple | dict) and bool(one == other)
+        return False
     if isinstance(one, dict):
         return one.keys() == other.keys() and all(_equal(one[key], other[key]) for key in one)
     if isinstance(one, tuple):
         return len(one) == len(other) and all(map(_equal, one, other))
-    if hasattr(one, "equals"):
-        return bool(one.equals(other))
-    return bool(one == other) or bool(one != one and other != other)  # noqa: PLR0124 - NaN
+    return bool(one.equals(other) if hasattr(one, "equals") else one == other)
 
 
 def _hashed(value: object) -> object:
     """Return what has the same hash for equal values: the hash of NaN is that of the object."""
     if isinstance(value, tuple):
         return tuple(map(_hashed, value))
-    return "nan" if isinstance(value, float) and value != value else value  # noqa: PLR0124
+    return "nan" if np.isscalar(value) and value != value else value  # noqa: PLR0124

@@ -188,6 +188,32 @@ def test_read_only_view_of_a_callers_array_is_copied() -> None:
     assert bands.centre.tolist() == [0.0, 1.0, 2.0]
 
 
+def test_read_only_array_of_a_caller_is_copied() -> None:
+    time = np.arange(3.0)
+    time.setflags(write=False)
+    bands = dataclasses.replace(thud.get_bands(), centre=time)
+    time.setflags(write=True)
+    time += 1
+    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+
+
+def test_arrays_of_results_are_copied_once() -> None:
+    many = thud.solve_many({"height": [0.5, 1.0]}, forces=True)
+    assert many.elastic_force.base is many.floor_force.base
+    other = dataclasses.replace(many)
+    assert other.floor_force is many.floor_force
+    assert dataclasses.replace(many, floor_force=many.floor_force[:, 1:]).floor_force.base is (
+        many.floor_force.base
+    )
+
+
+def test_unlocked_array_of_a_result_is_copied() -> None:
+    impact = thud.solve()
+    impact.floor_force.setflags(write=True)
+    other = dataclasses.replace(impact)
+    assert not np.shares_memory(other.floor_force, impact.floor_force)
+
+
 def test_nan_equals_nan() -> None:
     criteria = [thud.judge([39, 31, 23, 17, 12], 0.02, float("nan"), 1, 2.5, 1.0) for _ in range(2)]
     assert criteria[0] == criteria[1]
@@ -196,6 +222,31 @@ def test_nan_equals_nan() -> None:
         many = [thud.solve_many({"mass": [2.5, -1.0]}) for _ in range(2)]
     assert np.isnan(many[0].peak_force[1])
     assert many[0] == many[1]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Holder(immutable.Immutable):
+    """Holds anything."""
+
+    value: Any
+
+
+def test_nan_equals_nan_of_other_types_of_numbers() -> None:
+    kinds = (float, np.float64, np.float32, complex)
+    for one, other in combinations([Holder(kind("nan")) for kind in kinds], 2):
+        assert one == other
+        assert hash(one) == hash(other)
+    assert Holder(np.nan) != Holder(1.0)
+    assert Holder(2) == Holder(np.float64(2))
+    assert Holder((1, np.nan)) == Holder((1.0, np.float32("nan")))
+
+
+def test_values_of_different_kinds_are_not_equal() -> None:
+    values = [1.0, None, "1", np.ones(1), np.ones(2), (1.0,), (1.0, 1.0), {1.0: 1.0}]
+    values += [xr.Dataset({"x": ("y", [1.0])}), thud.Drop(height=1.0)]
+    for one, other in combinations(map(Holder, values), 2):
+        assert (one == other) is False
+        assert (other == one) is False
 
 
 def test_changed_levels_change_no_verdict() -> None:

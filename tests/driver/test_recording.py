@@ -133,6 +133,57 @@ def test_decimal_mark_is_that_of_the_whole_table(
 
 
 @pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("separator", [", ", ",  ", " ,", " , ", "; ", " ;", "\t ", " \t", "   "])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_blanks_beside_separators_change_no_number(
+    read: Callable[[Path], np.ndarray], separator: str, decimal: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    quote = '"' if decimal in separator else ""
+    rows = [(3 * i % 5, i / 8 + 2, 7 * i % 4) for i in range(8)]
+    form = separator.join(["{}", f"{quote}{{:.4f}}{quote}", "{}"])
+    lines = [form.format(*row).replace(".", decimal) for row in rows]
+    path.write_text("\n".join(["force, moment, count", *lines]) + "\n")
+    np.testing.assert_array_equal(read(path), rows)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize("end", ["", ";", " ;", "\t", " "])
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("7, 0.250", (7, 0.25)),
+        ("7, 12 347.25", (7, 12347.25)),
+        ("1,5;12 347,5", (1.5, 12347.5)),
+    ],
+)
+def test_ends_of_lines_change_no_number(
+    read: Callable[[Path], np.ndarray],
+    line: str,
+    end: str,
+    expected: tuple[float, float],
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "plate.csv"
+    path.write_text(f"{line}{end}\n" * 8)
+    np.testing.assert_array_equal(read(path), [expected] * 8)
+
+
+@pytest.mark.parametrize("read", READERS)
+@pytest.mark.parametrize(
+    ("first", "last"),
+    [("0 1,5", "2, 1,5"), ("0;1,5", "2,;1,5"), ("0 1", "2, 1.500")],
+)
+def test_comma_that_ends_a_number_is_refused_as_decimal_comma(
+    read: Callable[[Path], np.ndarray], first: str, last: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    path.write_text(f"{first}\n" * 8 + last + "\n")
+    with pytest.raises(thud.InputError, match=naming("plate.csv", "line")):
+        read(path)
+
+
+@pytest.mark.parametrize("read", READERS)
 @pytest.mark.parametrize(
     ("last", "parts"),
     [
@@ -169,8 +220,8 @@ def test_numbers_that_may_be_two_are_refused(
         ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
         ("0,001,5,2\n0,002,5\n", naming("line 2", 3, 4)),
         ("1,0\n2,\n", naming("line 2", "''")),
-        ("0,1\n1,2\0\n", naming("zero")),
-        ("0,1\n" + "1" * 70_000 + ",2\n", naming("65536 characters")),
+        ("0,1\n1,2\0\n", naming("line 2", "zero")),
+        ("0,1\n" + "1" * 70_000 + ",2\n", naming("line 2", "65536 characters")),
         ("0,1\n1,2\n", naming("2 rows", 8)),
         ("".join(f"{i},1,2\n" for i in range(9)), naming("9 rows", 3)),
         ("".join(f"{i},nan\n" for i in range(9)), naming("finite")),
@@ -187,6 +238,20 @@ def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None
         read_record(read_table(tmp_path / "plate.csv"), "plate.csv")
     assert "plate.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("read", READERS)
+def test_zero_bytes_are_refused_wherever_they_stand(
+    read: Callable[[Path], np.ndarray], tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.csv"
+    lines = ["1;2;3", *["0;1;2#" + "x" * (2**13 - 7)] * 2**7]
+    header = len("fs: 8000\n") if read is read_channels_of else 0
+    at = 2**20 - header  # the first character behind 2**20 of the file
+    text = "\n".join(lines)
+    path.write_text(text[:at] + "\0" + text[at + 1 :])
+    with pytest.raises(thud.InputError, match=naming("plate.csv", "line", "zero")):
+        read(path)
 
 
 def test_missing_record_is_told(tmp_path: Path) -> None:

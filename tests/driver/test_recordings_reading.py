@@ -358,6 +358,17 @@ def test_rate_of_header_and_times_must_agree(tmp_path: Path) -> None:
         open_signals(tmp_path / "t.csv")
 
 
+def test_times_without_decimals_and_commas_before_blanks_agree_with_the_header(
+    tmp_path: Path,
+) -> None:
+    pulse = half_sine(4000.0)
+    rows = "".join(f"{250 * i}, {v:.3f}\n" for i, v in enumerate(pulse))
+    (tmp_path / "t.csv").write_text("fs = 4000 Hz\ntime [us], force [N]\n" + rows)
+    (signal,) = open_signals(tmp_path / "t.csv")
+    assert signal.sample_rate == pytest.approx(4000)
+    np.testing.assert_array_equal(signal.samples(0, signal.n_sample), np.round(pulse, 3))
+
+
 def test_rounded_times_are_told(tmp_path: Path) -> None:
     rows = "".join(f"{i / 44100:.6f},{v:g}\n" for i, v in enumerate(half_sine(44100.0)))
     (tmp_path / "t.csv").write_text("time_s,force_N\n" + rows)
@@ -602,7 +613,7 @@ def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
         ("".join(f"{i},1\n" for i in range(9)), naming("rate", "1 Hz")),
         ("".join(f"{i / 8000},7\n" for i in range(9)), naming("samples", 7)),
         ("F_N\n" + "".join(f"{i}\n" for i in range(9)), naming("sample_rate")),
-        ("x" * 100_000, naming("65536 characters")),
+        ("x" * 100_000, naming("line 1", "65536 characters")),
         ("head\n" * 3000 + "1,2\n", naming("numbers")),
         (",".join("1" * 400) + "\n", naming("400 columns")),
         ("1,2\n\0\n", naming("text")),

@@ -65,21 +65,28 @@ def attempt(chance: random.Random) -> tuple[str, str]:
 
 def _attempt_notation(chance: random.Random) -> tuple[str, str]:
     """Return what becomes of numbers in a drawn notation: those that were written, or none."""
-    separator = chance.choice("\t;, ")
+    mark = chance.choice("\t;, ")
+    separator = chance.choice(["", "", " ", "  "]) + mark + chance.choice(["", " ", "  "])
+    end = chance.choice(["", "", " ", ";", " ; ", "\t", separator])
     decimal = chance.choice(".,")
     groups = ["", "", ".,".replace(decimal, ""), "'", "\N{NO-BREAK SPACE}"]
-    group = chance.choice([*groups, " "] if separator in "\t;" else groups)
-    # A column of decimal commas alone looks like two.
-    shape = chance.randrange(8, 30), chance.randrange(1 + (decimal == ","), 5)
+    group = chance.choice([*groups, " "] if mark in "\t;" or separator == ", " else groups)
+    # A column with commas, or with blanks that group digits, alone looks like two.
+    alike = decimal == "," or group == " " or "," in end
+    shape = chance.randrange(8, 30), chance.randrange(1 + alike, 5)
+    width = chance.choice([0, 0, 16])
     digits = [chance.choice([0, 2, 3, 3, 6]) for _ in range(shape[1])]
+    if mark == decimal:  # without quotes, numbers have decimal points
+        digits[0] = digits[0] or 2
     table = np.empty(shape)
     rows = []
     for values in table:
         row = [f"{chance.uniform(-1, 1) * 10 ** chance.uniform(0, 7):,.{n}f}" for n in digits]
         values[:] = [float(cell.replace(",", "")) for cell in row]
         row = [cell.translate({ord(","): group, ord("."): decimal}) for cell in row]
-        row = [f'"{cell}"' if separator in cell or chance.random() < 0.1 else cell for cell in row]
-        rows.append(separator.join(row))
+        row = [f'"{cell}"' if mark in cell or chance.random() < 0.1 else cell for cell in row]
+        row = [cell.rjust(width) for cell in row]
+        rows.append(separator.join(row) + end)
     path = Path("notation.csv")
     path.write_text("\n".join(rows) + "\n")
     recording = Path("recording.csv")

@@ -12,8 +12,8 @@ import numpy as np
 from thud.checks import refuse
 from thud.columns import (
     GROUPING,
-    Layout,
-    find_layout,
+    DecimalMark,
+    find_decimal,
     find_separator,
     is_number,
     read_lines,
@@ -52,8 +52,11 @@ MOST_COLUMNS = 256
 # Lines that are converted at once.
 BLOCK = 2**14
 SHORTEST = 8
-# What lines have that are split and converted one by one.
-UNUSUAL = re.compile(rf'["#{GROUPING.strip(" ")}]')
+# What lines have that are split and converted one by one, by their decimal mark.
+UNUSUAL = {
+    ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
+    ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
+}
 # Between names and values of a header; lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
 MOST_TITLES = 3
@@ -70,7 +73,8 @@ class _Table:
     """Lines of a file, sorted into header, titles and numbers."""
 
     name: str
-    layout: Layout = field(default_factory=lambda: Layout(None))
+    separator: str | None = None
+    decimal: DecimalMark = field(default_factory=DecimalMark)
     header: list[tuple[str, object]] = field(default_factory=list)
     titles: list[list[str]] = field(default_factory=list)
     first: int = 1
@@ -79,11 +83,11 @@ class _Table:
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line of numbers."""
-        return split_line(strip_comment(line), self.layout.separator)
+        return split_line(strip_comment(line), self.separator)
 
     def titles_of(self, line: str) -> list[str]:
         """Return the cells of a line of words."""
-        return [line.strip()] if self.width == 1 else split_line(line, self.layout.separator)
+        return [line.strip()] if self.width == 1 else split_line(line, self.separator)
 
 
 def read_channels(path: Path) -> list[Channel]:
@@ -97,7 +101,8 @@ def read_channels(path: Path) -> list[Channel]:
         table = _Table(shown_path(path))
         _read_header(read_lines(text, table.name, ALLOWED), table)
         text.seek(0)
-        _find_decimal(_lines_of_numbers(text, table), table)
+        rows = _rows(_lines_of_numbers(text, table), table)
+        table.decimal = find_decimal(rows, table.separator, table.name)
         text.seek(0)
         values = _read_numbers(_lines_of_numbers(text, table), table)
     return _channels(table, values)
@@ -108,18 +113,12 @@ def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
     return itertools.islice(read_lines(text, table.name, ALLOWED), table.first - 1, None)
 
 
-def _find_decimal(lines: Iterator[str], table: _Table) -> None:
-    """Find the decimal mark of the columns of numbers."""
-    table.layout = find_layout(
-        (
-            (number, [cells[i] for i in table.used if i < len(cells)])
-            for number, line in enumerate(lines, table.first)
-            if "." in line or "," in line
-            for cells in (table.cells(line),)
-        ),
-        table.layout.separator,
-        table.name,
-    )
+def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str]]]:
+    """Yield number and numeric cells of the lines that may show the decimal mark."""
+    for number, line in enumerate(lines, table.first):
+        if "." in line or "," in line:
+            cells = table.cells(line)
+            yield number, [cells[i] for i in table.used if i < len(cells)]
 
 
 def _read_header(lines: Iterator[str], table: _Table) -> None:
@@ -127,15 +126,15 @@ def _read_header(lines: Iterator[str], table: _Table) -> None:
     above: list[str] = []
     for line in itertools.islice(lines, LONGEST_HEADER):
         text = strip_comment(line)
-        table.layout = Layout(find_separator(text))
+        table.separator = find_separator(text)
         cells = table.cells(line)
         used = [i for i, cell in enumerate(cells) if is_number(cell)]
         # Beside the numbers a table may have words, such as a state.
         if used[:1] == [0] and len(used) > len(cells) / 2:
             table.first, table.width, table.used = len(above) + 1, len(cells), used
             _sort_header(above, table)
-            if table.layout.separator == "," and _is_one_column(text, table):
-                table.layout, table.width, table.used = Layout(";"), 1, [0]
+            if table.separator == "," and _is_one_column(text, table):
+                table.separator, table.width, table.used = ";", 1, [0]
                 _sort_header(above, table)
             return
         above.append(line)
@@ -188,13 +187,13 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
 
 def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
     """Return the numbers of some lines; None where one is empty, unusual or wrong."""
-    separator, decimal, _ = table.layout
+    separator, decimal = table.separator, table.decimal.mark
     joined = "\n".join(block)
     if separator is None:
         counts = {len(line.split()) for line in block}
     else:
         counts = {line.count(separator) + 1 for line in block}
-    if counts != {table.width} or UNUSUAL.search(joined) or (decimal == "," and "." in joined):
+    if counts != {table.width} or UNUSUAL[decimal].search(joined):
         return None
     lines = joined.replace(",", ".").split("\n") if decimal == "," else block
     try:
@@ -214,9 +213,9 @@ def _convert_each(block: list[str], first: int, table: _Table) -> NDArray[np.flo
             continue
         cells = table.cells(line)
         used = [cells[i] for i in table.used if i < len(cells)]
-        row = [to_number(cell, table.layout.decimal) for cell in used]
+        row = [to_number(cell, table.decimal.mark) for cell in used]
         if None in row:
-            wrong = table.layout.wrong(shown_text(used[row.index(None)]))
+            wrong = table.decimal.wrong(shown_text(used[row.index(None)]))
             refuse(f"{table.name}: line {number}: {wrong}", ALLOWED)
         if len(cells) != table.width:
             what = f"{len(cells)} columns, {table.width} above it"
@@ -233,7 +232,7 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
         what = f"{rows} rows of {len(numeric)} numbers"
         refuse(f"{table.name}: {what}", f"{SHORTEST} rows or more of numbers")
     titles, units = _titles(table, table.width)
-    rate = find_rate(table.header, table.layout.decimal)
+    rate = find_rate(table.header, table.decimal.mark)
     steps: tuple[str, ...] = ()
     time = next((i for i in numeric if is_time(titles[i]) or _is_time_unit(units[i])), None)
     if time is None and len(numeric) > 1 and (rate is None or _are_times(values[numeric[0]])):
