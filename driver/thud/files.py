@@ -143,7 +143,8 @@ class Results:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):
-            if marker is not None and marker not in _markers(self.folder):
+            held = {content_of(self.folder / name) for name in ("effective.nml", "sets.nml")}
+            if marker not in {None, *held}:
                 refuse(f"{self.folder} now holds results of another input", "run the case again")
             listed = self._listed()
             new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
@@ -198,7 +199,7 @@ class Entry(NamedTuple):
 def refuse_foreign(path: Path) -> NoReturn:
     """Raise InputError of what thud has not written."""
     if is_directory(path):
-        refuse(f"{path} is a directory of something else", "another directory for the results")
+        refuse(f"{path} is a directory of something else", "another directory")
     refuse(
         f"{path} is in the way: thud has not written it, or it has changed since",
         "another directory, or --replace (replace=True) to replace it",
@@ -306,13 +307,6 @@ def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
     """Whether thud has written a file."""
     content = content_of(path) if path.name in listed else None
     return content is not None and checksum(content) in listed[path.name].checksums
-
-
-def _markers(folder: Path) -> Iterator[bytes]:
-    """Yield the contents of the files that identify the results of a directory."""
-    for name in ("effective.nml", "sets.nml"):
-        if (content := content_of(folder / name)) is not None:
-            yield content
 
 
 @contextmanager
