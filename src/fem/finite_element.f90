@@ -79,7 +79,7 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       !> The time, s.
       real(wp) :: cost
-      real(wp) :: speed, interval, time, n_step, element_cost
+      real(wp) :: speed, interval, time, n_step, element_cost, damping
 
       ! Stable steps follow pressure waves through the elements, the smallest of which lie at the inner surface.
       speed = sqrt((options%material%bulk_ratio + 4/3.0_wp)*ball%youngs_modulus/3/get_density(ball))
@@ -93,6 +93,12 @@ contains
          end if
          element_cost = element_cost*mesh%radial_elements*mesh%polar_elements
       end associate
+      if (options%material%viscosity == 'kelvin_voigt') then
+         ! The stable step with the damping ratio of the fastest mode: dt**2 K + 2 dt C <= 4 M.
+         damping = 4*options%material%loss_factor/(2*pi*options%material%loss_frequency)/(3*options%material%bulk_ratio + 4) &
+            *options%step_safety/interval
+         interval = interval*(hypot(1.0_wp, damping) - damping)
+      end if
       time = typical_contact + options%flight_before + options%flight_after
       if (options%bounces > 1) time = sampling%duration
       n_step = max(get_step_count(sampling, time), min(time, sampling%duration)/interval)

@@ -104,7 +104,7 @@ def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
     [
         (["missing.wav"], naming("missing.wav")),
         (["kilo.csv"], naming("kilo.csv", "kN")),
-        (["drop.wav", "--height", "-1"], naming("height", -1)),
+        (["drop.wav", "--height", "-1"], naming("height", -1.0)),
         (["drop.wav", "--config", "no.toml"], naming("no.toml")),
         (["drop.wav", "--channel", "9"], naming("drop.wav", "channel", 9)),
     ],

@@ -210,7 +210,7 @@ def test_modulus_of_a_case_changes_with_its_coefficient() -> None:
         ({"reference": 20, "c1": 8}, naming("c2")),
         ({"reference": 20, "c1": 8, "c2": -1}, naming("c2", -1)),
         ({"coefficient": 1}, naming("reference")),
-        ({"reference": 20}, naming("coefficient")), (None, naming("[temperature]", "[parameters]")),
+        ({"reference": 20}, naming("coefficient")), (None, naming("[temperature]", "parameter")),
     ],
 )  # fmt: skip
 def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words: str) -> None:
@@ -223,7 +223,7 @@ def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words:
     found = read_temperature(given, case, varying)
     assert found is not None
     assert found.given == given
-    with pytest.raises(thud.InputError, match=naming("[temperature]", "[parameters]")):
+    with pytest.raises(thud.InputError, match=naming("[temperature]", "parameter")):
         read_temperature(given, case, ())
     assert read_temperature(None, case, ()) is None
 

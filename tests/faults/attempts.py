@@ -174,7 +174,9 @@ def _handles(*, files_only: bool) -> set[str]:
 
 
 def _memory() -> int:
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+    # Unlike `getrusage`, this does not begin with the peak of the parent process.
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) * 1024
 
 
 def _work(name: str, part: Part, folder: Path) -> None:

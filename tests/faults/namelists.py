@@ -120,7 +120,7 @@ def _is_small(effective: bytes) -> bool:
 def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> tuple[str, str]:
     """Run a case as the executable does, and look at all that it leaves."""
     out = Path("o")
-    found = call(api.run, str(path), str(out), 0)
+    found = call(api.run, str(path), str(out), 0, 0)
     if wrong := _no_numbers("", found):
         return "NaN", wrong
     files = {one.name: one.read_bytes() for one in out.iterdir() if one.is_file()}
@@ -147,7 +147,7 @@ def _differing(files: dict[str, bytes]) -> list[str]:
     Path("o/effective.nml").rename("effective.nml")
     shutil.rmtree("o")
     try:
-        call(api.run, "effective.nml", "o", 0)
+        call(api.run, "effective.nml", "o", 0, 0)
     finally:
         Path("effective.nml").unlink()
     again = {one.name: one.read_bytes() for one in Path("o").iterdir() if one.is_file()}

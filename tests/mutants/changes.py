@@ -218,9 +218,5 @@ def _term(code: str, begin: int) -> int:
         depth += (one in "([") - (one in ")]")
         operator = one in "+-" and code[begin:place].strip() and code[place - 1] not in "ed*/("
         if depth < 0 or (depth == 0 and (one in ",;\n<>=&" or operator)):
-            return (
-                0
-                if one == "&"
-                else place - len(code[begin:place]) + len(code[begin:place].rstrip())
-            )
+            return 0 if one == "&" else begin + len(code[begin:place].rstrip())
     return 0

@@ -18,7 +18,7 @@ from coverage import CoverageData
 from tree import ROOT, in_parallel
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator, Mapping
 
     from changes import Change
     from tree import Tree
@@ -54,7 +54,9 @@ class Covering:
     known: of the core, and of what fixtures run.
     """
 
-    def __init__(self, lines: dict[str, dict[str, list[str]]], seconds: dict[str, float]) -> None:
+    def __init__(
+        self, lines: Mapping[str, Mapping[int, set[str]]], seconds: Mapping[str, float]
+    ) -> None:
         self._lines = lines
         self._seconds = seconds
 
@@ -65,9 +67,7 @@ class Covering:
         that imports it.
         """
         lines = self._lines.get(change.path, {})
-        found = {
-            test for n in range(change.first, change.last + 1) for test in lines.get(str(n), ())
-        }
+        found = {test for n in range(change.first, change.last + 1) for test in lines.get(n, ())}
         if not found:
             files = [change.path, *_users(change.path)]
             found = {
@@ -85,7 +85,9 @@ class Covering:
 
 def _users(path: str) -> list[str]:
     """Return the files that import a source."""
-    module = f"thud_{Path(path).stem}" if path.startswith("src") else path[7:-3].replace("/", ".")
+    module = f"thud_{Path(path).stem}"
+    if path.startswith("driver/"):
+        module = path.removeprefix("driver/").removesuffix(".py").replace("/", ".")
     imports = re.compile(rf"^\s*(?:use|from|import) +{re.escape(module)}\b", re.MULTILINE)
     sources = {path for pattern in STATE[:3] for path in ROOT.glob(pattern)}
     return [str(one.relative_to(ROOT)) for one in sources if imports.search(one.read_text())]
@@ -110,48 +112,49 @@ def _bodies(path: Path) -> set[int]:
     }
 
 
-def read_covering(folder: Path, trees: list[Tree]) -> Covering:
-    """Return the record of a state of the project; measure it where there is none."""
+def read_covering(folder: Path, new_trees: Callable[[], list[Tree]]) -> Covering:
+    """Return the record of the present state of the project.
+
+    What is missing of it is measured: each suite and each file of tests by itself, in trees whose
+    build counts lines.
+    """
     digest = sha256()
     for path in sorted(path for pattern in STATE for path in ROOT.glob(pattern)):
         digest.update(path.read_bytes())
-    cache = folder / f"covering-{digest.hexdigest()[:16]}.json"
-    if not cache.exists():
-        cache.write_text(json.dumps(_measure(folder, trees)))
-    return Covering(*json.loads(cache.read_text()))
-
-
-def _measure(
-    folder: Path, trees: list[Tree]
-) -> tuple[dict[str, dict[str, list[str]]], dict[str, float]]:
-    """Run each suite and each file of tests by itself."""
-    files = [
-        path
-        for room in ("driver", "validation")
-        for path in sorted((ROOT / "tests" / room).glob("test_*.py"))
-    ]
-    jobs = [*(path for path in files if path.stem not in LEFT_OUT), *trees[0].suites()]
-    lines: dict[str, dict[str, set[str]]] = defaultdict(lambda: defaultdict(set))
-    seconds: dict[str, float] = {}
+    records = folder / f"covering-{digest.hexdigest()[:16]}"
+    records.mkdir(parents=True, exist_ok=True)
+    suites = [path.stem for path in (ROOT / "tests/fortran").glob("test_*.pf")]
+    files = [path for part in STATE[-2:] for path in ROOT.glob(part) if path.match("test_*.py")]
+    jobs = [*(path for path in files if path.stem not in LEFT_OUT), *suites]
+    missing = [job for job in jobs if not _record(records, job).exists()]
 
     def measure(tree: Tree, job: str | Path) -> None:
-        room = folder / "data" / (job if isinstance(job, str) else job.stem)
-        shutil.rmtree(room, ignore_errors=True)
-        room.mkdir(parents=True)
+        place = folder / "data" / _record(records, job).stem
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir(parents=True)
         if isinstance(job, str):
-            tree.run_suite(job, GCOV_PREFIX=str(room))
-            reached, took = [(*place, job) for place in _core_lines(tree, room)], {job: 0.0}
+            tree.run_suite(job, GCOV_PREFIX=str(place))
+            measured = [(*line, job) for line in _core_lines(tree, place)], {job: 0.0}
         else:
-            reached, took = _python_file(tree, job, room)
-        shutil.rmtree(room)
-        for path, number, test in reached:
-            lines[path][str(number)].add(test)
-        seconds.update(took)
+            measured = _python_file(tree, job, place)
+        shutil.rmtree(place)
+        _record(records, job).write_text(json.dumps(measured))
 
-    in_parallel(measure, trees, jobs, "files of tests")
-    return {
-        path: {n: sorted(tests) for n, tests in found.items()} for path, found in lines.items()
-    }, seconds
+    if missing:
+        in_parallel(measure, new_trees(), missing, "files of tests")
+    lines: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+    seconds: dict[str, float] = {}
+    for job in jobs:
+        reached, took = json.loads(_record(records, job).read_text())
+        seconds |= took
+        for path, number, test in reached:
+            lines[path][number].add(test)
+    return Covering(lines, seconds)
+
+
+def _record(records: Path, job: str | Path) -> Path:
+    """Return the file of what was measured of a suite, or of a file of tests."""
+    return records / (f"{job}.json" if isinstance(job, str) else f"{job.stem}-python.json")
 
 
 def _python_file(

@@ -15,6 +15,8 @@ import os
 import random
 import sys
 import threading
+from functools import partial
+from pathlib import Path
 from subprocess import TimeoutExpired
 from typing import TYPE_CHECKING
 
@@ -32,13 +34,13 @@ SOURCES = ("src/**/*.f90", "src/**/*.c", "driver/thud/**/*.py", "driver/thud_dri
 GENERATED = {"_schema.py"}
 
 
-def draw(paths: list[str], seed: int) -> Iterator[Change]:
+def draw(paths: list[Path], seed: int) -> Iterator[Change]:
     """Yield changes in random order: each line that has some is as likely as another."""
     chance = random.Random(seed)  # noqa: S311
     lines: dict[tuple[str, int], list[Change]] = {}
     for path in sorted({path for pattern in SOURCES for path in ROOT.glob(pattern)}):
         name = str(path.relative_to(ROOT))
-        if path.name in GENERATED or not any(name.startswith(one) for one in paths):
+        if path.name in GENERATED or not any(path.is_relative_to(one) for one in paths):
             continue
         text = path.read_text()
         for change in changes(path, name):
@@ -85,13 +87,22 @@ def difference(change: Change) -> str:
     return "\n".join([*lines][2:])
 
 
+def _source(text: str) -> Path:
+    """Return the path of sources, or raise ArgumentTypeError."""
+    path = Path(text).resolve()
+    if not path.exists() or not path.is_relative_to(ROOT):
+        message = f"{text} is no folder or file of this project"
+        raise argparse.ArgumentTypeError(message)
+    return path
+
+
 def main() -> int:
     """Draw changes, run the tests, list what was not noticed; return the exit code."""
     parser = argparse.ArgumentParser(
         description=__doc__.partition("\n")[0], prog="./bootstrap mutants"
     )
     parser.add_argument(
-        "paths", nargs="*", default=["src", "driver"], metavar="PATH", help="folders or files"
+        "paths", nargs="*", type=_source, metavar="PATH", help="folders or files (default: all)"
     )
     parser.add_argument(
         "--count", type=int, default=100, metavar="N", help="changes (default: 100)"
@@ -106,12 +117,15 @@ def main() -> int:
     )
     options = parser.parse_args()
     width = len(os.sched_getaffinity(0))
-    trees = [Tree(FOLDER / f"coverage-{n}", "-O1 --coverage") for n in range(width)]
-    covering = read_covering(FOLDER, trees)
-    trees = [Tree(FOLDER / f"tree-{n}", "-O1") for n in range(width)]
+
+    def new_trees(name: str, flags: str) -> list[Tree]:
+        return [Tree(FOLDER / f"{name}-{n}", flags) for n in range(width)]
+
+    covering = read_covering(FOLDER, partial(new_trees, "coverage", "-O1 --coverage"))
+    trees = new_trees("tree", "-O1")
     record = FOLDER / f"seed-{options.seed}.json"
     known: dict[str, str] = json.loads(record.read_text()) if record.exists() else {}
-    drawn = draw(options.paths, options.seed)
+    drawn = draw(options.paths or [ROOT / "src", ROOT / "driver"], options.seed)
     counted: list[tuple[Change, str]] = []
     lock = threading.Lock()
 
@@ -119,8 +133,10 @@ def main() -> int:
         key = f"{change}\n{difference(change)}"
         found = known.get(key) or notice(tree, change, covering, options.limit)
         with lock:
-            known[key] = found
-            record.write_text(json.dumps(known, indent=1))
+            # Whether what has passed is noticed by now is found anew.
+            if not found.startswith("passes"):
+                known[key] = found
+                record.write_text(json.dumps(known, indent=1))
             if found != "not built":
                 counted.append((change, found))
                 if found.startswith("passes"):

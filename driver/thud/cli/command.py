@@ -95,9 +95,9 @@ def channel_of(text: str | None) -> int | str | None:
 
 
 def tell(remarks: Iterable[object]) -> None:
-    """Print remarks."""
+    """Print remarks; a progress bar stays below them."""
     for remark in remarks:
-        print(f"thud-driver: {remark}", file=sys.stderr)
+        tqdm.write(f"thud-driver: {remark}", file=sys.stderr)
 
 
 @contextmanager
@@ -108,8 +108,7 @@ def shown_at_once() -> Iterator[None]:
 
     def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
         if issubclass(kind, kinds):
-            # A progress bar stays below it.
-            tqdm.write(f"thud-driver: {warning}", file=sys.stderr)
+            tell([warning])
         else:
             usual(warning, kind, *place)
 

@@ -29,5 +29,6 @@ def run_history(options: argparse.Namespace) -> int:
         print(format_rows(history.table()))
         for remark in history.remarks():
             print(remark)
-        print(*(f"Chart: {path}" for path in paths[:1]))
+        if paths:
+            print(f"Chart: {paths[0]}")
     return 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +17,6 @@ from thud.cli.command import (
     results_of,
     tell,
 )
-from thud.errors import ReportWarning
 from thud.levels import SOURCES
 from thud.tables import format_rows
 
@@ -62,9 +60,7 @@ def measure(options: argparse.Namespace) -> int:
             keep=kept,
         )
         verdict = recording.conformity()
-        with warnings.catch_warnings(record=True) as found:
-            warnings.simplefilter("always", ReportWarning)
-            results.save(recording, files, figures=figures)
+        results.save(recording, files, figures=figures)
     if not options.quiet:
         rows = results.drop_table(recording)
         print(format_rows(rows[: SHOWN + 1]))
@@ -77,7 +73,7 @@ def measure(options: argparse.Namespace) -> int:
             print(f"  {step}")
         print(f"  {results.verdict_sentence(recording)}")
     told = results.sentences(recording, "remarks")
-    tell((*recording.doubts, *recording.outliers, *told, *(w.message for w in found)))
+    tell((*recording.doubts, *recording.outliers, *told))
     if not options.quiet:
         print(f"Results: {folder}")
     return NOT_CONFORMING if options.check and not verdict else 0

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, tell
 from thud.display import left_out
 from thud.errors import NumericalError, ThudError
 from thud.studies.kinds import KINDS, get_kind
@@ -79,8 +79,7 @@ def run_study(options: argparse.Namespace) -> int:
             raise type(error)(message) from error
         if not options.quiet:
             tqdm.write(kind.table(result, study))
-        for remark in kind.remarks(result):
-            _tell(options.study, remark)
+        tell(f"{options.study}: {remark}" for remark in kind.remarks(result))
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):
@@ -91,8 +90,3 @@ def run_study(options: argparse.Namespace) -> int:
     if not options.quiet:
         tqdm.write(f"Results: {folder}")
     return 0 if kind.succeeded(result) else NumericalError.exit_code
-
-
-def _tell(study: str, remark: object) -> None:
-    """Print a remark; a progress bar stays below it."""
-    tqdm.write(f"thud-driver: {study}: {remark}", file=sys.stderr)
