@@ -6,6 +6,7 @@ import errno
 import fcntl
 import os
 import platform
+import re
 import secrets
 import shutil
 import signal
@@ -29,44 +30,15 @@ if TYPE_CHECKING:
 MANIFEST = ".thud"
 HEAD = "# files that thud has written, with checksums (CRC-32)"
 # Temporary name of a file in a result directory.
-PART = ".thud.new"
+PART = f"{MANIFEST}.new"
 # Age at which a temporary file of another host is no longer being written, s.
 _MAX_AGE = 86400.0
-
-
-def lock(folder: Path, result: Path) -> int:
-    """Lock a directory until the returned descriptor is closed.
-
-    Raises
-    ------
-    InputError
-        Where another run holds the lock; names the result that it will write.
-    """
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        if not _flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB):
-            _warn_unlocked(folder)
-    except BlockingIOError as error:
-        os.close(descriptor)
-        message = f"{result} is being computed; allowed: wait, or another directory"
-        raise InputError(message) from error
-    return descriptor
-
-
-def _flock(descriptor: int, kind: int) -> bool:
-    """Lock an open file; return False where the file system has no locks."""
-    try:
-        fcntl.flock(descriptor, kind)
-    except BlockingIOError:
-        raise
-    except OSError:
-        return False
-    return True
-
-
-def _warn_unlocked(folder: Path) -> None:
-    message = f"{folder}: the file system has no locks; let only one run at a time write there"
-    warnings.warn(message, LockWarning, stacklevel=4)
+# Errors of a file system that has no locks.
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EINVAL)
+# Errors of a path with nothing there, or no regular file.
+_NO_FILE = (
+    errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR
+)  # fmt: skip
 
 
 @contextmanager
@@ -132,9 +104,19 @@ class Results:
     replace: bool = False
     is_locked: bool = False
 
-    def require(self, names: Iterable[str]) -> None:
-        """Raise InputError where a file is in the way that must not be replaced."""
-        self._require(dict.fromkeys(names), self._listed())
+    def require(self, names: Iterable[str], listed: Mapping[str, Entry] | None = None) -> None:
+        """Raise InputError where a file is in the way that must not be replaced.
+
+        Files that are `listed`, by default in the manifest, may be.
+        """
+        listed = self._listed() if listed is None else listed
+        for name in names:
+            path = self.folder / name
+            if not os.path.lexists(path):
+                continue
+            self.require_no_input(path)
+            if is_directory(path) or not (self.replace or _is_listed(path, listed)):
+                refuse_foreign(path)
 
     def write(
         self, contents: Mapping[str, bytes], stale: Iterable[str] = (), marker: bytes | None = None
@@ -161,10 +143,17 @@ class Results:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         with nullcontext() if self.is_locked else locked(self.folder):
-            if marker is not None and marker not in _markers(self.folder):
+            held = {content_of(self.folder / name) for name in ("effective.nml", "sets.nml")}
+            if marker not in {None, *held}:
                 refuse(f"{self.folder} now holds results of another input", "run the case again")
             listed = self._listed()
-            self._require(contents, listed)
+            new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
+            # Whatever of both contents a killed writer leaves is listed.
+            both = listed | {
+                n: Entry((*listed.get(n, Entry(())).checksums, *e.checksums), e.command)
+                for n, e in new.items()
+            }
+            self.require(contents, both)
             gone = [
                 n
                 for n in {*stale} - {*contents}
@@ -172,20 +161,14 @@ class Results:
             ]
             if not contents and not gone:
                 return []
-            new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
-            # Whatever of both contents a killed writer leaves is listed.
-            both = {
-                n: Entry((*listed[n].checksums, *e.checksums), e.command) if n in listed else e
-                for n, e in new.items()
-            }
-            self._put({MANIFEST: _manifest(listed | both), **contents})
+            self._put({MANIFEST: _manifest(both), **contents})
             for name in gone:
-                (self.folder / name).unlink()
+                (self.folder / name).unlink(missing_ok=True)
             after = {name: e for name, e in (listed | new).items() if name not in gone}
             if after:
                 self._put({MANIFEST: _manifest(after)})
             else:
-                (self.folder / MANIFEST).unlink()
+                (self.folder / MANIFEST).unlink(missing_ok=True)
         return [self.folder / name for name in contents]
 
     def _put(self, contents: Mapping[str, bytes]) -> None:
@@ -196,22 +179,9 @@ class Results:
         try:
             return read_manifest(self.folder)
         except InputError:
-            if not self.replace or (self.folder / MANIFEST).is_dir():
+            if not self.replace or is_directory(self.folder / MANIFEST):
                 raise
             return {}
-
-    def _require(self, contents: Mapping[str, bytes | None], listed: Mapping[str, Entry]) -> None:
-        """Raise InputError where a file is in the way of one of a name and a content."""
-        for name, content in contents.items():
-            path = self.folder / name
-            if not os.path.lexists(path):
-                continue
-            self.require_no_input(path)
-            if path.is_dir() and not path.is_symlink():
-                refuse(f"{path} is a directory", "another directory for the results")
-            same = content is not None and content_of(path) == content
-            if not (self.replace or same or _is_listed(path, listed)):
-                refuse_foreign(path)
 
     def require_no_input(self, path: Path) -> None:
         """Raise InputError where a path is that of an input."""
@@ -227,7 +197,9 @@ class Entry(NamedTuple):
 
 
 def refuse_foreign(path: Path) -> NoReturn:
-    """Raise InputError of a file that thud has not written."""
+    """Raise InputError of what thud has not written."""
+    if is_directory(path):
+        refuse(f"{path} is a directory of something else", "another directory")
     refuse(
         f"{path} is in the way: thud has not written it, or it has changed since",
         "another directory, or --replace (replace=True) to replace it",
@@ -243,12 +215,27 @@ def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
     return False
 
 
+def is_directory(path: Path) -> bool:
+    """Whether a path is that of a directory and no link."""
+    return path.is_dir() and not path.is_symlink()
+
+
 def is_regular(path: Path) -> bool:
     """Whether a path is that of a regular file and no link; to open anything else could block."""
     try:
         return stat.S_ISREG(path.lstat().st_mode)
     except (OSError, ValueError):
         return False
+
+
+def is_temporary(name: str) -> bool:
+    """Whether a name is that of a file that is not whole, also one of `own_path`."""
+    return re.fullmatch(r"\.(thud\.new|.+\.part)(\..*)?", name) is not None
+
+
+def is_failure(error: BaseException) -> bool:
+    """Whether an error of reading is one of the system, and says nothing of what is there."""
+    return isinstance(error, OSError) and error.errno not in (None, *_NO_FILE)
 
 
 def read_input(path: Path) -> bytes:
@@ -322,19 +309,16 @@ def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
     return content is not None and checksum(content) in listed[path.name].checksums
 
 
-def _markers(folder: Path) -> Iterator[bytes]:
-    """Yield the contents of the files that identify the results of a directory."""
-    for name in ("effective.nml", "sets.nml"):
-        if (content := content_of(folder / name)) is not None:
-            yield content
-
-
 @contextmanager
 def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
-    """Hold the lock of a result directory, so that no other run switches or adds to it."""
+    """Hold the lock of a result directory, so that no other run switches or adds to it.
+
+    Raises BlockingIOError where another run holds it and `kind` has LOCK_NB.
+    """
     with _held(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
-        if kind == fcntl.LOCK_EX and not is_locked:
-            _warn_unlocked(folder)
+        if kind & fcntl.LOCK_EX and not is_locked:
+            sentence = "the file system has no locks; let only one run at a time write there"
+            warnings.warn(f"{folder}: {sentence}", LockWarning, stacklevel=3)
         yield
 
 
@@ -346,21 +330,35 @@ def _held(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int, bool]]
     """
     while True:
         descriptor = os.open(path, flags, 0o666)
-        is_locked = _flock(descriptor, kind)
-        if flags & os.O_CREAT and not flags & os.O_EXCL and not is_locked:
+        try:
+            is_locked = _flock(descriptor, kind)
+            if flags & os.O_CREAT and not flags & os.O_EXCL and not is_locked:
+                path.unlink(missing_ok=True)
+                path, flags = own_path(path), flags | os.O_EXCL
+            # The previous holder of the lock may have renamed it, or switched the directory.
+            elif _leads_to(path, descriptor):
+                yield path, descriptor, is_locked
+                return
+        finally:
             os.close(descriptor)
-            path.unlink(missing_ok=True)
-            path, flags = own_path(path), flags | os.O_EXCL
-            continue
-        # The previous holder of the lock may have renamed it, or switched the directory.
-        with suppress(FileNotFoundError):
-            if os.path.samestat(os.fstat(descriptor), path.stat()):
-                break
-        os.close(descriptor)
+
+
+def _flock(descriptor: int, kind: int) -> bool:
+    """Lock an open file; return False where the file system has no locks."""
     try:
-        yield path, descriptor, is_locked
-    finally:
-        os.close(descriptor)
+        fcntl.flock(descriptor, kind)
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+        return False
+    return True
+
+
+def _leads_to(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False
 
 
 def own_path(part: Path) -> Path:
@@ -391,7 +389,7 @@ def _is_running(process: int) -> bool:
 
 def remove(path: Path) -> None:
     """Remove a file or a directory, if it exists; an interrupt leaves its name all or nothing."""
-    if path.is_dir() and not path.is_symlink():
+    if is_directory(path):
         gone = path.with_name(f".{path.name}.part")
         shutil.rmtree(gone, ignore_errors=True)
         path.rename(gone)

@@ -8,7 +8,7 @@ module thud_file_set
    use thud_error, only: error_type, input_error
    use thud_interrupt, only: check_interrupt
    use thud_system, only: close_descriptor, exchange_directories, get_file_checksum, get_file_size, get_system_message, &
-      link_file, list_directory, name_length, open_end, remove_file, rename_file, write_text
+      is_missing, is_regular_file, link_file, list_directory, name_length, open_end, remove_file, rename_file, write_text
    use thud_text, only: newline
    implicit none (type, external)
    private
@@ -20,7 +20,7 @@ module thud_file_set
    character(len=*), parameter :: manifest = '.thud'
    character(len=*), parameter :: head = '# files that thud has written, with checksums (CRC-32)'
 
-   !> Temporary name of a file that the driver writes.
+   !> Temporary name of a file that the driver writes; a period and the writer follow where there are no locks.
    character(len=*), parameter :: temporary = manifest//'.new'
 
    !> Before the name of a file that is set aside in the workspace.
@@ -66,6 +66,14 @@ contains
          write (entries(i)%sum, '(z8.8)') sums(i)
       end do
    end function new_entries
+
+   !> Whether a name is that of a file that the driver has not finished.
+   elemental function is_temporary(name) result(yes)
+      character(len=*), intent(in) :: name
+      logical :: yes
+
+      yes = name == temporary .or. index(name, temporary//'.') == 1
+   end function is_temporary
 
    !> Whether a file of a directory is as its manifest lists it.
    function is_listed(place, name, entries) result(yes)
@@ -146,7 +154,7 @@ contains
       done = .true.
       call list_directory(place, found)
       do i = 1, size(found)
-         if (any(found(i) == [character(len=name_length) :: manifest, temporary, replaced])) cycle
+         if (is_temporary(found(i)) .or. any(found(i) == [character(len=name_length) :: manifest, replaced])) cycle
          call link_file(place//'/'//trim(found(i)), workspace//'/'//trim(found(i)), done)
          if (.not. done) return
       end do
@@ -155,7 +163,7 @@ contains
       ! The user may have changed files meanwhile; those that are the same are left alone.
       call list_directory(workspace, left)
       do i = 1, size(left)
-         if (any(left(i) == [character(len=name_length) :: manifest, temporary, replaced])) cycle
+         if (is_temporary(left(i)) .or. any(left(i) == [character(len=name_length) :: manifest, replaced])) cycle
          call rename_file(workspace//'/'//trim(left(i)), place//'/'//trim(left(i)), changed)
       end do
    end subroutine exchange
@@ -221,7 +229,7 @@ contains
       call list_directory(workspace, found)
       do i = 1, size(found)
          if (found(i) == manifest) cycle
-         if (.not. any([listed%name == found(i), index(found(i), aside) == 1, found(i) == temporary])) then
+         if (.not. any([listed%name == found(i), index(found(i), aside) == 1, is_temporary(found(i))])) then
             call link_file(workspace//'/'//trim(found(i)), place//'/'//trim(found(i)), done)
          end if
          call remove_file(workspace//'/'//trim(found(i)))
@@ -240,17 +248,14 @@ contains
       logical, intent(out) :: is_manifest
       character(len=name_length + 64) :: line
       character(len=256) :: message
-      integer(int64) :: checksum
       integer :: unit, status, n, i
 
       allocate (entries(64))
       n = 0
-      ! To open a pipe could block.
-      call get_file_checksum(path//'/'//manifest, checksum)
-      is_manifest = checksum == -1
+      is_manifest = is_missing(path//'/'//manifest)
       status = -1
-      if (checksum >= 0) open (newunit=unit, file=path//'/'//manifest, status='old', action='read', iostat=status, &
-         iomsg=message)
+      if (is_regular_file(path//'/'//manifest)) open (newunit=unit, file=path//'/'//manifest, status='old', action='read', &
+         iostat=status, iomsg=message)
       if (status == 0) then
          read (unit, '(a)', iostat=status, iomsg=message) line
          is_manifest = status == 0 .and. line == head

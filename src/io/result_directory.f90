@@ -5,14 +5,14 @@
 !> other; what a killed one has left there is removed. The lock on the directory is held for its check and for the
 !> replacement. The first line of the marker, a file of the set, says whose results a directory holds.
 module thud_result_directory
-   use, intrinsic :: iso_fortran_env, only: int32, int64
+   use, intrinsic :: iso_fortran_env, only: int32
    use thud_error, only: error_type, input_error
    use thud_file, only: read_text_file, text_file_type
    use thud_file_set, only: add_entries, clear_workspace, entry_type, get_kept, is_listed, is_workspace, manifest, &
       new_entries, read_manifest, replace_set
    use thud_interrupt, only: check_interrupt
    use thud_system, only: add_to_checksum, can_exchange, close_descriptor, create_file, directory_exists, flush_directory, &
-      get_file_checksum, get_system_message, is_same_file, keep_interrupts, list_directory, lock_directory, &
+      get_system_message, is_missing, is_same_file, keep_interrupts, list_directory, lock_directory, &
       name_length, pass_interrupts, path_length, remove_file, rename_file, resolve_path, write_text
    use thud_text, only: newline
    implicit none (type, external)
@@ -281,15 +281,13 @@ contains
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: entries(:)
       character(len=:), allocatable :: path, text
-      integer(int64) :: checksum
       logical :: is_manifest
       integer :: i, j
 
       call read_manifest(directory%place, entries, is_manifest)
       do i = 1, size(directory%names)
          path = directory%place//'/'//trim(directory%names(i))
-         call get_file_checksum(path, checksum)
-         if (checksum == -1) cycle
+         if (is_missing(path)) cycle
          do j = 1, size(directory%inputs)
             if (.not. is_same_file(path, trim(directory%inputs(j)))) cycle
             ! Results are repeated from their own input.
@@ -301,25 +299,27 @@ contains
                //'allowed: another directory')
             return
          end do
-         if (directory_exists(path)) then
-            error = input_error('--output '//directory%path//': '//trim(directory%names(i))//' is a directory; allowed: a ' &
-               //'file of this name')
-         else if (.not. (directory%replace .or. is_listed(directory%place, directory%names(i), entries))) then
-            error = foreign_error(directory%path, directory%names(i))
+         if (.not. directory_exists(path)) then
+            if (directory%replace .or. is_listed(directory%place, directory%names(i), entries)) cycle
          end if
-         if (allocated(error)) return
+         error = foreign_error(directory%path, directory%names(i))
+         return
       end do
    end subroutine check_files
 
-   !> Error of a file that thud has not written.
-   pure function foreign_error(path, name) result(error)
+   !> Error of what thud has not written.
+   function foreign_error(path, name) result(error)
       !> Path of its directory.
       character(len=*), intent(in) :: path
       character(len=*), intent(in) :: name
       type(error_type) :: error
 
-      error = input_error(path//'/'//trim(name)//' is in the way: thud has not written it, or it has changed since; ' &
-         //'allowed: another directory, or --replace (replace=True) to replace it')
+      if (directory_exists(path//'/'//trim(name))) then
+         error = input_error(path//'/'//trim(name)//' is a directory of something else; allowed: another directory')
+      else
+         error = input_error(path//'/'//trim(name)//' is in the way: thud has not written it, or it has changed since; ' &
+            //'allowed: another directory, or --replace (replace=True) to replace it')
+      end if
    end function foreign_error
 
    !> Takes the workspace of a directory. Interrupts are kept from then on.

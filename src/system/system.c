@@ -265,7 +265,7 @@ uint32_t thud_checksum(uint32_t before, const unsigned char *bytes, size_t lengt
    return ~rest;
 }
 
-// The checksum of a regular file; -1 where there is nothing of its name, -2 where it is something else or cannot be read.
+// The checksum of a regular file; negative where it is something else or cannot be read.
 int64_t thud_get_file_checksum(const char *path)
 {
    unsigned char bytes[1 << 16];
@@ -273,10 +273,11 @@ int64_t thud_get_file_checksum(const char *path)
    ssize_t count;
    int descriptor = open_regular(path, O_RDONLY);
 
-   if (descriptor < 0) return descriptor == -ENOENT || descriptor == -ENOTDIR ? -1 : -2;
-   while ((count = read(descriptor, bytes, sizeof bytes)) > 0) checksum = thud_checksum(checksum, bytes, (size_t)count);
+   if (descriptor < 0) return -1;
+   while ((count = thud_read(descriptor, (char *)bytes, sizeof bytes)) > 0)
+      checksum = thud_checksum(checksum, bytes, (size_t)count);
    close(descriptor);
-   return count < 0 ? -2 : (int64_t)checksum;
+   return count < 0 ? -1 : (int64_t)checksum;
 }
 
 // Writes all of a text; -1 after an interrupt that was kept.
@@ -414,6 +415,15 @@ int thud_is_same_file(const char *path, const char *other)
    struct stat here, there;
 
    return stat(path, &here) == 0 && stat(other, &there) == 0 && here.st_dev == there.st_dev && here.st_ino == there.st_ino;
+}
+
+// 1 for a regular file and no link, 0 where there is nothing of a name, -1 for anything else.
+int thud_look_up(const char *path)
+{
+   struct stat found;
+
+   if (lstat(path, &found) != 0) return errno == ENOENT || errno == ENOTDIR ? 0 : -1;
+   return S_ISREG(found.st_mode) ? 1 : -1;
 }
 
 // Length of the next name in an open directory, `.` and `..` left out; 0 at the end.

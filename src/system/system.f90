@@ -10,8 +10,8 @@ module thud_system
    public :: standard_error, standard_output
    public :: add_to_checksum, begin_call, can_exchange, close_descriptor, create_file, directory_exists, end_call
    public :: end_calls, end_process, exchange_directories, flush_directory, get_file_checksum, get_file_size, get_free_bytes
-   public :: get_system_message, is_closed, is_same_file, is_terminal, keep_interrupts, link_file, list_directory
-   public :: lock_directory, open_descriptor, open_end
+   public :: get_system_message, is_closed, is_missing, is_regular_file, is_same_file, is_terminal, keep_interrupts
+   public :: link_file, list_directory, lock_directory, open_descriptor, open_end
    public :: pass_interrupts, prepare_process, read_bytes, remove_file, rename_file, resolve_path, write_text
 
    !> Descriptors of the process.
@@ -21,6 +21,10 @@ module thud_system
    integer, parameter, public :: name_length = 255, path_length = 4096
 
    abstract interface
+      subroutine plain_call() bind(c)
+         implicit none (type, external)
+      end subroutine plain_call
+
       function path_call(path) bind(c) result(status)
          import :: c_char, c_int
          implicit none (type, external)
@@ -35,6 +39,13 @@ module thud_system
          integer(c_int) :: status
       end function two_path_call
 
+      function path_number_call(path) bind(c) result(number)
+         import :: c_char, c_int64_t
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int64_t) :: number
+      end function path_number_call
+
       function number_call(number) bind(c) result(status)
          import :: c_int
          implicit none (type, external)
@@ -47,15 +58,29 @@ module thud_system
    procedure(path_call), bind(c, name='thud_create') :: c_create
    procedure(path_call), bind(c, name='thud_open_end') :: c_open_end
    procedure(path_call), bind(c, name='remove') :: c_remove
+   procedure(path_number_call), bind(c, name='thud_get_file_size') :: c_get_file_size
+   procedure(path_number_call), bind(c, name='thud_get_file_checksum') :: c_get_file_checksum
    procedure(two_path_call), bind(c, name='rename') :: c_rename
    procedure(two_path_call), bind(c, name='link') :: c_link
    procedure(two_path_call), bind(c, name='thud_can_exchange') :: c_can_exchange
    procedure(two_path_call), bind(c, name='thud_is_same_file') :: c_is_same_file
    procedure(two_path_call), bind(c, name='thud_exchange') :: c_exchange
    procedure(path_call), bind(c, name='thud_flush') :: c_flush
+   procedure(path_call), bind(c, name='thud_look_up') :: c_look_up
    procedure(number_call), bind(c, name='thud_close') :: c_close
    procedure(number_call), bind(c, name='isatty') :: c_isatty
    procedure(number_call), bind(c, name='thud_is_closed') :: c_is_closed
+
+   !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a sentence.
+   procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
+   !> Keeps an interrupt from now on; it then stops `write_text`.
+   procedure(plain_call), bind(c, name='thud_keep_interrupts') :: keep_interrupts
+   !> Lets signals that the process handles set `latest_signal`, too. Every call of the library begins with it.
+   procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
+   !> Ends what `begin_call` has begun.
+   procedure(plain_call), bind(c, name='thud_end_call') :: end_call
+   !> Ends all calls that are running.
+   procedure(plain_call), bind(c, name='thud_end_calls') :: end_calls
 
    interface
       !> Ends the process at once; nothing must be left to be written.
@@ -66,16 +91,6 @@ module thud_system
          integer(c_int), value :: code
       end subroutine end_process
 
-      !> Turns signals of full and closed outputs into errors, and SIGINT and SIGTERM into a sentence.
-      subroutine prepare_process() bind(c, name='thud_prepare_process')
-         implicit none (type, external)
-      end subroutine prepare_process
-
-      !> Keeps an interrupt from now on; it then stops `write_text`.
-      subroutine keep_interrupts() bind(c, name='thud_keep_interrupts')
-         implicit none (type, external)
-      end subroutine keep_interrupts
-
       !> Lets an interrupt end the process from now on.
       subroutine pass_interrupts(written) bind(c, name='thud_pass_interrupts')
          import :: c_int
@@ -83,21 +98,6 @@ module thud_system
          !> 1 where there are results by now, else 0.
          integer(c_int), value :: written
       end subroutine pass_interrupts
-
-      !> Lets signals that the process handles set `latest_signal`, too. Every call of the library begins with it.
-      subroutine begin_call() bind(c, name='thud_begin_call')
-         implicit none (type, external)
-      end subroutine begin_call
-
-      !> Ends what `begin_call` has begun.
-      subroutine end_call() bind(c, name='thud_end_call')
-         implicit none (type, external)
-      end subroutine end_call
-
-      !> Ends all calls that are running.
-      subroutine end_calls() bind(c, name='thud_end_calls')
-         implicit none (type, external)
-      end subroutine end_calls
 
       subroutine c_get_error_text(number, text, length) bind(c, name='thud_get_error_text')
          import :: c_char, c_int, c_size_t
@@ -173,20 +173,6 @@ module thud_system
          type(c_ptr), value :: directory
          integer(c_int) :: status
       end function c_closedir
-
-      function c_get_file_size(path) bind(c, name='thud_get_file_size') result(bytes)
-         import :: c_char, c_int64_t
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int64_t) :: bytes
-      end function c_get_file_size
-
-      function c_get_file_checksum(path) bind(c, name='thud_get_file_checksum') result(checksum)
-         import :: c_char, c_int64_t
-         implicit none (type, external)
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int64_t) :: checksum
-      end function c_get_file_checksum
 
       function c_get_free_bytes(path) bind(c, name='thud_get_free_bytes') result(bytes)
          import :: c_char, c_double
@@ -442,11 +428,27 @@ contains
    !> Checksum of a file, CRC-32 as in zlib.
    subroutine get_file_checksum(path, checksum)
       character(len=*), intent(in) :: path
-      !> The checksum; -1 where there is nothing of that name, -2 where it is no regular file or cannot be read.
+      !> The checksum; negative where it is no regular file or cannot be read.
       integer(int64), intent(out) :: checksum
 
       checksum = int(c_get_file_checksum(path//c_null_char), int64)
    end subroutine get_file_checksum
+
+   !> Whether there is nothing of a name.
+   function is_missing(path) result(yes)
+      character(len=*), intent(in) :: path
+      logical :: yes
+
+      yes = c_look_up(path//c_null_char) == 0
+   end function is_missing
+
+   !> Whether a path is that of a regular file and no link; to open anything else could block.
+   function is_regular_file(path) result(yes)
+      character(len=*), intent(in) :: path
+      logical :: yes
+
+      yes = c_look_up(path//c_null_char) == 1
+   end function is_regular_file
 
    !> Whether two paths lead to the same file, by links too.
    function is_same_file(path, other) result(yes)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import re
 import resource
@@ -20,6 +21,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
+from thud.files import own_path
 from thud.studies import evaluation, fit
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
@@ -29,6 +31,8 @@ sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, library
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import xarray as xr
 
     from thud.studies.sets import SetStudy
@@ -291,6 +295,35 @@ def test_command_without_locks_ends_with_results_and_one_warning(tmp_path: Path)
     assert "new" in done.stderr
 
 
+def test_lock_is_that_of_the_directory_that_has_the_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = thud.read_study(HEIGHTS)
+    folder = tmp_path / "out"
+    flock = fcntl.flock
+
+    def switch(descriptor: int, kind: int) -> None:
+        flock(descriptor, kind)
+        if not (tmp_path / "before").exists():
+            folder.rename(tmp_path / "before")
+            folder.mkdir()
+
+    monkeypatch.setattr("fcntl.flock", switch)
+    with KIND.take(study, folder), pytest.raises(thud.InputError, match=naming("out/python")):
+        thud.sweep(study, folder)
+
+
+def test_killed_study_goes_on_where_there_are_no_locks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = thud.read_study(HEIGHTS)
+    keep_one_block(study, tmp_path)
+    own_path(tmp_path / "python.partial/.block_000000000001.nc.part").write_bytes(b"half")
+    refuse_locks(monkeypatch)
+    with pytest.warns(thud.LockWarning):
+        assert thud.sweep(study, tmp_path).sizes["height"] == 2
+
+
 def test_other_studies_leave_no_mark_on_one_at_work(tmp_path: Path) -> None:
     other = {"parameters": {"height": {"values": [70, 80], "unit": "cm"}}}
     study = thud.read_study(HEIGHTS)
@@ -376,6 +409,59 @@ def test_directories_of_something_else_stay(name: str, tmp_path: Path) -> None:
         with pytest.raises(thud.InputError, match=naming(name)):
             thud.sweep(HEIGHTS, tmp_path, replace=replace)
     assert (tmp_path / name / "paper.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", ["python.partial", "python.zarr"])
+def test_directories_of_something_else_stay_beside_an_older_version(
+    name: str, tmp_path: Path
+) -> None:
+    thud.sweep({"parameters": {"height": {"values": [1]}}}, tmp_path)
+    before = (tmp_path / "python.nc").read_bytes()
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "mine").write_text("mine")
+    with pytest.raises(thud.InputError, match=naming(name, "directory")):
+        thud.sweep(HEIGHTS, tmp_path, replace=True)
+    assert (tmp_path / name / "mine").read_text() == "mine"
+    assert (tmp_path / "python.nc").read_bytes() == before
+
+
+def test_input_stays_beside_an_older_version(tmp_path: Path) -> None:
+    """It is named as the next file of results, and is reached after the older one."""
+    thud.sweep({"name": "a", "parameters": {"height": {"values": [1]}}}, tmp_path)
+    path = tmp_path / "a.zarr"
+    path.write_text("parameters.height.values = [0.5]\nname = 'a'")
+    with pytest.raises(thud.InputError, match=naming("a.zarr", "input")):
+        thud.sweep(path, tmp_path, replace=True)
+    assert path.exists()
+
+
+@pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.EACCES])
+@pytest.mark.parametrize("name", ["python.nc", "python.zarr", "python_surrogate.npz"])
+def test_results_that_cannot_be_read_for_now_stay(
+    name: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of this version, with `replace`."""
+    if name.endswith("npz"):
+        run: Callable[..., object] = thud.surrogate
+        study: dict[str, Any] = {
+            "parameters": {"height": {"low": 0.99, "high": 1.01}},
+            "surrogate": {"size": 64, "error": 1.0},
+        }
+    else:
+        run, study = thud.sweep, {**HEIGHTS, "format": "zarr" if "zarr" in name else "netcdf"}
+    run(study, tmp_path)
+    inode = (tmp_path / name).stat().st_ino
+
+    def fail(*_: object, **__: object) -> None:
+        raise OSError(number, os.strerror(number), name)
+
+    with monkeypatch.context() as patch:
+        patch.setattr("xarray.open_zarr", fail)
+        patch.setattr("thud.studies.blocks.read_input", fail)
+        patch.setattr("thud.studies.emulation.surrogate.read_input", fail)
+        with pytest.raises(OSError, match=os.strerror(number)):
+            run(study, tmp_path, replace=True)
+    assert (tmp_path / name).stat().st_ino == inode
 
 
 def test_unfinished_blocks_of_another_size_are_computed_again(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import os
 import platform
 import re
@@ -10,16 +11,13 @@ import subprocess
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from conftest import naming
 
 import thud
-from thud.files import Results, replace_file
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from thud.files import Results, locked, replace_file
 
 
 @pytest.fixture
@@ -81,6 +79,27 @@ def test_leftovers_without_locks_are_removed_where_their_writer_has_ended(tmp_pa
     assert left == {"file", names["running"], names["elsewhere"], names["another file"]}
 
 
+def test_failure_of_a_lock_is_no_file_system_without_locks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr("fcntl.flock", fail)
+    with pytest.raises(OSError, match=os.strerror(errno.EIO)), locked(tmp_path):
+        pass
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
+def test_lock_that_is_not_had_leaves_no_open_file(tmp_path: Path) -> None:
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    with locked(tmp_path):
+        for _ in range(10):
+            with pytest.raises(BlockingIOError), locked(tmp_path, fcntl.LOCK_EX | fcntl.LOCK_NB):
+                pass
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
+
+
 @pytest.mark.usefixtures("no_locks")
 def test_results_without_locks_are_added_with_a_warning(tmp_path: Path) -> None:
     with pytest.warns(thud.LockWarning, match=re.escape(str(tmp_path))):
@@ -108,3 +127,27 @@ def test_pipes_are_neither_opened_nor_replaced(tmp_path: Path) -> None:
             replace_file(tmp_path / "file", b"new")
         assert (tmp_path / name).is_fifo()
         (tmp_path / name).unlink()
+
+
+@pytest.mark.parametrize("replace", [False, True])
+def test_directory_of_the_name_of_the_manifest_is_named_as_such(
+    tmp_path: Path, *, replace: bool
+) -> None:
+    (tmp_path / ".thud").mkdir()
+    with pytest.raises(thud.InputError, match=naming(".thud", "directory")) as caught:
+        Results(tmp_path, replace=replace).write({"force.png": b"figure"})
+    assert "--replace" not in str(caught.value)
+
+
+def test_stale_file_may_vanish_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    results = Results(tmp_path)
+    results.write({"old": b"1"})
+    put = Results._put  # noqa: SLF001
+
+    def put_and_remove(self: Results, contents: dict[str, bytes]) -> None:
+        put(self, contents)
+        (tmp_path / "old").unlink(missing_ok=True)
+
+    monkeypatch.setattr(Results, "_put", put_and_remove)
+    results.write({"new": b"2"}, stale=["old"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".thud", "new"]

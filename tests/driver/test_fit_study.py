@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.files import lock
+from thud.files import locked
 from thud.studies.fit import KIND
 
 if TYPE_CHECKING:
@@ -274,10 +273,9 @@ def test_fits_take_a_directory_one_at_a_time(
     (tmp_path / "study.toml").write_text(STUDY)
     fit = ["fit", "-q", "--no-figures", "study.toml", "-o", "found"]
     (tmp_path / "found").mkdir()
-    descriptor = lock(tmp_path / "found", tmp_path / "found/fit.json")
-    assert cli.main(fit) == 1
+    with locked(tmp_path / "found"):
+        assert cli.main(fit) == 1
     assert "found/fit.json" in capsys.readouterr().err
-    os.close(descriptor)
     assert cli.main(fit) == 0
 
 

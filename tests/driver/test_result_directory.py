@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import random
 import re
@@ -9,16 +10,20 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import MINIMAL, naming
+from conftest import MINIMAL, REPOSITORY, naming
 
 import thud
 from thud.errors import PlausibilityWarning
-from thud.files import HEAD, Results, locked
+from thud.files import HEAD, PART, Results, locked, own_path
+
+sys.path.insert(0, str(REPOSITORY / "tests/faults"))
+from injection import can_inject, library
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -175,6 +180,54 @@ def test_figures_are_not_added_to_results_of_another_input(
     assert read_bytes(out) == two_inputs["b"]
     Results(out).write({"force.png": b""}, marker=two_inputs["b"]["effective.nml"])
     assert names_in(out) == sorted([*two_inputs["b"], "force.png"])
+
+
+def test_unfinished_figures_go_where_there_are_no_locks(
+    run: Run, two_inputs: dict[str, dict[str, bytes]], tmp_path: Path
+) -> None:
+    out = tmp_path / "outputs/case"
+    run("a/case.nml")
+    part = own_path(out / PART)
+    mine = out / f"{PART}s"
+    part.write_bytes(b"half a figure")
+    mine.write_bytes(b"mine")
+    assert run("a/case.nml").returncode == 0
+    assert names_in(out) == sorted([*two_inputs["a"], mine.name])
+
+
+@pytest.mark.parametrize("more", [[], ["--replace"]])
+def test_directory_of_the_name_of_the_manifest_is_named_as_such(
+    run: Run, case_file: CaseFile, tmp_path: Path, more: list[str]
+) -> None:
+    (tmp_path / "out/.thud").mkdir(parents=True)
+    result = run(case_file(MINIMAL), "-o", "out", *more)
+    assert result.returncode == 1
+    assert re.search(naming("out/.thud", "directory"), result.stderr)
+    assert "--replace" not in result.stderr
+
+
+@pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
+def test_signal_during_a_checksum_changes_nothing(
+    run: Run, case_file: CaseFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    case = case_file(MINIMAL)
+    assert run(case, "-o", "out").returncode == 0
+    before = read_bytes(tmp_path / "out")
+    faults = {
+        "LD_PRELOAD": library(),
+        "FAULT_CALLS": "read",
+        "FAULT_ACTION": f"{errno.EINTR}",
+        "FAULT_UNDER": str(tmp_path / "out/levels.csv"),
+        "FAULT_LOG": "calls",
+    }
+    for name, value in faults.items():
+        monkeypatch.setenv(name, value)
+    for number in range(1, 9):
+        monkeypatch.setenv("FAULT_AT", f"{number}")
+        result = run(case, "-o", "out")
+        assert result.returncode == 0, result.stderr
+        assert read_bytes(tmp_path / "out") == before
+    assert (tmp_path / "calls").read_text()
 
 
 def test_killed_run_does_not_lock_its_directory(

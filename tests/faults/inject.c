@@ -89,6 +89,13 @@ ssize_t write(int descriptor, const void *bytes, size_t length)
    return NEXT(ssize_t, write, int, const void *, size_t)(descriptor, bytes, length);
 }
 
+// Where they are named only: they change nothing.
+ssize_t read(int descriptor, void *bytes, size_t length)
+{
+   if (getenv("FAULT_CALLS") && fault("read", of(descriptor))) return -1;
+   return NEXT(ssize_t, read, int, void *, size_t)(descriptor, bytes, length);
+}
+
 int close(int descriptor)
 {
    int flags = fcntl(descriptor, F_GETFL);

@@ -13,7 +13,16 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from thud.checks import refuse
-from thud.files import is_regular, own_path, read_input, remove, replace_file, uninterrupted
+from thud.files import (
+    is_failure,
+    is_regular,
+    is_temporary,
+    own_path,
+    read_input,
+    remove,
+    replace_file,
+    uninterrupted,
+)
 from thud.studies.dataset import disk_space, grid_of, in_order, new_dataset
 
 if TYPE_CHECKING:
@@ -27,8 +36,8 @@ if TYPE_CHECKING:
 LARGE = 256 * 2**20
 # The file with the identity of the blocks.
 MARK = "study"
-# Names of the files beside it, and of those that are not whole.
-_OWN = re.compile(rf"{MARK}|block_\d+\.nc|\..*\.part")
+# The names of all finished files.
+_OWN = re.compile(rf"{MARK}|block_\d+\.nc")
 # Separates a NetCDF file from its checksum, which HDF5 ignores.
 _SEAL = b"thud sha256 "
 
@@ -132,7 +141,7 @@ def read_identity(path: Path) -> dict[str, str] | None:
     """Return what results depend on; None where they have no finished block."""
     if path.suffix == ".partial":
         for one in path.iterdir():
-            if not is_regular(one) or not _OWN.fullmatch(one.name):
+            if not is_regular(one) or not (_OWN.fullmatch(one.name) or is_temporary(one.name)):
                 refuse(f"{one} is not of a study", "finished blocks of a study")
         if not block_paths(path) and not (path / MARK).exists():
             return None
@@ -165,6 +174,8 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
     ------
     InputError
         Where there are no results of a study.
+    OSError
+        Where they cannot be read for now.
     """
     place = Path(path)
     if place.suffix == ".partial":
@@ -230,6 +241,8 @@ def _readable(path: Path) -> Iterator[None]:
     try:
         yield
     except (OSError, ValueError, KeyError, RuntimeError) as error:
+        if is_failure(error):
+            raise
         refuse(f"{path} cannot be read", "results of a study, or remove it", error)
 
 

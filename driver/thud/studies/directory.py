@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from fcntl import LOCK_EX, LOCK_NB
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from thud.checks import refuse
-from thud.errors import InputError
-from thud.files import Results, lock, refuse_foreign, remove
+from thud.files import Results, is_directory, is_failure, locked, refuse_foreign, remove
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -38,21 +38,22 @@ def take(
     a file is in the way (both only without `replace`), OSError where nothing can be written.
     """
     place = Path(folder)
-    names = kind.results(study)
+    names = kind.identity_files(study)
     place.mkdir(parents=True, exist_ok=True)
-    descriptor = lock(place, place / names[0])
-    try:
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(locked(place, LOCK_EX | LOCK_NB))
+        except BlockingIOError as error:
+            refuse(f"{place / names[0]} is being computed", "wait, or another directory", error)
         results = Results(place, kind.name, study.inputs, replace=replace, is_locked=True)
-        others = [n for n in kind.other_files(study) if figures or not n.endswith(FORMATS)]
-        results.require(others)
+        listed = kind.listed_files(study)
+        results.require(n for n in listed if figures or not n.endswith(FORMATS))
         readers = dict.fromkeys((place / name for name in names), kind.identity_in)
-        require_version(readers, study, results, kind.other_files(study))
+        require_version(readers, study, results, listed)
         if not (place / names[0]).exists():
             with TemporaryFile(dir=place):
                 pass
         yield results
-    finally:
-        os.close(descriptor)
 
 
 def require_version(
@@ -64,20 +65,21 @@ def require_version(
     """Raise InputError where results belong to another study, or else remove them.
 
     `readers` return the identity of results by their paths; `others` are names of files that are
-    removed with them.
+    removed with them. Nothing is removed before all results are known.
     """
+    gone: list[Path] = []
     for path, identity_in in readers.items():
         if not os.path.lexists(path):
             continue
         results.require_no_input(path)
         try:
             before = identity_in(path)
-        except (InputError, ValueError, LookupError, TypeError, OSError):
-            if path.is_dir() and not path.is_symlink():
-                refuse(f"{path} is in the way: a directory of something else", "another directory")
-            if not results.replace:
+        except (OSError, ValueError, LookupError, TypeError) as error:
+            if is_failure(error):
+                raise
+            if is_directory(path) or not results.replace:
                 refuse_foreign(path)
-            path.unlink()
+            gone.append(path)
             continue
         changes = "" if before is None else differences(before, study.identity)
         if changes and not results.replace:
@@ -86,24 +88,11 @@ def require_version(
                 "another directory, or --replace (replace=True) to compute it again",
             )
         if changes:
-            for one in readers:
-                remove(one)
-            results.write({}, stale=others)
-
-
-def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
-    """Return the differences of a study from that of existing results."""
-    try:
-        before = identity_in(path)
-    except InputError:
-        raise
-    except (ValueError, LookupError, TypeError, FileNotFoundError) as error:
-        refuse(
-            f"{path} holds something else, or results of an older thud",
-            "another directory, or remove it",
-            error,
-        )
-    return "" if before is None else differences(before, study.identity)
+            gone.append(path)
+    for path in gone:
+        remove(path)
+    if gone:
+        results.write({}, stale=others)
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:

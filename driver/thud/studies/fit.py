@@ -306,7 +306,7 @@ class FitKind(Kind[FitStudy, Fit]):
             progress=how.get("progress", False),
         )
 
-    def results(self, study: FitStudy) -> list[str]:  # noqa: ARG002
+    def identity_files(self, study: FitStudy) -> list[str]:  # noqa: ARG002
         """Return the name of the file that holds the identity."""
         return ["fit.json"]
 
@@ -314,8 +314,8 @@ class FitKind(Kind[FitStudy, Fit]):
         """Return the identity of a fit."""
         return dict(json.loads(read_input(path))["identity"])
 
-    def other_files(self, study: FitStudy) -> list[str]:
-        """Return the names of the other files."""
+    def listed_files(self, study: FitStudy) -> list[str]:
+        """Return the names of all files."""
         ends = file_ends(len(study.targets))
         names = [*(f"fit{end}" for end in ends), "confidence"]
         figures = [f"{name}{ending}" for name in names for ending in FORMATS]

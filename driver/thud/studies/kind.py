@@ -136,7 +136,7 @@ class Kind(ABC, Generic[S, R]):
         """Return the result, kept in a directory if given."""
 
     @abstractmethod
-    def results(self, study: S) -> list[str]:
+    def identity_files(self, study: S) -> list[str]:
         """Return the names of files that hold an identity; the first exists once it is done."""
 
     @abstractmethod
@@ -144,8 +144,8 @@ class Kind(ABC, Generic[S, R]):
         """Return the identity of results; None where no result would be lost."""
 
     @abstractmethod
-    def other_files(self, study: S) -> list[str]:
-        """Return the names of the other files that a study may write."""
+    def listed_files(self, study: S) -> list[str]:
+        """Return the names of files that a study may write and list in the manifest."""
 
     @abstractmethod
     def table(self, result: R, study: S) -> str:

@@ -99,9 +99,9 @@ class SensitivityKind(SetKind[Sensitivity]):
         """Return the Sobol indices of all sets."""
         return _indices(study, dataset.load())
 
-    def other_files(self, study: SetStudy) -> list[str]:
+    def listed_files(self, study: SetStudy) -> list[str]:
         """Return the names of figures and table."""
-        return [*super().other_files(study), f"{study.name}_indices.csv"]
+        return [*super().listed_files(study), f"{study.name}_indices.csv"]
 
     def files(self, result: Sensitivity, study: SetStudy) -> dict[str, bytes]:
         """Return the table of all indices."""

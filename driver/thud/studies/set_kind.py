@@ -111,7 +111,7 @@ class DropsKind(Kind[SetStudy, R]):
     def draw(self, result: R) -> Figure:
         """Return the figure of a result."""
 
-    def other_files(self, study: SetStudy) -> list[str]:
+    def listed_files(self, study: SetStudy) -> list[str]:
         """Return the names of the figures, and of the surrogate that is trained."""
         trained = [surrogate_name(study)] if study.plan else []
         return [*trained, *(f"{study.name}{ending}" for ending in FORMATS)]
@@ -153,7 +153,7 @@ class SetKind(DropsKind[R]):
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> R:
         """Return the result of all sets."""
 
-    def results(self, study: SetStudy) -> list[str]:
+    def identity_files(self, study: SetStudy) -> list[str]:
         """Return the names of the dataset and of the directory of blocks."""
         return result_names(study)
 

@@ -60,7 +60,7 @@ class SurrogateKind(DropsKind[Surrogate]):
         size = study.plan.size if study.plan else 0
         return f"{study.name}: {study.model} by {names}, up to {size} drops"
 
-    def results(self, study: SetStudy) -> list[str]:
+    def identity_files(self, study: SetStudy) -> list[str]:
         """Return the name of the file."""
         return [surrogate_name(study)]
 

@@ -17,7 +17,7 @@ from thud.case import Case, case_text
 from thud.checks import refuse, require_kind
 from thud.display import Displayed
 from thud.extras import require_extra
-from thud.files import read_input, replace_file
+from thud.files import is_failure, read_input, replace_file
 from thud.keys import OF_FILES, put
 from thud.levels import get_bands
 from thud.studies.emulation.verdict import judge_many
@@ -339,6 +339,8 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
     ------
     InputError
         Where there is none, or the file is damaged.
+    OSError
+        Where it cannot be read for now.
     """
     require_kind("surrogate", path, str | Path)
     try:
@@ -352,7 +354,10 @@ def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
         header["keys"] = tuple(header["keys"])
         found = Surrogate(**header, **arrays)
         intact = found.digest == digest and found.is_whole
-    except Exception as error:  # noqa: BLE001 - zip, NumPy and JSON raise many kinds
+    except Exception as error:
+        if is_failure(error):
+            raise
+        # Zip, NumPy and JSON raise many kinds.
         reason = getattr(error, "strerror", None) or "no surrogate"
         refuse(f"{path} cannot be read: {reason}", "a file that Surrogate.save wrote", error)
     if not intact:
