@@ -176,6 +176,7 @@ class Results:
             _replace(self.folder / name, content, self.folder / PART)
 
     def _listed(self) -> dict[str, Entry]:
+        self.require_no_input(self.folder / MANIFEST)
         try:
             return read_manifest(self.folder)
         except InputError:

@@ -280,25 +280,18 @@ contains
       !> Names the file that is in the way.
       type(error_type), allocatable, intent(out) :: error
       type(entry_type), allocatable :: entries(:)
-      character(len=:), allocatable :: path, text
+      character(len=:), allocatable :: path
       logical :: is_manifest
-      integer :: i, j
+      integer :: i
 
+      call check_input(directory, manifest, error)
+      if (allocated(error)) return
       call read_manifest(directory%place, entries, is_manifest)
       do i = 1, size(directory%names)
          path = directory%place//'/'//trim(directory%names(i))
          if (is_missing(path)) cycle
-         do j = 1, size(directory%inputs)
-            if (.not. is_same_file(path, trim(directory%inputs(j)))) cycle
-            ! Results are repeated from their own input.
-            if (directory%names(i) == directory%marker%name) call read_text_file(path, text, error)
-            if (allocated(text)) then
-               if (text == directory%marker%content) cycle
-            end if
-            error = input_error(directory%path//'/'//trim(directory%names(i))//' is an input, which is never replaced; ' &
-               //'allowed: another directory')
-            return
-         end do
+         call check_input(directory, directory%names(i), error)
+         if (allocated(error)) return
          if (.not. directory_exists(path)) then
             if (directory%replace .or. is_listed(directory%place, directory%names(i), entries)) cycle
          end if
@@ -306,6 +299,30 @@ contains
          return
       end do
    end subroutine check_files
+
+   !> Refuses to replace an input.
+   subroutine check_input(directory, name, error)
+      type(result_directory_type), intent(in) :: directory
+      !> Name of a file to be written.
+      character(len=*), intent(in) :: name
+      !> The name leads to an input.
+      type(error_type), allocatable, intent(out) :: error
+      character(len=:), allocatable :: path, text
+      integer :: i
+
+      path = directory%place//'/'//trim(name)
+      do i = 1, size(directory%inputs)
+         if (.not. is_same_file(path, trim(directory%inputs(i)))) cycle
+         ! Results are repeated from their own input.
+         if (name == directory%marker%name) call read_text_file(path, text, error)
+         if (allocated(text)) then
+            if (text == directory%marker%content) cycle
+         end if
+         error = input_error(directory%path//'/'//trim(name)//' is an input, which is never replaced; allowed: another ' &
+            //'directory')
+         return
+      end do
+   end subroutine check_input
 
    !> Error of what thud has not written.
    function foreign_error(path, name) result(error)
