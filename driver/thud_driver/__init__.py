@@ -34,6 +34,8 @@ def main() -> int:
     """Run the command line of this process; return the exit code."""
     _handle(_end)
     _open_screen()
+    # Figures are written to files, whatever else is set.
+    os.environ["MPLBACKEND"] = "agg"
     from thud.cli import main as run  # noqa: PLC0415 - takes its time
 
     # Coroutines that an interrupt ends would say that nobody has awaited them.

@@ -95,8 +95,10 @@ contains
       end associate
       if (options%material%viscosity == 'kelvin_voigt') then
          ! The stable step with the damping ratio of the fastest mode: dt**2 K + 2 dt C <= 4 M.
-         damping = 4*options%material%loss_factor/(2*pi*options%material%loss_frequency)/(3*options%material%bulk_ratio + 4) &
-            *options%step_safety/interval
+         associate (material => options%material)
+            damping = 4*material%loss_factor/(2*pi*material%loss_frequency)/(3*material%bulk_ratio + 4) &
+               *options%step_safety/interval
+         end associate
          interval = interval*(hypot(1.0_wp, damping) - damping)
       end if
       time = typical_contact + options%flight_before + options%flight_after

@@ -402,6 +402,19 @@ def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("name", ["python.partial", "python.zarr", "python.nc"])
+def test_links_in_the_place_of_results_are_not_followed(name: str, tmp_path: Path) -> None:
+    out, other = tmp_path / "out", tmp_path / "other"
+    out.mkdir()
+    other.mkdir()
+    (out / name).symlink_to(other)
+    with pytest.raises(thud.InputError, match=naming(out / name)):
+        thud.sweep(HEIGHTS, out)
+    assert list(other.iterdir()) == []
+    thud.sweep(HEIGHTS, out, replace=True)
+    assert list(other.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["python.partial", "python.zarr", "python.nc"])
 def test_directories_of_something_else_stay(name: str, tmp_path: Path) -> None:
     (tmp_path / name).mkdir()
     (tmp_path / name / "paper.txt").write_text("mine")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from typing import TYPE_CHECKING
 
 from conftest import REPOSITORY
@@ -23,6 +24,20 @@ def test_examples_are_those_of_the_repository(tmp_path: Path) -> None:
     for name in names:
         assert (copied / name).read_bytes() == (REPOSITORY / "inputs" / name).read_bytes()
     assert thud.read_case(copied / "rubber_ball_100cm.nml").drop.height == 1.0
+
+
+def test_examples_are_copied_whole_or_not_at_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(_: Path, target: Path, **_options: object) -> None:
+        target.mkdir()
+        (target / "half").touch()
+        raise shutil.Error([("source", str(target), "No space left on device")])
+
+    monkeypatch.setattr("shutil.copytree", fail)
+    assert cli.main(["examples", str(tmp_path / "new")]) == 1
+    assert str(tmp_path / "new") in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_examples_replace_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

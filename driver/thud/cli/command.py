@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tqdm import tqdm
 
-from thud.display import draw_all
+from thud.display import draw_all, left_out
 from thud.errors import InputError, LockWarning, ReportWarning, ThudError, WorkerWarning
 from thud.files import Results
 
@@ -134,9 +134,10 @@ def conclude(  # noqa: PLR0913, PLR0917 - each of them differs
     results = results_of(options, found.name, [source])
     contents = dict([file])
     if not options.no_figures:
-        from thud.plot.look import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+        with left_out(figure):
+            from thud.plot.look import picture_files  # noqa: PLC0415 - Matplotlib takes its time
 
-        contents |= picture_files(draw_all({figure: found.plot}))
+            contents |= picture_files(draw_all({figure: found.plot}))
     results.write(contents)
     if not options.quiet:
         print(shown)

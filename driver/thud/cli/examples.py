@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from thud.checks import refuse
 from thud.cli.command import QUIET, Command, argument
+from thud.files import own_path
 
 if TYPE_CHECKING:
     import argparse
@@ -22,8 +23,16 @@ def copy_examples(options: argparse.Namespace) -> int:
     with resources.as_file(resources.files("thud") / "inputs") as source:
         if not source.is_dir():
             refuse("this package has no inputs", "an installed one; in a clone they are in inputs/")
-        # Installers compile the scripts.
-        shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        part = own_path(target.with_name(f".{target.name}.part"))
+        try:
+            # Installers compile the scripts.
+            shutil.copytree(source, part, ignore=shutil.ignore_patterns("__pycache__"))
+            part.rename(target)
+        except shutil.Error as error:
+            refuse(f"{target} cannot be written", "a place with space that you may write to", error)
+        finally:
+            shutil.rmtree(part, ignore_errors=True)
     if not options.quiet:
         print(f"Inputs: {target}")
     return 0

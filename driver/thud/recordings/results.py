@@ -10,7 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from thud._api import version
-from thud.display import draw_all
+from thud.display import draw_all, left_out
 from thud.errors import InputError, ReportWarning
 from thud.extras import require_extra
 from thud.levels import get_bands
@@ -186,12 +186,13 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         **_dataset(data, results.folder),
     }
     if figures:
-        # Matplotlib takes its time.
-        from thud.plot.look import picture_files  # noqa: PLC0415
-
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-        contents |= page_contents(data, list(drawn.values()), results.folder)
-        contents |= picture_files(drawn)
+        with left_out("the page"):
+            # Matplotlib takes its time.
+            from thud.plot.look import picture_files  # noqa: PLC0415
+
+            contents |= page_contents(data, list(drawn.values()), results.folder)
+            contents |= picture_files(drawn)
     write_files(results, data, contents, file_names())
 
 

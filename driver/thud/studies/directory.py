@@ -73,7 +73,7 @@ def require_version(
             continue
         results.require_no_input(path)
         try:
-            before = identity_in(path)
+            changes = _changes(path, identity_in, study)
         except (OSError, ValueError, LookupError, TypeError) as error:
             if is_failure(error):
                 raise
@@ -81,7 +81,6 @@ def require_version(
                 refuse_foreign(path)
             gone.append(path)
             continue
-        changes = "" if before is None else differences(before, study.identity)
         if changes and not results.replace:
             refuse(
                 f"{path} belongs to another version of this study: {changes}",
@@ -93,6 +92,15 @@ def require_version(
         remove(path)
     if gone:
         results.write({}, stale=others)
+
+
+def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
+    """Return the differences of a study from that of results; raise where these are none."""
+    if path.is_symlink():
+        message = f"{path} is a link"
+        raise ValueError(message)
+    before = identity_in(path)
+    return "" if before is None else differences(before, study.identity)
 
 
 def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:
