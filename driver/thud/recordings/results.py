@@ -185,15 +185,23 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
         JSON: json_bytes(data),
         **_dataset(data, results.folder),
     }
-    if figures:
-        drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
-        with left_out("the page"):
-            # Matplotlib takes its time.
-            from thud.plot.look import picture_files  # noqa: PLC0415
+    if figures and _has_matplotlib():
+        # It takes its time.
+        from thud.plot.look import picture_files  # noqa: PLC0415
 
-            contents |= page_contents(data, list(drawn.values()), results.folder)
-            contents |= picture_files(drawn)
+        drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+        contents |= page_contents(data, list(drawn.values()), results.folder)
+        contents |= picture_files(drawn)
     write_files(results, data, contents, file_names())
+
+
+def _has_matplotlib() -> bool:
+    """Return whether figures can be drawn at all; warn where they cannot."""
+    with left_out("the page"):
+        import matplotlib as mpl  # noqa: PLC0415 - takes its time
+
+        return bool(mpl.__version__)
+    return False
 
 
 def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
