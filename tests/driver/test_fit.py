@@ -46,6 +46,12 @@ def test_known_parameters_come_back() -> None:
     assert fit.case.ball == replace(TRUTH, youngs_modulus=fit.values["youngs_modulus"])
 
 
+def test_confidence_below_rounding_has_intervals_without_width() -> None:
+    fit = thud.fit(thud.solve(TRUTH), ["youngs_modulus", "height"], confidence=1e-17)
+    for name, (low, high) in fit.intervals().items():
+        assert low == high == fit.values[name]
+
+
 @pytest.mark.parametrize(
     ("case", "truth", "starts"),
     [

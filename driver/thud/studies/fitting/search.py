@@ -209,7 +209,8 @@ def _doubts(
     found += [null_sentence(answer.names, direction) for direction in known.null]
     factor = coverage_factor(answer.confidence, answer.interval_freedom)
     count = objective.count
-    wide = worst_directions(covariance[:count, :count], WIDE / factor)
+    # Of a confidence below rounding the factor is 0, and no interval is wide.
+    wide = worst_directions(covariance[:count, :count], WIDE / factor) if factor else []
     for deviation, direction in wide:
         found.append(
             weak_sentence(answer.names[:count], direction, factor * deviation, answer.confidence)
