@@ -118,13 +118,13 @@ def read_titled(
             filled = itertools.chain([(number, line)], filled)
             break
         titles = cells
-    rows = [(number, split_line(line, separator)) for number, line in filled]
+    rows = [(number, split_line(line, separator), '"' in line) for number, line in filled]
     if not rows:
         refuse(f"{path}: cannot be read (no numbers)", allowed)
     decimal = find_decimal(rows, separator, str(path))
     width = len(rows[0][1])
     table = np.empty((len(rows), width))
-    for row, (number, cells) in zip(table, rows, strict=True):
+    for row, (number, cells, _) in zip(table, rows, strict=True):
         values = [to_number(cell, decimal.mark) for cell in cells]
         if None in values:
             refuse(f"{path}: line {number}: {decimal.wrong(cells[values.index(None)])}", allowed)
@@ -207,9 +207,9 @@ def is_number(cell: str) -> bool:
 
 
 def find_decimal(
-    rows: Iterable[tuple[int, list[str]]], separator: str | None, name: str
+    rows: Iterable[tuple[int, list[str], bool]], separator: str | None, name: str
 ) -> DecimalMark:
-    """Return the decimal mark of a table from the numbers and cells of its lines.
+    """Return the decimal mark of a table from number and cells of its lines, and whether in quotes.
 
     The first number that can be read with one of the decimal marks only decides for all: ``0,5``,
     ``1.234,5`` and ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
@@ -220,15 +220,16 @@ def find_decimal(
         Names the line of a number that may be two, where no number of the table decides.
     """
     doubtful: tuple[int, str] | None = None
-    for line, cells in rows:
+    for line, cells, are_quoted in rows:
+        # Where commas separate columns, numbers without quotes have decimal points.
+        has_points = separator == "," and not are_quoted
         for cell in cells:
             if "." not in cell and "," not in cell:
                 continue
             marks = [mark for mark, pattern in NUMBERS.items() if pattern.fullmatch(cell)]
             if len(marks) == 1:
                 return DecimalMark(marks[0], line)
-            # Where commas separate columns, numbers without quotes have decimal points.
-            if len(marks) > 1 and doubtful is None and not (separator == "," and "." in cell):
+            if len(marks) > 1 and doubtful is None and not (has_points and "." in cell):
                 doubtful = line, cell
     if doubtful is not None:
         line, cell = doubtful

@@ -100,6 +100,9 @@ def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object
             if name not in dataset.indexes:
                 freeze(variable.values)
         return dataset
+    # Columns of tables, such as those of pandas.
+    if hasattr(value, "__array__") and not isinstance(value, np.generic):
+        return keep_array(np.array(value))
     return value
 
 

@@ -1,6 +1,7 @@
 !> Tables of drops: text with the keys in its first line and one drop in each of the others. Tabs, semicolons,
 !> commas or blanks separate the values, as in the first line; they may stand in quotes. Decimal commas are allowed
-!> where commas do not separate; empty lines and what follows a `#` are skipped.
+!> where commas do not separate, or in quotes; the first number with a decimal mark decides for the table. Empty lines
+!> and what follows a `#` are skipped.
 module thud_set_table
    use thud_case, only: case_type, get_active_fields
    use thud_column, only: column_type, find_columns
@@ -29,6 +30,8 @@ module thud_set_table
       type(line_reader_type) :: reader
       !> What separates their cells.
       character(len=1) :: separator = ' '
+      !> Decimal mark of their numbers; a blank as long as none has one.
+      character(len=1) :: decimal = ' '
       !> The keys of its columns: [n_column].
       type(column_type), allocatable :: columns(:)
       !> Their names: [n_column].
@@ -106,9 +109,11 @@ contains
                //'blanks between')
             return
          end if
+         call find_decimal(table, cells, error)
+         if (allocated(error)) return
          n_set = n_set + 1
          do i = 1, size(cells)
-            call read_value(table, i, trim(cells(i)), values(i, n_set), error)
+            call read_value(table, i, trim(replaced(cells(i), ',', '.')), values(i, n_set), error)
             if (allocated(error)) return
          end do
       end do
@@ -195,9 +200,47 @@ contains
       do i = 1, n
          call unquote(table, cells(i), error)
          if (allocated(error)) return
-         cells(i) = replaced(cells(i), ',', '.')
       end do
    end subroutine split_line
+
+   !> Finds the decimal mark of a table in the numbers of a line.
+   subroutine find_decimal(table, cells, error)
+      type(set_table_type), intent(inout) :: table
+      !> The cells of the line: [n_cell].
+      character(len=cell_length), intent(in) :: cells(:)
+      !> A number has the other mark than those before it, or may have a decimal comma or 1000 times the value.
+      type(error_type), allocatable, intent(out) :: error
+      integer :: doubtful, i, at
+
+      doubtful = 0
+      do i = 1, size(cells)
+         at = scan(cells(i), '.,')
+         if (at == 0 .or. .not. is_number(trim(replaced(cells(i), ',', '.')))) cycle
+         if (table%decimal /= ' ' .and. cells(i)(at:at) /= table%decimal) then
+            error = line_error(table, quoted(trim(cells(i)))//' has another decimal mark than the numbers before it; ' &
+               //'allowed: one decimal mark in a table')
+            return
+         else if (table%decimal == ' ' .and. may_be_group(cells(i))) then
+            doubtful = i
+         else
+            table%decimal = cells(i)(at:at)
+         end if
+      end do
+      if (doubtful > 0 .and. table%decimal == ' ') error = line_error(table, quoted(trim(cells(doubtful))) &
+         //' may have a decimal comma or be a thousand times as much; allowed: numbers such as 1575 and 1,5750')
+   end subroutine find_decimal
+
+   !> Whether the comma of a number may separate thousands, as in 1,575.
+   pure function may_be_group(cell) result(may)
+      character(len=*), intent(in) :: cell
+      logical :: may
+      integer :: first, comma
+
+      first = verify(cell, '+-')
+      comma = index(cell, ',')
+      may = comma > first .and. comma - first <= 3 .and. len_trim(cell) - comma == 3 .and. cell(first:first) /= '0' &
+         .and. verify(trim(cell(first:)), '0123456789,') == 0
+   end function may_be_group
 
    !> Removes the quotes around a cell, and the blanks inside them.
    subroutine unquote(table, cell, error)

@@ -328,6 +328,8 @@ contains
             if (n == size(names)) names = [names, names]
             n = n + 1
             names(n) = name(:length)
+            ! A blank at the end is part of the name, which C ends here.
+            if (name(length:length) == ' ') names(n)(min(length + 1, name_length):) = c_null_char
          end do
          if (c_closedir(directory) /= 0) n = 0
       end if

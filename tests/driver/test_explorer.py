@@ -409,11 +409,21 @@ def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     "moved",
-    [[], {"drop.height": []}, {"drop.height": ["a", 1]}, {"sampling.substeps": [1, 10**400]}],
+    [
+        5,
+        [],
+        {"drop.height": 1},
+        {"drop.height": []},
+        {"drop.height": [1]},
+        {"drop.height": ["a", "b"]},
+        {"drop.height": ["a", 1]},
+        {"sampling.substeps": [1, 10**400]},
+    ],
 )
 def test_study_of_no_moves_gets_a_sentence(client: TestClient, moved: object) -> None:
     answer = client.post("/download/study.toml", json=SHELL | {"moved": moved})
     assert answer.status_code == 400
+    assert moved == [] or "move" in answer.text
     assert "want of memory" not in answer.text
 
 

@@ -188,6 +188,13 @@ def test_read_only_view_of_a_callers_array_is_copied() -> None:
     assert bands.centre.tolist() == [0.0, 1.0, 2.0]
 
 
+def test_column_of_a_table_is_copied() -> None:
+    column = xr.DataArray(np.arange(3.0))
+    bands = dataclasses.replace(thud.get_bands(), centre=column)
+    column += 1
+    assert bands.centre.tolist() == [0.0, 1.0, 2.0]
+
+
 def test_read_only_array_of_a_caller_is_copied() -> None:
     time = np.arange(3.0)
     time.setflags(write=False)

@@ -32,6 +32,7 @@ from thud.recordings.signal import Signal
 from thud.recordings.units import Calibration
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -379,6 +380,84 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
     assert re.search(naming("times", "1e-06 s"), step)
 
 
+def table_of(row: Callable[[int, float, float], str]) -> str:
+    """Return the lines of a table from row, time and force."""
+    pulse = half_sine(8000.0)
+    return "".join(row(i, i / 8000, v) + "\n" for i, v in enumerate(pulse))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        # A cell that cannot be read makes no column one of words.
+        (
+            "t;F [N];G [N]\n"
+            + table_of(lambda i, t, v: f"{t:.6f};{'' if i else '---'}{v:.1f};{v:.1f}"),
+            naming("line 3", "column 2", "line 2"),
+        ),
+        (
+            "t;F [N];state\n"
+            + table_of(lambda i, t, v: f"{t:.6f};{v:.1f};{'5' if i == 6 else 'ok'}"),
+            naming("line 8", "column 3", 5, "line 2"),
+        ),
+        # No row above the first number is left out.
+        (
+            "t;F [N]\n" + table_of(lambda i, t, v: f"{t:.6f};{v:.1f}" if i > 4 else f"{t:.6f};---"),
+            naming("line 2", "'---'"),
+        ),
+        (
+            "t;F [N]\n" + table_of(lambda i, t, v: f"{t:.6f};{v:.1f}" if i > 4 else f"---;{v:.1f}"),
+            naming("line 2", "'---'"),
+        ),
+        # Commas that separate and are decimal marks.
+        (
+            "t,F\n" + table_of(lambda _, t, v: f"{t:.6f},{v:.1f}".replace(".", ",")),
+            naming("line 2", "decimal marks"),
+        ),
+        (
+            table_of(lambda _, t, v: f"{t:.6f},{v:.1f}".replace(".", ",")),
+            naming("line 1", "decimal marks"),
+        ),
+        (
+            "fs: 8000\n" + table_of(lambda _, t, v: f"{v:.0f},{v / 2:.0f}"),
+            naming("line 2", "decimal marks"),
+        ),
+        (
+            "fs: 8000\n" + table_of(lambda _, t, v: f'"{1 + v // 10:.0f}.000"'),
+            naming("line 2", "'1.000'", 1000),
+        ),
+        (
+            "a,b\n" + table_of(lambda i, t, v: f'"{i}","{1 + v // 10:.0f}.000"'),
+            naming("line 2", "'1.000'", 1000),
+        ),
+        # The rate of the header has either mark.
+        ("fs: 51,200 kHz\nF\n" + table_of(lambda _, t, v: f"{v:.0f}"), naming("sample rate")),
+    ],
+)
+def test_tables_that_may_be_read_in_two_ways_are_refused(
+    text: str, words: str, tmp_path: Path
+) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    assert re.search(words, refusal(tmp_path / "t.csv"))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "fs: 8000\n" + table_of(lambda _, t, v: f"{v:.3f}".replace(".", ",")),
+        "fs: 8000\n" + table_of(lambda _, t, v: f"{v:.1f}".replace(".", ",").removesuffix(",0")),
+        "fs: 8000\nF [N],G\n" + table_of(lambda _, t, v: f"{v:.0f},0"),
+        "fs: 8000\n" + table_of(lambda _, t, v: f"{v:.0f},-1,-2"),
+        "fs: 8.000 Hz\n" + table_of(lambda _, t, v: f"{v:.3f}".replace(".", ",")),
+    ],
+)
+def test_commas_between_numbers(text: str, tmp_path: Path) -> None:
+    (tmp_path / "t.csv").write_text(text)
+    signal, force = read_all(tmp_path / "t.csv", channel=1)
+    assert signal.sample_rate == 8000
+    np.testing.assert_allclose(force, half_sine(8000.0), atol=0.5)
+
+
 def test_date_of_a_broadcast_file(tmp_path: Path) -> None:
     path = tmp_path / "plate.wav"
     soundfile.write(path, half_sine(8000.0) / 5000, 8000, "PCM_24")
@@ -604,20 +683,20 @@ def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
         ("", naming("empty")),
         ("a,b\nc,d\n", naming("numbers")),
         ("time;force\n0;0\n1;2 N\n", naming("line 3", "'2 N'")),
-        ("0,001,5,2\n0,002,5\n", naming("line 2", 3, 4)),
-        ("1,0\n2,\n", naming("line 2", "''")),
-        ("0,1\n1,2\n", naming("2 rows")),
-        ("".join(f"{i**2},1\n" for i in range(9)), naming("row", 0.12)),
-        ("".join(f"{-i},1\n" for i in range(9)), naming("-1 s", "1000 s")),
-        ("".join("0,1\n" for _ in range(9)), naming("0 s", "1000 s")),
-        ("".join(f"{i},1\n" for i in range(9)), naming("rate", "1 Hz")),
+        ("0.5,1,5,2\n0.5,2,5\n", naming("line 2", 3, 4)),
+        ("1.5,0\n2,\n", naming("line 2", "''")),
+        ("0;1\n1;2\n", naming("2 rows")),
+        ("".join(f"{i**2};1\n" for i in range(9)), naming("row", 0.12)),
+        ("".join(f"{-i};1\n" for i in range(9)), naming("-1 s", "1000 s")),
+        ("".join("0;1\n" for _ in range(9)), naming("0 s", "1000 s")),
+        ("".join(f"{i};1\n" for i in range(9)), naming("rate", "1 Hz")),
         ("".join(f"{i / 8000},7\n" for i in range(9)), naming("samples", 7)),
         ("F_N\n" + "".join(f"{i}\n" for i in range(9)), naming("sample_rate")),
         ("x" * 100_000, naming("line 1", "65536 characters")),
         ("head\n" * 3000 + "1,2\n", naming("numbers")),
-        (",".join("1" * 400) + "\n", naming("400 columns")),
+        (";".join("1" * 400) + "\n", naming("400 columns")),
         ("1,2\n\0\n", naming("text")),
-        ("1e999,2\n" * 9, naming("finite")),
+        ("1e999;2\n" * 9, naming("finite")),
     ],
 )
 def test_useless_tables_are_told(text: str, words: str, tmp_path: Path) -> None:

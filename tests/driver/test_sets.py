@@ -149,6 +149,10 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("height\n" + "1," * 300 + "1\n", naming("line 2", 256, 64)),
         ("height\n1e400\n", naming("line 2", "height", "'1e400'")),
         ("height\n" + "1" * 5000 + "\n", naming("line 2", 4096)),
+        ("height;mass\n1;1,575\n", naming("line 2", "'1,575'", "1575")),
+        ('height,mass\n1,"1,575"\n', naming("line 2", "'1,575'", "1575")),
+        ("height;mass\n1.5;2\n1;2,5\n", naming("line 3", "'2,5'")),
+        ("height;mass\n0,5;2.5\n", naming("line 2", "'2.5'")),
         ("height,mass\n1" + " " * 5000 + ",99\n", naming("line 2", 4096)),
     ],
 )
@@ -192,6 +196,8 @@ def test_bad_arguments_are_refused(
         "height\twall_thickness\tmomentum_flux\n1,0\t0,032\tnone\n1,2\t0,03\tretarding\n",
         "height wall_thickness  momentum_flux\n 1.0  0.032 none # first\n1.2 0.03 'retarding'\n",
         '"height", "wall_thickness", momentum_flux\n1.0, 0.032, NONE\n1.2, 3e-2, retarding\n',
+        "height;wall_thickness;momentum_flux\n1,000;0,032;none\n1,200;0,03;retarding\n",
+        'height,wall_thickness,momentum_flux\n"1,000","0,032",none\n"1,2","0,03",retarding\n',
     ],
 )
 def test_tables_are_read_as_records_are(run: Run, case: Path, tmp_path: Path, text: str) -> None:

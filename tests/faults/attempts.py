@@ -9,6 +9,7 @@ import json
 import os
 import queue
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -149,6 +150,9 @@ def _make(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[Fin
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             may_stop = part.may_stop and isinstance(late, KeyboardInterrupt)
             made += 1
+            # Its own end may have been what was interrupted.
+            for path in Path().iterdir():
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
             yield Finding("stopped" if may_stop else "hung", traceback.format_exc())
         except Exception:  # noqa: BLE001 - that is the question
             signal.signal(signal.SIGINT, signal.SIG_IGN)

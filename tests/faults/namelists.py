@@ -46,8 +46,6 @@ RADIATORS = ("plate", "floating_floor", "joist_floor")
 NEEDED = (
     "modes", "mesh", "room", "compression", "measured_modes", "measured_mobility", "hunt_crossley",
 )  # fmt: skip
-# Samples, and elements of a mesh, up to which a case is computed.
-MANY_SAMPLES, MANY_ELEMENTS = 20_000, 64
 NO_NUMBER = re.compile(rb"(?i)(?<![a-z_])(nan|inf|infinity)(?![a-z_])|\*\*\*")
 
 
@@ -87,7 +85,7 @@ def _tried(path: Path, effective: bytes, chance: random.Random) -> tuple[str, st
         fraction = MEAN_TIME / (cost + FILE_TIME)
     if any(b"'%s'" % floor.encode() in effective for floor in RADIATORS):
         fraction *= OVER_RADIATOR
-    if dice > fraction or not _is_small(effective):
+    if dice > fraction:
         return "accepted", ""
     # With sanitizers all takes ten times as long.
     if SANITIZED and chance.random() < 0.8:
@@ -106,15 +104,6 @@ def _effective(text: bytes) -> bytes:
     finally:
         path.unlink()
     return found
-
-
-def _is_small(effective: bytes) -> bool:
-    """Return whether a case is quickly computed."""
-    lines = re.findall(rb"^ +(\w+) += (\d[-+.\deE]*)", effective, re.MULTILINE)
-    given = {key.decode(): float(value) for key, value in lines}
-    samples = given.get("sample_rate", 0) * given.get("duration", 0)
-    elements = given.get("radial_elements", 0) * given.get("polar_elements", 0)
-    return samples * given.get("substeps", 0) <= MANY_SAMPLES and elements <= MANY_ELEMENTS
 
 
 def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> tuple[str, str]:

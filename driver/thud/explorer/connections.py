@@ -22,15 +22,22 @@ if TYPE_CHECKING:
 
     from starlette.applications import Starlette
 
-# Connections at a time. As many again may be accepted before those that are too many are closed,
-# and works need files, too.
-MAX_CONNECTIONS = 500
-if (_files := resource.getrlimit(resource.RLIMIT_NOFILE)[0]) != resource.RLIM_INFINITY:
-    MAX_CONNECTIONS = min(MAX_CONNECTIONS, _files // 4)
-# Time in which a connection has to send the head of its next request, s.
+# Time in which a connection has to send the head of its next request, or to read of its answer, s.
 HEAD_TIME = 10
 # Time in which messages of one kind are logged once, s.
 SILENCE = 60.0
+
+
+def _max_connections() -> int:
+    """Return the number of connections at a time.
+
+    As many again may be accepted before those that are too many are closed, and works need files.
+    """
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return 500 if files == resource.RLIM_INFINITY else min(500, files // 4)
+
+
+MAX_CONNECTIONS = _max_connections()
 
 
 def run_server(application: Starlette, listener: socket.socket, folder: Path) -> None:
@@ -77,7 +84,7 @@ class _Server(Server):
 
 
 class _Connection(H11Protocol):
-    """A connection that has to send each head in time.
+    """A connection that has to send each head, and to read each answer, in time.
 
     Where there are too many, the one that has waited for a head the longest makes room.
     """
@@ -97,6 +104,14 @@ class _Connection(H11Protocol):
             oldest = min(waiting, key=lambda one: waiting[one])
             self.connections.discard(oldest)
             oldest.transport.abort()
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._unread = self.loop.call_later(HEAD_TIME, self.transport.abort)
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._unread.cancel()
 
     def data_received(self, data: bytes) -> None:
         # The base class gives up the end of the wait at the first byte of a head.

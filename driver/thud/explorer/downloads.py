@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.case import check_case
-from thud.checks import refuse
+from thud.checks import refuse, require_number, shown
 from thud.comparison import compare
 from thud.explorer.answer import new_case
 from thud.impact import compute
@@ -62,8 +62,7 @@ def report(values: Values) -> bytes:
 
 def study(values: Values) -> bytes:
     """Return the file of a sweep over the keys that were moved, between the ends of their moves."""
-    moves = dict(values.pop(MOVED, {}))
-    moved = {key: (float(min(ends)), float(max(ends))) for key, ends in moves.items()}
+    moved = _moves(values.pop(MOVED, {}))
     case = new_case(values)
     check_case(case)
     names = {f"{key.group}.{key.name}": name for name, key in known_keys(users(case)).items()}
@@ -85,6 +84,18 @@ def study(values: Values) -> bytes:
         ends = [round(low), round(high)] if key.kind == "whole" else [low, high]
         lines.append(f'"{name}" = {{ low = {ends[0]!r}, high = {ends[1]!r}{count} }}')
     return ("\n".join(lines) + "\n").encode()
+
+
+def _moves(moved: object) -> dict[str, tuple[float, float]]:
+    """Return the smallest and the largest value of each key that was moved."""
+    if not isinstance(moved, dict):
+        refuse(f"{MOVED} = {shown(moved)} holds no keys", "the ends of the moves by group.key")
+    for key, ends in moved.items():
+        if not isinstance(ends, list) or len(ends) != 2:  # noqa: PLR2004
+            refuse(f"{MOVED}: {key} = {shown(ends)} is no pair", "two numbers")
+        for end in ends:
+            require_number(f"{MOVED}: {key}", end)
+    return {key: (float(min(ends)), float(max(ends))) for key, ends in moved.items()}
 
 
 def _count(key: Key, low: float, high: float) -> int:

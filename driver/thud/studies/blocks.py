@@ -226,7 +226,9 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
                 _require_whole(path)
                 # Whole files are renamed to this name, so that no lock is needed; some file
                 # systems have none.
-                dataset = xr.open_dataset(path, engine="h5netcdf", driver_kwds={"locking": False})
+                dataset = xr.open_dataset(
+                    path, engine="h5netcdf", driver_kwds={"locking": False}, phony_dims="access"
+                )
         with dataset:
             yield dataset
 

@@ -57,6 +57,8 @@ UNUSUAL = {
     ".": re.compile(rf'["#{GROUPING.strip(" ")}]'),
     ",": re.compile(rf'["#{GROUPING.strip(" ")}.]|,(?!\d)'),
 }
+# What shows a decimal comma, as 1,05 and -0,5.
+DECIMAL_COMMA = re.compile(r"[-+]?\d+,0\d|[-+]0,")
 # Between names and values of a header; lines of titles and units.
 PAIR = re.compile(r"[:=\t;,]")
 MOST_TITLES = 3
@@ -70,7 +72,10 @@ ALLOWED = (
 
 @dataclass
 class _Table:
-    """Lines of a file, sorted into header, titles and numbers."""
+    """Lines of a file, sorted into header, titles and numbers.
+
+    Its only column has decimal commas, where it has commas.
+    """
 
     name: str
     separator: str | None = None
@@ -80,6 +85,7 @@ class _Table:
     first: int = 1
     width: int = 0
     used: list[int] = field(default_factory=list)
+    has_commas: bool = False
 
     def cells(self, line: str) -> list[str]:
         """Return the cells of a line of numbers."""
@@ -104,6 +110,8 @@ def read_channels(path: Path) -> list[Channel]:
         rows = _rows(_lines_of_numbers(text, table), table)
         table.decimal = find_decimal(rows, table.separator, table.name)
         text.seek(0)
+        _require_separators(_lines_of_numbers(text, table), table)
+        text.seek(0)
         values = _read_numbers(_lines_of_numbers(text, table), table)
     return _channels(table, values)
 
@@ -113,12 +121,41 @@ def _lines_of_numbers(text: TextIO, table: _Table) -> Iterator[str]:
     return itertools.islice(read_lines(text, table.name, ALLOWED), table.first - 1, None)
 
 
-def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str]]]:
-    """Yield number and numeric cells of the lines that may show the decimal mark."""
+def _rows(lines: Iterator[str], table: _Table) -> Iterator[tuple[int, list[str], bool]]:
+    """Yield number and numeric cells of the lines that may show the decimal mark, and quotes."""
     for number, line in enumerate(lines, table.first):
         if "." in line or "," in line:
             cells = table.cells(line)
-            yield number, [cells[i] for i in table.used if i < len(cells)]
+            yield number, [cells[i] for i in table.used if i < len(cells)], '"' in line
+
+
+def _require_separators(lines: Iterator[str], table: _Table) -> None:
+    """Raise InputError where commas may separate columns as well as be decimal marks."""
+    if table.has_commas:
+        # Nobody writes whole numbers as 05 or -0.
+        texts = filter(None, map(strip_comment, lines))
+        if any("," not in text or DECIMAL_COMMA.match(text) for text in texts):
+            return
+    elif table.separator != "," or table.decimal.line or _has_titles(table):
+        return
+    else:
+        # What begins with a sign is no decimal fraction.
+        signed = {0}
+        for line in lines:
+            if '"' in line or "." in line:
+                return
+            signed |= {i for i, cell in enumerate(table.cells(line)) if cell[:1] in {"-", "+"}}
+            if len(signed) == table.width:
+                return
+    refuse(
+        f"{table.name}: line {table.first}: the commas may separate columns or be decimal marks",
+        "a title for each column, decimal points, or semicolons between columns",
+    )
+
+
+def _has_titles(table: _Table) -> bool:
+    """Whether the columns of a table have titles."""
+    return any(any(cells) for cells in table.titles)
 
 
 def _read_header(lines: Iterator[str], table: _Table) -> None:
@@ -135,10 +172,24 @@ def _read_header(lines: Iterator[str], table: _Table) -> None:
             _sort_header(above, table)
             if table.separator == "," and _is_one_column(text, table):
                 table.separator, table.width, table.used = ";", 1, [0]
+                table.has_commas = True
                 _sort_header(above, table)
+            _require_rows(above, table)
             return
         above.append(line)
     refuse(f"{table.name}: cannot be read (no numbers)", ALLOWED)
+
+
+def _require_rows(above: list[str], table: _Table) -> None:
+    """Raise InputError where a line above the numbers is one of them that cannot be read."""
+    for number, line in enumerate(above, 1):
+        cells = table.cells(line)
+        if line.lstrip()[:1] in COMMENTS or len(cells) != table.width:
+            continue
+        is_row = not any(map(str.isalpha, cells[0])) and any(map(is_number, cells))
+        if is_row or is_number(cells[0]):
+            wrong = next(cell for cell in cells if not is_number(cell))
+            refuse(f"{table.name}: line {number}: {shown_text(wrong)!r} is not a number", ALLOWED)
 
 
 def _is_one_column(text: str, table: _Table) -> bool:
@@ -171,7 +222,10 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
         refuse(f"{table.name}: {table.width} columns", f"up to {MOST_COLUMNS}")
     blocks: list[NDArray[np.float64]] = []
     number, count = table.first, 0
+    words = sorted({*range(table.width)} - {*table.used})
     while block := list(itertools.islice(lines, BLOCK)):
+        if words:
+            _require_words(block, number, words, table)
         values = _convert(block, table)
         if values is None:
             values = _convert_each(block, number, table)
@@ -183,6 +237,19 @@ def _read_numbers(lines: Iterator[str], table: _Table) -> dict[int, NDArray[np.f
                 "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
             )
     return {i: np.concatenate([block[:, k] for block in blocks]) for k, i in enumerate(table.used)}
+
+
+def _require_words(block: list[str], first: int, words: list[int], table: _Table) -> None:
+    """Raise InputError where a column that began with a word has a number."""
+    for number, line in enumerate(block, first):
+        cells = table.cells(line)
+        found = next((i for i in words if i < len(cells) and is_number(cells[i])), None)
+        if found is not None:
+            refuse(
+                f"{table.name}: line {number}: column {found + 1} has the number "
+                f"{shown_text(cells[found])} and none in line {table.first}",
+                "columns of numbers or of words",
+            )
 
 
 def _convert(block: list[str], table: _Table) -> NDArray[np.float64] | None:
@@ -232,7 +299,7 @@ def _channels(table: _Table, values: dict[int, NDArray[np.float64]]) -> list[Cha
         what = f"{rows} rows of {len(numeric)} numbers"
         refuse(f"{table.name}: {what}", f"{SHORTEST} rows or more of numbers")
     titles, units = _titles(table, table.width)
-    rate = find_rate(table.header, table.decimal.mark)
+    rate = find_rate(table.header, table.decimal.mark if table.decimal.line else "")
     steps: tuple[str, ...] = ()
     time = next((i for i in numeric if is_time(titles[i]) or _is_time_unit(units[i])), None)
     if time is None and len(numeric) > 1 and (rate is None or _are_times(values[numeric[0]])):
