@@ -36,7 +36,12 @@ def main() -> int:
     _open_screen()
     # Figures are written to files, whatever else is set.
     os.environ["MPLBACKEND"] = "agg"
-    from thud.cli import main as run  # noqa: PLC0415 - takes its time
+    try:
+        from thud.cli import main as run  # noqa: PLC0415 - takes its time
+    except (ImportError, MemoryError) as error:  # such as under a limit of memory
+        reason = " ".join(str(error).split())[:200] or "out of memory"
+        sys.stderr.write(f"thud-driver: a library cannot be loaded ({reason})\n")
+        return 1
 
     # Coroutines that an interrupt ends would say that nobody has awaited them.
     warnings.filterwarnings("ignore", "coroutine ")

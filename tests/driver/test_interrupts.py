@@ -219,6 +219,13 @@ def test_executable_ends_sets_and_leaves_nothing(
     assert not list((tmp_path / "outputs").iterdir())
 
 
+def test_library_that_cannot_be_loaded_is_one_sentence() -> None:
+    code = "import sys, thud_driver; sys.modules['numpy'] = None; sys.exit(thud_driver.main())"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert re.fullmatch(r"thud-driver: .*numpy.*\n", done.stderr)
+
+
 @pytest.mark.parametrize("delay", [0.0, 0.1, 0.2, 0.4])
 def test_interrupt_at_the_start_of_the_driver_is_one_sentence(delay: float, tmp_path: Path) -> None:
     (tmp_path / "long.nml").write_text(LONG)
