@@ -137,7 +137,8 @@ def read_covering(folder: Path, new_trees: Callable[[], list[Tree]]) -> Covering
             measured = [(*line, job) for line in _core_lines(tree, place)], {job: 0.0}
         else:
             measured = _python_file(tree, job, place)
-        shutil.rmtree(place)
+        # Processes that a test has left may still write.
+        shutil.rmtree(place, ignore_errors=True)
         _record(records, job).write_text(json.dumps(measured))
 
     if missing:
