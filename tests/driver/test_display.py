@@ -73,6 +73,10 @@ def test_texts_name_verdicts_and_numbers() -> None:
     assert shell.rows()[-1] == ("all criteria", "", "", "does not conform")
     many = thud.solve_many({"mass": [2.5, -1.0]})
     assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 1 failed>"
+    many = thud.solve_many({"mass": [-1.0, -2.0]})
+    assert repr(many) == "<Ensemble: 2 drops by mass; 0 conform, 2 failed>"
+    many = thud.solve_many({"mass": [2.4, 2.5]}, levels=False)
+    assert repr(many) == "<Ensemble: 2 drops by mass; not judged>"
     assert repr(thud.Case("one", model=None, modes=thud.Modes())) == "<Case one: free modes>"
 
 

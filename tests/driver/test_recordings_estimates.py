@@ -488,6 +488,30 @@ def test_clipping_is_refused() -> None:
         drops(np.minimum(force, 1200), 48e3)
 
 
+@pytest.mark.parametrize("slopes", [(1, 2), (2, 1)])
+@pytest.mark.parametrize("half", [12, 13])
+def test_flat_top_is_clipped_where_the_force_beside_it_falls(
+    slopes: tuple[int, int], half: int
+) -> None:
+    # Half its length beside the top the force has fallen by 12 digits of 1 N, or by more.
+    rise, fall = slopes
+    force = np.concatenate(
+        [
+            np.zeros(9600),
+            np.arange(0.0, 1400.0, rise),
+            np.full(2 * half, 1400.0),
+            np.arange(1400.0 - fall, 0.0, -fall),
+            np.zeros(9600),
+        ]
+    )
+    (window,) = find_windows(Signal.from_array(force, 48e3, "file.wav"))
+    if half == 12:
+        repair(window)
+    else:
+        with pytest.raises(thud.InputError, match=naming("clip", "1400 N")):
+            repair(window)
+
+
 def test_coarse_digits_are_no_clipping() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=96e3)
     (drop,) = drops(np.round(force / 2) * 2, 96e3)

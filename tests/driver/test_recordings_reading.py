@@ -11,6 +11,7 @@ import time
 import tomllib
 import tracemalloc
 import zlib
+from contextlib import nullcontext
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +30,7 @@ from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
 from thud.recordings.reading import open_signals
 from thud.recordings.signal import Signal
-from thud.recordings.units import Calibration
+from thud.recordings.units import Calibration, newtons_per_unit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -301,6 +302,18 @@ def test_calibrations_lead_to_newtons(
     assert signal.full_scale == pytest.approx(newtons)
     known = calibration.uncertainty if isinstance(calibration, Calibration) else None
     assert signal.calibration_uncertainty == known
+
+
+@pytest.mark.parametrize(
+    ("calibration", "is_refused"),
+    [(1.1e-30, False), (0.9e-30, True), (-0.9e30, False), (1.1e30, True), ("1.1e30 N/V", True)],
+)
+def test_calibrations_have_a_possible_size(
+    calibration: float | str, is_refused: bool
+) -> None:
+    context = pytest.raises(InputError, match=naming("calibration")) if is_refused else nullcontext()
+    with context:
+        newtons_per_unit("V", calibration, None, "plate.wav")
 
 
 def test_channels_are_found_by_number_and_name(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import re
 import resource
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -148,11 +149,15 @@ def test_files_of_the_user_survive(
     assert names_in(out.parent) == ["case"]
 
 
-def test_permissions_of_the_directory_stay(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir(mode=0o700)
+@pytest.mark.parametrize("mode", [0o700, 0o755, 0o2775, 0o1777])
+def test_permissions_of_the_directory_stay(
+    run: Run, case_file: CaseFile, tmp_path: Path, mode: int
+) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out").chmod(mode)
     for _ in range(2):
         assert run(case_file(MINIMAL), "-o", "out").returncode == 0
-        assert (tmp_path / "out").stat().st_mode & 0o777 == 0o700
+        assert stat.S_IMODE((tmp_path / "out").stat().st_mode) == mode
 
 
 def test_stale_figures_do_not_stand_beside_new_results(
