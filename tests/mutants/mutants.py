@@ -121,7 +121,9 @@ def main() -> int:
     def new_trees(name: str, flags: str) -> list[Tree]:
         return [Tree(FOLDER / f"{name}-{n}", flags) for n in range(width)]
 
-    covering = read_covering(FOLDER, partial(new_trees, "coverage", "-O1 --coverage"))
+    # The executable ends by _exit, which would write no counts.
+    flags = "-O1 --coverage -D_exit=exit"
+    covering = read_covering(FOLDER, partial(new_trees, "coverage", flags))
     trees = new_trees("tree", "-O1")
     record = FOLDER / f"seed-{options.seed}.json"
     known: dict[str, str] = json.loads(record.read_text()) if record.exists() else {}
