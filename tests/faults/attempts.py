@@ -128,9 +128,9 @@ def _observe(name: str, part: Part, seeds: list[int], folder: Path) -> Iterator[
         left += open_now - handles if handles is not None else ()
         if left:
             found = Finding("left behind", f"{left}; {word}: {detail}")
-        is_large = usual is not None and memory > usual + GROWTH and not SANITIZED
         # What was stopped may have been a large case.
-        if is_large and found.word != "stopped":
+        may_grow = SANITIZED or found.word == "stopped"
+        if usual is not None and memory > usual + GROWTH and not may_grow:
             found = Finding("grown", f"{(memory - usual) / 2**20:.0f} MiB; {word}: {detail}")
         handles, usual, silent = open_now, max(memory, usual or memory), os.fstat(2).st_size
         yield found
