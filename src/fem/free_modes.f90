@@ -24,9 +24,6 @@ module thud_free_modes
    !> Maximum number of restarts of the Lanczos method; a few are needed.
    integer, parameter :: max_restarts = 300
 
-   !> Marks a failure of the operator among ARPACK's own.
-   integer, parameter :: volume_lost = -1000
-
    !> Highest harmonic that a mode is looked for in.
    integer, parameter :: max_harmonic = 64
 
@@ -159,16 +156,33 @@ contains
             end select
          end associate
       end do iterations
-      if (failed .or. is_interrupted()) info = volume_lost
       allocate (vector(n, count))
-      if (info == 0) call dseupd(.true., 'A', select, eigenvalue, vector, n, matrices%shift, 'G', n, 'LM', count, &
-         eigenvalue_tolerance, resid, ncv, basis, n, iparam(1:7), ipntr, workd, workl, size(workl), info)
+      if (info == 0 .and. .not. (failed .or. is_interrupted())) call dseupd(.true., 'A', select, eigenvalue, vector, n, &
+         matrices%shift, 'G', n, 'LM', count, eigenvalue_tolerance, resid, ncv, basis, n, iparam(1:7), ipntr, workd, &
+         workl, size(workl), info)
       !$omp end critical (arpack)
+      call check_eigenpairs(failed, info, error)
+   end subroutine find_eigenpairs
+
+   !> Refuses what an interrupt, the operator or ARPACK has ended.
+   subroutine check_eigenpairs(failed, info, error)
+      !> The volume could not be kept.
+      logical, intent(in) :: failed
+      !> Status of ARPACK, 0 where it succeeded.
+      integer, intent(in) :: info
+      !> Names what has ended it.
+      type(error_type), allocatable, intent(out) :: error
+
       call check_interrupt(error)
       if (allocated(error)) return
-      if (info /= 0) error = numerical_error('&modes: the Lanczos method fails (info = '//to_text(info) &
-         //' of ARPACK); allowed: fewer modes, or a finer mesh')
-   end subroutine find_eigenpairs
+      if (failed) then
+         error = numerical_error('&ball: at poisson_ratio = 0.5 the volume of a wall so thin is not kept in double ' &
+            //'precision; allowed: a larger wall_thickness, or a lower poisson_ratio')
+      else if (info /= 0) then
+         error = numerical_error('&modes: the Lanczos method fails (info = '//to_text(info) &
+            //' of ARPACK); allowed: fewer modes, or a finer mesh')
+      end if
+   end subroutine check_eigenpairs
 
    !> Shape, harmonic and participation of one mode.
    subroutine describe(ball, matrices, vector, mesh, shape, harmonic, participation)
