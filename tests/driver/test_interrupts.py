@@ -172,23 +172,32 @@ except KeyboardInterrupt:
     assert done.returncode == 7
 
 
-def test_processes_forked_beside_short_calls_have_no_locked_libraries() -> None:
-    code = """
+@pytest.mark.parametrize(
+    ("work", "forks"),
+    [("thud.solve_case(case)", 60), ("check_case(case)", 300)],
+    ids=["solve", "check"],
+)
+def test_processes_forked_beside_short_calls_have_no_locked_libraries(
+    work: str, forks: int
+) -> None:
+    code = f"""
 import os, signal, threading, thud
+from thud.case import check_case
 case = thud.Case(model=thud.ModalBall(rings=20))
-force = thud.solve_case(case).peak_force
 
 def compute():
     while True:
-        thud.solve_case(case)
+        {work}
 
+{work}
 for _ in range(2):
     threading.Thread(target=compute, daemon=True).start()
-for _ in range(60):
+for _ in range({forks}):
     child = os.fork()
     if not child:
         signal.alarm(20)
-        os._exit(thud.solve_case(case).peak_force != force)
+        {work}
+        os._exit(0)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if code:
         os._exit(abs(code))
