@@ -149,10 +149,10 @@ contains
       logical :: valid, converged
 
       if (length < impact%stages%interval) then
-         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%scale, impact%motion, end, &
-            valid, converged)
+         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%time, impact%scale, &
+            impact%motion, end, valid, converged)
       else
-         call take_coupled_step(source, impact%stages, impact%scale, impact%motion, end, valid, converged)
+         call take_coupled_step(source, impact%stages, impact%time, impact%scale, impact%motion, end, valid, converged)
       end if
       if (.not. valid) then
          error = source%get_failure(drop, impact%time, get_relative_state(source, impact%motion))

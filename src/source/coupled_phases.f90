@@ -62,8 +62,8 @@ contains
             state = get_relative_state(source, motion)
             slower = state
             slower(2) = state(2) - length
-            call source%get_derivative(0.0_wp, state, rate, valid)
-            call source%get_derivative(0.0_wp, slower, slower_rate, valid)
+            call source%get_derivative(impact%time, state, rate, valid)
+            call source%get_derivative(impact%time, slower, slower_rate, valid)
             change = (rate(place) - motion%force) &
                /(1 + impact%receiver%direct*(rate(place) - slower_rate(place))/(state(2) - slower(2)))
             if (abs(change) <= epsilon(change)*abs(motion%force)) exit
