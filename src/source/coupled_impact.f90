@@ -53,7 +53,8 @@ contains
       impact%motion%motion = new_receiver_motion(receiver)
       allocate (impact%motion%displacement(source%n_mass), impact%motion%acceleration(source%n_mass), source=0.0_wp)
       allocate (impact%motion%velocity(source%n_mass), source=history%impact_velocity)
-      call begin_contact(source, impact)
+      call begin_contact(source, impact, error)
+      if (allocated(error)) return
       do i = 1, n
          call record(source, impact, i, history)
          if (i == n) exit
@@ -101,7 +102,8 @@ contains
          end if
          call go_to_event(source, drop, event, end, left, impact, error)
          if (allocated(error)) return
-         call pass_event(source, event, impact, history)
+         call pass_event(source, event, impact, history, error)
+         if (allocated(error)) return
          if (.not. left > 0.0_wp) return
       end do
       error = coarse_error(to_text(max_events)//' touches, releases and turning points fall into one step')
