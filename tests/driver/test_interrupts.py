@@ -121,6 +121,43 @@ def test_driver_that_waits_for_another_writer_can_be_ended(tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
+def test_threads_of_the_blas_are_those_of_the_process_after_a_call() -> None:
+    code = """
+import ctypes, sys, numpy as np, thud
+with open("/proc/self/maps", encoding="utf-8") as file:
+    paths = {line.split(maxsplit=5)[-1].strip() for line in file if "openblas" in line}
+libraries = [ctypes.CDLL(path) for path in sorted(paths)]
+blas = [library for library in libraries if hasattr(library, "openblas_set_num_threads")]
+if not blas:
+    sys.exit(3)
+for library in blas:
+    library.openblas_set_num_threads(2)
+before = [library.openblas_get_num_threads() for library in blas]
+for work in (
+    lambda: thud.solve(model="modal_ball"),
+    lambda: thud.solve(drop=thud.Drop(height=1000.0), model="modal_ball"),
+    lambda: thud.solve_many({"height": [0.9, 1.0]}, thud.Case(model=thud.ModalBall()), threads=2),
+    lambda: thud.solve_many({"height": np.linspace(0.9, 1.0, 40)}, threads=2),
+    lambda: thud.free_modes(radial_elements=2, polar_elements=32),
+):
+    try:
+        work()
+    except thud.ThudError:
+        pass
+    assert [library.openblas_get_num_threads() for library in blas] == before
+"""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        check=False,
+        env=environment,
+        timeout=6 * LIMIT,
+    )
+    if done.returncode == 3:
+        pytest.skip("no OpenBLAS whose threads can be counted")
+    assert done.returncode == 0
+
+
 def test_interrupt_ends_calls_in_other_threads() -> None:
     with ThreadPoolExecutor(2) as threads:
         futures = [threads.submit(WORK["finite elements"]) for _ in range(2)]
