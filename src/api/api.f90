@@ -69,10 +69,12 @@ contains
       type(bundle_type), pointer :: bundle
       type(error_type), allocatable :: error
 
+      call begin_call()
       allocate (bundle)
       call bundle%add_text('version', version)
       call bundle%add_text('compiler', trim(get_compiler()))
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine describe_library
 
    !> The full input of a namelist file.
@@ -87,6 +89,7 @@ contains
       type(error_type), allocatable :: error
       character(len=:), allocatable :: text
 
+      call begin_call()
       allocate (bundle)
       call load_case(path, case, error)
       if (.not. allocated(error)) then
@@ -94,6 +97,7 @@ contains
          call bundle%add_text('case', text)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine effective_case
 
    !> Whether the text of a namelist file is a case.
@@ -107,9 +111,11 @@ contains
       type(case_type), target :: case
       type(error_type), allocatable :: error
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine check_text
 
    !> The impact of a case.
@@ -125,13 +131,13 @@ contains
       type(results_type) :: results
       type(error_type), allocatable :: error
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (.not. allocated(error)) call add_results(bundle, case, results)
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine solve
 
    !> Free modes of the ball of a case.
@@ -147,14 +153,14 @@ contains
       type(results_type) :: results
       type(error_type), allocatable :: error
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       call read_case(text, 'python', case, error)
       case%has_impact = .false.
       if (.not. allocated(error)) call compute_case(case, results, error)
       if (.not. allocated(error)) call add_results(bundle, case, results)
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine free_modes
 
    !> Slow compression of the ball of a case.
@@ -170,13 +176,13 @@ contains
       type(compression_type) :: compression
       type(error_type), allocatable :: error
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call compress_case(case, compression, error)
       if (.not. allocated(error)) call add_compression(bundle, compression)
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine compress
 
    !> Loss factor of the material of a case against frequency.
@@ -197,6 +203,7 @@ contains
       type(error_type), allocatable :: error
       real(wp) :: loss_factor(n)
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) then
@@ -206,6 +213,7 @@ contains
       end if
       if (.not. allocated(error)) call bundle%add_array('loss_factors', [n], loss_factor)
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine loss_factors
 
    !> Runs a namelist file as the executable does, and keeps what it has computed.
@@ -228,8 +236,8 @@ contains
       character(len=:), allocatable :: text
       integer :: i
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       if (progress == 1) call begin_progress()
       call run_case(path, output, replace == 1, case, results, outcome, error)
       call end_progress()
@@ -244,8 +252,8 @@ contains
          call bundle%add_number('conforms', merge(1.0_wp, 0.0_wp, outcome%conforms))
          call add_results(bundle, case, results)
       end if
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine run
 
 end module thud_api

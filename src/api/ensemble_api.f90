@@ -34,6 +34,7 @@ contains
       type(many_type) :: many
       type(error_type), allocatable :: error
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
@@ -48,6 +49,7 @@ contains
          call bundle%add_number('further', real(size(many%further_name), wp))
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine size_many
 
    !> Outcomes, levels and verdicts of drops of a case that differ in some keys.
@@ -97,8 +99,8 @@ contains
       type(error_type), allocatable :: error
       character(len=:), allocatable :: reasons
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       call read_case(text, 'python', case, error, unchecked=.true.)
       if (.not. allocated(error)) call find_columns(case, split(names, n_column), columns, error)
       if (.not. allocated(error)) then
@@ -120,8 +122,8 @@ contains
          call bundle%add_text('reasons', reasons)
          call leave_many(many)
       end if
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine drop_many
 
    !> The sentences of all drops that failed, a line for each.

@@ -46,6 +46,7 @@ contains
       type(error_type), allocatable :: error
       complex(wp) :: mobility(n)
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) then
@@ -63,6 +64,7 @@ contains
          call bundle%add_array('imaginary', [n], aimag(mobility))
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine floor_mobility
 
    !> Energy that a force gives to the floor of a case, by bands.
@@ -87,6 +89,7 @@ contains
       type(error_type), allocatable :: error
       real(wp), allocatable :: by_motion(:), by_mobility(:)
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call find_bands(set, bands, error)
@@ -97,9 +100,7 @@ contains
       end if
       if (.not. allocated(error)) then
          allocate (by_motion(size(bands)), by_mobility(size(bands)))
-         call begin_call()
          call get_injected_energies(receiver, force, velocity, sample_rate, bands, by_motion, by_mobility, error)
-         call end_call()
       end if
       if (.not. allocated(error)) then
          call bundle%add_array('frequency', shape(bands), bands%nominal)
@@ -108,6 +109,7 @@ contains
          call bundle%add_array('conductance', shape(bands), get_mean_conductances(receiver, bands))
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine floor_energies
 
    !> Velocity of a point of the floor of a case.
@@ -130,6 +132,7 @@ contains
       type(error_type), allocatable :: error
       real(wp) :: velocity(n)
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) then
@@ -139,6 +142,7 @@ contains
       end if
       if (.not. allocated(error)) call bundle%add_array('velocity', [n], velocity)
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine point_velocity
 
    !> The impact of a case on its floor alone.
@@ -154,13 +158,13 @@ contains
       type(force_history_type), allocatable :: on_floor
       type(error_type), allocatable :: error
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call drop_on_case_floor(case, on_floor, error)
       if (allocated(on_floor) .and. .not. allocated(error)) call add_history(bundle, 'on_floor.', on_floor)
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine drop_on_floor
 
    !> Level that a force causes in the room below.
@@ -183,6 +187,7 @@ contains
       type(error_type), allocatable :: error
       integer :: n(1)
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) call get_room_bands(bands, error)
@@ -212,6 +217,7 @@ contains
          call add_remarks(bundle, remarks)
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine predict_room
 
    !> The plate of a floor that radiates into the room below, at some frequencies.
@@ -233,6 +239,7 @@ contains
       real(wp) :: conductance(n_frequency)
       integer :: n(1)
 
+      call begin_call()
       allocate (bundle)
       call read_case(text, 'python', case, error)
       if (.not. allocated(error)) then
@@ -253,6 +260,7 @@ contains
          end associate
       end if
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine get_radiator
 
 end module thud_floor_api

@@ -25,9 +25,11 @@ contains
       !> Numbers of band sets, of sources with limits, and of criteria of a verdict.
       integer, intent(out) :: n_set, n_source, n_criterion
 
+      call begin_call()
       n_set = size(band_set_names)
       n_source = size(source_names)
       n_criterion = criterion_count
+      call end_call()
    end subroutine count_names
 
    !> Names of band sets and sources.
@@ -40,8 +42,10 @@ contains
       !> Sources with limits: [n_source].
       character(len=24), intent(out) :: sources(n_source)
 
+      call begin_call()
       sets = band_set_names
       sources = source_names
+      call end_call()
    end subroutine get_names
 
    !> Number of bands of a set.
@@ -55,9 +59,11 @@ contains
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
 
+      call begin_call()
       call find_bands(set, bands, error)
       n_band = size(bands)
       call get_status(error, status, message)
+      call end_call()
    end subroutine count_bands
 
    !> Bands of a set.
@@ -72,11 +78,13 @@ contains
       real(wp), intent(out) :: lower(n_band), upper(n_band)
       type(band_type) :: bands(n_band)
 
+      call begin_call()
       bands = get_set_bands(set)
       nominal = bands%nominal
       centre = bands%centre
       lower = bands%lower
       upper = bands%upper
+      call end_call()
    end subroutine get_bands
 
    !> Force exposure levels of any record.
@@ -100,12 +108,12 @@ contains
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
 
-      levels = 0.0_wp
       call begin_call()
+      levels = 0.0_wp
       call find_bands(set, bands, error)
       if (.not. allocated(error)) call get_force_exposure_levels(force, sample_rate, bands, method, levels, error)
-      call end_call()
       call get_status(error, status, message)
+      call end_call()
    end subroutine force_exposure
 
    !> Number of peaks of a force.
@@ -119,7 +127,9 @@ contains
       real(wp), intent(in) :: sample_rate
       integer, intent(out) :: n_peak
 
+      call begin_call()
       n_peak = get_peak_count(force, sample_rate)
+      call end_call()
    end subroutine count_peaks
 
    !> A force as force plates record it: the part below 1.25 kHz.
@@ -134,7 +144,9 @@ contains
       !> The part, N: [n_sample].
       real(wp), intent(out) :: recorded(n_sample)
 
+      call begin_call()
       call get_low_pass(force, sample_rate, recorded_band, recorded)
+      call end_call()
    end subroutine record_force
 
    !> Criteria of a source and which of them are met.
@@ -165,6 +177,7 @@ contains
       type(source_limits_type) :: limits
       type(error_type), allocatable :: error
 
+      call begin_call()
       call get_source_limits(source, limits, error)
       if (.not. allocated(error)) criteria = get_criteria(limits, levels, contact_time, restitution, n_peak, mass, &
          drop_height)
@@ -175,6 +188,7 @@ contains
       upper = criteria%upper
       met = merge(1, 0, conforms(criteria))
       call get_status(error, status, message)
+      call end_call()
    end subroutine judge
 
    !> Number of bands that a rating is made of.
@@ -188,9 +202,11 @@ contains
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
 
+      call begin_call()
       call find_rated_bands(set, bands, error)
       n_band = size(bands)
       call get_status(error, status, message)
+      call end_call()
    end subroutine count_rated
 
    !> Bands that a rating is made of.
@@ -204,8 +220,10 @@ contains
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
 
+      call begin_call()
       call find_rated_bands(set, bands, error)
       nominal = bands%nominal
+      call end_call()
    end subroutine get_rated
 
    !> Maximum A-weighted levels of the classes of KS F 2863-2.
@@ -216,7 +234,9 @@ contains
       !> The levels, dB: [n_class].
       real(wp), intent(out) :: limits(n_class)
 
+      call begin_call()
       limits = class_limits(:n_class)
+      call end_call()
    end subroutine get_class_limits
 
    !> Levels standardised to the reference room.
@@ -231,7 +251,9 @@ contains
       !> The standardised levels, dB: [n_band].
       real(wp), intent(out) :: standardised(n_band)
 
+      call begin_call()
       standardised = level + get_standardisation(reverberation_time, volume)
+      call end_call()
    end subroutine standardise
 
    !> Levels without the background.
@@ -247,8 +269,10 @@ contains
       integer, intent(out) :: is_maximum(n_band)
       logical :: less(n_band)
 
+      call begin_call()
       call correct_for_background(level, background, corrected, less)
       is_maximum = merge(1, 0, less)
+      call end_call()
    end subroutine remove_background
 
    !> Single numbers of the levels in a room.
@@ -269,17 +293,20 @@ contains
       type(band_type), allocatable :: bands(:)
       type(error_type), allocatable :: error
 
+      call begin_call()
       a_weighted = 0.0_wp
       rounded = 0
       grade = 0
       legacy = 0
       call find_rated_bands(set, bands, error)
       call get_status(error, status, message)
-      if (status /= 0) return
-      a_weighted = get_a_weighted_level(set, level)
-      rounded = get_rounded(a_weighted)
-      grade = get_grade(a_weighted)
-      if (set == octave_set) legacy = get_legacy_rating(level)
+      if (status == 0) then
+         a_weighted = get_a_weighted_level(set, level)
+         rounded = get_rounded(a_weighted)
+         grade = get_grade(a_weighted)
+         if (set == octave_set) legacy = get_legacy_rating(level)
+      end if
+      call end_call()
    end subroutine rate
 
 end module thud_level_api

@@ -29,8 +29,8 @@ contains
       type(error_type), allocatable :: error
       real(wp) :: free_error
 
-      allocate (bundle)
       call begin_call()
+      allocate (bundle)
       call fit_table(frequency, cmplx(real_part, imaginary_part, wp), order, floor, free_error, error)
       if (.not. allocated(error)) then
          call bundle%add_number('free_error', free_error)
@@ -44,8 +44,8 @@ contains
             call bundle%add_array('floor.residue_imaginary', [n], floor%residue_imaginary%values(:n))
          end associate
       end if
-      call end_call()
       call leave(bundle, error, status, handle, n_byte, n_value)
+      call end_call()
    end subroutine fit_mobility
 
 end module thud_mobility_api

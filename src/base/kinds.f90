@@ -1,12 +1,13 @@
 !> Kinds of numbers: one of all real numbers, and the integers that memory is counted in.
 module thud_kinds
-   use, intrinsic :: iso_fortran_env, only: int8, int64, real64
+   use, intrinsic :: iso_c_binding, only: c_double
+   use, intrinsic :: iso_fortran_env, only: int8, int64
    implicit none (type, external)
    private
 
    public :: int8, int64, wp
 
-   !> Working precision: IEEE double.
-   integer, parameter :: wp = real64
+   !> Working precision: IEEE double, the `double` of C.
+   integer, parameter :: wp = c_double
 
 end module thud_kinds

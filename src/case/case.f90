@@ -192,7 +192,7 @@ contains
 
       associate (floor => case%floors(get_floor_number(case))%model)
          call floor%check(error)
-         if (.not. allocated(error)) call floor%check_points(error)
+         if (.not. allocated(error)) call floor%check_points(case%floor, error)
          if (allocated(error) .or. .not. case%has_room) return
          call get_room_bands(bands, error)
          allocate (conductance(size(bands)))

@@ -2,7 +2,7 @@
 module thud_free_modes
    use thud_arpack, only: dsaupd, dseupd
    use thud_ball, only: ball_type
-   use thud_blas_threads, only: use_one_blas_thread
+   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error, numerical_error
    use thud_field, only: field_type
@@ -23,9 +23,6 @@ module thud_free_modes
 
    !> Maximum number of restarts of the Lanczos method; a few are needed.
    integer, parameter :: max_restarts = 300
-
-   !> Marks a failure of the operator among ARPACK's own.
-   integer, parameter :: volume_lost = -1000
 
    !> Highest harmonic that a mode is looked for in.
    integer, parameter :: max_harmonic = 64
@@ -96,8 +93,8 @@ contains
       modes%mesh = new_mesh(ball, mesh_options, 2)
       call use_one_blas_thread()
       call new_mode_matrices(ball, modes%mesh, matrices, error)
-      if (allocated(error)) return
-      call find_eigenpairs(matrices, count + 1, eigenvalue, vector, error)
+      if (.not. allocated(error)) call find_eigenpairs(matrices, count + 1, eigenvalue, vector, error)
+      call restore_blas_threads()
       if (allocated(error)) return
       modes%rigid_frequency = sqrt(abs(eigenvalue(1)))/(2*pi)
       allocate (modes%frequency, source=sqrt(max(eigenvalue(2:), 0.0_wp))/(2*pi))
@@ -159,16 +156,33 @@ contains
             end select
          end associate
       end do iterations
-      if (failed .or. is_interrupted()) info = volume_lost
       allocate (vector(n, count))
-      if (info == 0) call dseupd(.true., 'A', select, eigenvalue, vector, n, matrices%shift, 'G', n, 'LM', count, &
-         eigenvalue_tolerance, resid, ncv, basis, n, iparam(1:7), ipntr, workd, workl, size(workl), info)
+      if (info == 0 .and. .not. (failed .or. is_interrupted())) call dseupd(.true., 'A', select, eigenvalue, vector, n, &
+         matrices%shift, 'G', n, 'LM', count, eigenvalue_tolerance, resid, ncv, basis, n, iparam(1:7), ipntr, workd, &
+         workl, size(workl), info)
       !$omp end critical (arpack)
+      call check_eigenpairs(failed, info, error)
+   end subroutine find_eigenpairs
+
+   !> Refuses what an interrupt, the operator or ARPACK has ended.
+   subroutine check_eigenpairs(failed, info, error)
+      !> The volume could not be kept.
+      logical, intent(in) :: failed
+      !> Status of ARPACK, 0 where it succeeded.
+      integer, intent(in) :: info
+      !> Names what has ended it.
+      type(error_type), allocatable, intent(out) :: error
+
       call check_interrupt(error)
       if (allocated(error)) return
-      if (info /= 0) error = numerical_error('&modes: the Lanczos method fails (info = '//to_text(info) &
-         //' of ARPACK); allowed: fewer modes, or a finer mesh')
-   end subroutine find_eigenpairs
+      if (failed) then
+         error = numerical_error('&ball: at poisson_ratio = 0.5 the volume of a wall so thin is not kept in double ' &
+            //'precision; allowed: a larger wall_thickness, or a lower poisson_ratio')
+      else if (info /= 0) then
+         error = numerical_error('&modes: the Lanczos method fails (info = '//to_text(info) &
+            //' of ARPACK); allowed: fewer modes, or a finer mesh')
+      end if
+   end subroutine check_eigenpairs
 
    !> Shape, harmonic and participation of one mode.
    subroutine describe(ball, matrices, vector, mesh, shape, harmonic, participation)

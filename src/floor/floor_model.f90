@@ -72,15 +72,17 @@ contains
    end function get_point_fields
 
    !> Refuses points that are not there.
-   subroutine check_points(options, error)
+   subroutine check_points(options, group, error)
       class(floor_model_type), intent(in) :: options
+      !> Group of the options.
+      character(len=*), intent(in) :: group
       !> Names the point.
       type(error_type), allocatable, intent(out) :: error
       type(receiver_type) :: transfer
       integer :: i
 
       if (options%point_x%count /= options%point_y%count) then
-         error = input_error('&floor: point_x has '//to_text(options%point_x%count)//' values and point_y ' &
+         error = input_error('&'//trim(group)//': point_x has '//to_text(options%point_x%count)//' values and point_y ' &
             //to_text(options%point_y%count)//'; allowed: as many of both')
          return
       end if

@@ -48,6 +48,8 @@ contains
       call check_interrupt(error)
       if (allocated(error)) return
       if (.not. failed) call make_passive(2*pi*frequency, weight, pole, residue, floor%direct, failed)
+      call check_interrupt(error)
+      if (allocated(error)) return
       if (failed) then
          error = numerical_error('the mobility: no passive function of '//to_text(order)//' poles was found')
       else if (size(pole) > size(floor%pole_frequency%values)) then

@@ -5,6 +5,7 @@ module thud_mesh_files
    use thud_kinds, only: wp
    use thud_motion, only: motion_type
    use thud_text, only: fixed, newline, to_text
+   use thud_text_buffer, only: text_buffer_type
    use thud_vtu, only: biquadratic_quadrilateral, get_pvd, get_vtu, quadrilateral
    implicit none (type, external)
    private
@@ -108,16 +109,18 @@ contains
       type(motion_type), intent(in) :: motion
       !> Text of `pressure.csv`.
       character(len=:), allocatable, intent(out) :: text
+      type(text_buffer_type) :: buffer
       integer :: i, j
 
-      text = 'time_s,radius_m,pressure_Pa,shear_Pa'//newline
+      call buffer%append('time_s,radius_m,pressure_Pa,shear_Pa'//newline)
       do i = 1, motion%n_frame
          do j = 0, ubound(motion%contact_pressure, 1)
             if (.not. motion%contact_pressure(j, i) > 0.0_wp) cycle
-            text = text//to_text(motion%time(i))//','//to_text(motion%position(j, ubound(motion%position, 2), 1, i))//',' &
-               //to_text(motion%contact_pressure(j, i))//','//to_text(motion%contact_shear(j, i))//newline
+            call buffer%append(to_text(motion%time(i))//','//to_text(motion%position(j, ubound(motion%position, 2), 1, i)) &
+               //','//to_text(motion%contact_pressure(j, i))//','//to_text(motion%contact_shear(j, i))//newline)
          end do
       end do
+      text = buffer%get_text()
    end subroutine get_pressure_csv
 
    !> Nodes one after the other, those of a ring side by side.

@@ -9,6 +9,7 @@ module thud_report
    use thud_kinds, only: wp
    use thud_source_limits, only: conforms, criterion_type
    use thud_text, only: join_quoted, newline, quoted, to_text
+   use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
 
@@ -73,15 +74,17 @@ contains
       type(compression_type), intent(in) :: compression
       !> Text of `compression.csv`.
       character(len=:), allocatable :: text
+      type(text_buffer_type) :: buffer
       character(len=50) :: row
       integer :: i
 
-      text = 'deflection_m,force_N'//newline
+      call buffer%append('deflection_m,force_N'//newline)
       do i = 1, size(compression%force)
          write (row, csv_form) compression%deflection(i), compression%force(i)
          row(len(row):) = newline
-         text = text//row
+         call buffer%append(row)
       end do
+      text = buffer%get_text()
    end function get_compression_csv
 
    !> Channels of the model against time, 17 digits.

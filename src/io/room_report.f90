@@ -7,6 +7,7 @@ module thud_room_report
    use thud_rating, only: get_a_weighted_level, get_grade, get_rounded
    use thud_room, only: few_modes, room_level_type
    use thud_text, only: fixed, newline, to_text
+   use thud_text_buffer, only: text_buffer_type
    implicit none (type, external)
    private
 
@@ -56,16 +57,18 @@ contains
       !> The columns: [n_row, n_column].
       real(wp), intent(in) :: columns(:, :)
       character(len=:), allocatable, intent(out) :: text
+      type(text_buffer_type) :: buffer
       integer :: i, j
 
-      text = header//newline
+      call buffer%append(header//newline)
       do i = 1, size(columns, 1)
          do j = 1, size(columns, 2)
-            if (j > 1) text = text//','
-            text = text//to_text(columns(i, j))
+            if (j > 1) call buffer%append(',')
+            call buffer%append(to_text(columns(i, j)))
          end do
-         text = text//newline
+         call buffer%append(newline)
       end do
+      text = buffer%get_text()
    end subroutine get_table_csv
 
    !> The levels for the screen; thirds of few modes are marked.

@@ -12,7 +12,6 @@
 !> norm of the record, see `dropped`; the quadrature errs by less than `quadrature_error`.
 module thud_band_projection
    use thud_band, only: band_type
-   use thud_blas_threads, only: use_one_blas_thread
    use thud_constants, only: pi
    use thud_kinds, only: wp
    use thud_lapack, only: dgemm, dstevr
@@ -123,7 +122,6 @@ contains
       real(wp), allocatable :: node(:), root_weight(:), angle(:, :)
       integer :: i
 
-      call use_one_blas_thread()
       projection%n_sample = n_sample
       call set_sequences(projection, maxval(bands%upper)/sample_rate, failed)
       if (failed) projection%n_sample = 0

@@ -5,7 +5,11 @@ module thud_blas_threads
    implicit none (type, external)
    private
 
-   public :: use_one_blas_thread
+   public :: restore_blas_threads, use_one_blas_thread
+
+   !> Pieces of work that use one thread now, and the threads that the process had before the first of them.
+   integer :: n_work = 0
+   integer(c_int) :: count_before = 1_c_int
 
    interface
       subroutine openblas_set_num_threads(count) bind(c, name='openblas_set_num_threads')
@@ -13,13 +17,33 @@ module thud_blas_threads
          implicit none (type, external)
          integer(c_int), value :: count
       end subroutine openblas_set_num_threads
+
+      function openblas_get_num_threads() bind(c, name='openblas_get_num_threads') result(count)
+         import :: c_int
+         implicit none (type, external)
+         integer(c_int) :: count
+      end function openblas_get_num_threads
    end interface
 
 contains
 
-   !> Makes OpenBLAS work in the calling thread, for the whole process.
+   !> Makes OpenBLAS work in the calling thread, for the whole process, until `restore_blas_threads`.
    subroutine use_one_blas_thread()
-      call openblas_set_num_threads(1_c_int)
+      !$omp critical (blas_threads)
+      if (n_work == 0) then
+         count_before = openblas_get_num_threads()
+         call openblas_set_num_threads(1_c_int)
+      end if
+      n_work = n_work + 1
+      !$omp end critical (blas_threads)
    end subroutine use_one_blas_thread
+
+   !> Ends what `use_one_blas_thread` has begun: the last to end gives the process its threads back.
+   subroutine restore_blas_threads()
+      !$omp critical (blas_threads)
+      n_work = n_work - 1
+      if (n_work == 0) call openblas_set_num_threads(count_before)
+      !$omp end critical (blas_threads)
+   end subroutine restore_blas_threads
 
 end module thud_blas_threads

@@ -3,12 +3,16 @@ module thud_blas_threads
    implicit none (type, external)
    private
 
-   public :: use_one_blas_thread
+   public :: restore_blas_threads, use_one_blas_thread
 
 contains
 
    !> Nothing to be done.
    subroutine use_one_blas_thread()
    end subroutine use_one_blas_thread
+
+   !> Nothing to be done.
+   subroutine restore_blas_threads()
+   end subroutine restore_blas_threads
 
 end module thud_blas_threads

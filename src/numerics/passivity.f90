@@ -1,18 +1,19 @@
 !> Passivity of a rational mobility or admittance: its real part must not be negative at any frequency.
 module thud_passivity
+   use thud_interrupt, only: is_interrupted
    use thud_kinds, only: wp
    use thud_lapack, only: dposv
    use thud_rational, only: get_basis, get_coefficients, get_eigenvalues, get_residues, get_state_input, get_state_matrix
    implicit none (type, external)
    private
 
-   public :: find_violations, make_passive
+   public :: find_violations, make_passive, solve_dual
 
    !> Rounds of the correction; each adds the worst frequencies of the one before.
    integer, parameter :: n_round = 30
 
-   !> Sweeps of Hildreth's method.
-   integer, parameter :: n_sweep = 2000
+   !> Maximum number of sweeps of Hildreth's method.
+   integer, parameter :: max_sweeps = 2000
 
    !> Margin of the corrected real part over the mean magnitude: above rounding.
    real(wp), parameter :: margin = 1.0e-9_wp
@@ -75,7 +76,7 @@ contains
       complex(wp), intent(inout) :: residue(:)
       !> Constant part.
       real(wp), intent(inout) :: direct
-      !> LAPACK found no eigenvalues.
+      !> LAPACK found no eigenvalues, or an interrupt came.
       logical, intent(out) :: failed
       real(wp), allocatable :: normal(:, :), omega(:), held(:), x(:), length(:)
       complex(wp), allocatable :: basis(:, :)
@@ -98,6 +99,7 @@ contains
       do i = 1, n_round
          direct = max(direct, least)
          call find_violations(pole, residue, direct, omega, failed)
+         failed = failed .or. is_interrupted()
          if (failed .or. size(omega) == 0) return
          held = [held, omega]
          x = get_correction(pole, residue, direct, held, normal, length, least)
@@ -108,14 +110,14 @@ contains
       do i = 1, n_round
          direct = max(direct, least)
          call find_violations(pole, residue, direct, omega, failed)
+         failed = failed .or. is_interrupted()
          if (failed .or. size(omega) == 0) return
          direct = direct + least - minval([(get_real_part(pole, residue, direct, omega(n)), n=1, size(omega))])
       end do
       failed = .true.
    end subroutine make_passive
 
-   !> The least change x of the coefficients, x' N x, that makes the real part at least `least` at some frequencies:
-   !> Hildreth's method on the dual problem.
+   !> The least change x of the coefficients, x' N x, that makes the real part at least `least` at some frequencies.
    function get_correction(pole, residue, direct, omega, normal, length, least) result(x)
       !> Poles, 1/s, and residues: [n].
       complex(wp), intent(in) :: pole(:), residue(:)
@@ -132,7 +134,7 @@ contains
       complex(wp), allocatable :: basis(:, :)
       real(wp) :: factor(size(length), size(length)), rows(size(length), size(omega)), solved(size(length), size(omega))
       real(wp) :: gram(size(omega), size(omega)), missing(size(omega)), force(size(omega))
-      integer :: i, sweep, info
+      integer :: i, n_sweep, info
 
       call get_basis(pole, cmplx(0.0_wp, omega, wp), basis)
       do i = 1, size(omega)
@@ -145,14 +147,34 @@ contains
       x = 0.0_wp
       if (info /= 0) return
       gram = matmul(transpose(rows), solved)
-      force = 0.0_wp
-      do sweep = 1, n_sweep
-         do i = 1, size(omega)
-            force(i) = max(0.0_wp, force(i) + (missing(i) - dot_product(gram(:, i), force))/gram(i, i))
-         end do
-      end do
+      call solve_dual(gram, missing, force, n_sweep)
       x = matmul(solved, force)/length
    end function get_correction
+
+   !> The forces of constraints, each not negative, that lift every constraint by at least what it misses, and by just
+   !> that where its force is positive: Hildreth's method.
+   subroutine solve_dual(gram, missing, force, n_sweep)
+      !> Lift of each constraint by the unit force of each, symmetric: [n, n].
+      real(wp), intent(in), contiguous :: gram(:, :)
+      !> What the constraints miss: [n].
+      real(wp), intent(in) :: missing(:)
+      !> The forces: [n].
+      real(wp), intent(out) :: force(:)
+      !> Sweeps that were made; the last one has changed nothing, unless they are `max_sweeps` or an interrupt came.
+      integer, intent(out) :: n_sweep
+      real(wp) :: before(size(force))
+      integer :: i
+
+      force = 0.0_wp
+      do n_sweep = 1, max_sweeps
+         before = force
+         do i = 1, size(force)
+            force(i) = max(0.0_wp, force(i) + (missing(i) - dot_product(gram(:, i), force))/gram(i, i))
+         end do
+         if (is_interrupted() .or. maxval(abs(force - before)) <= 0.0_wp) return
+      end do
+      n_sweep = max_sweeps
+   end subroutine solve_dual
 
    !> Angular frequency between two others at which the real part is least: golden sections.
    pure function get_least(pole, residue, direct, lower, upper) result(omega)

@@ -53,7 +53,8 @@ contains
       impact%motion%motion = new_receiver_motion(receiver)
       allocate (impact%motion%displacement(source%n_mass), impact%motion%acceleration(source%n_mass), source=0.0_wp)
       allocate (impact%motion%velocity(source%n_mass), source=history%impact_velocity)
-      call begin_contact(source, impact)
+      call begin_contact(source, impact, error)
+      if (allocated(error)) return
       do i = 1, n
          call record(source, impact, i, history)
          if (i == n) exit
@@ -101,7 +102,8 @@ contains
          end if
          call go_to_event(source, drop, event, end, left, impact, error)
          if (allocated(error)) return
-         call pass_event(source, event, impact, history)
+         call pass_event(source, event, impact, history, error)
+         if (allocated(error)) return
          if (.not. left > 0.0_wp) return
       end do
       error = coarse_error(to_text(max_events)//' touches, releases and turning points fall into one step')
@@ -149,10 +151,10 @@ contains
       logical :: valid, converged
 
       if (length < impact%stages%interval) then
-         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%scale, impact%motion, end, &
-            valid, converged)
+         call take_coupled_step(source, new_receiver_stages(impact%receiver, length), impact%time, impact%scale, &
+            impact%motion, end, valid, converged)
       else
-         call take_coupled_step(source, impact%stages, impact%scale, impact%motion, end, valid, converged)
+         call take_coupled_step(source, impact%stages, impact%time, impact%scale, impact%motion, end, valid, converged)
       end if
       if (.not. valid) then
          error = source%get_failure(drop, impact%time, get_relative_state(source, impact%motion))

@@ -2,10 +2,12 @@
 module thud_coupled_phases
    use thud_contact_source, only: contact_source_type
    use thud_coupled_step, only: coupled_state_type, get_relative_state
+   use thud_error, only: error_type, numerical_error
    use thud_force_history, only: force_history_type
    use thud_kinds, only: wp
    use thud_receiver, only: get_receiver_velocity, receiver_type
    use thud_receiver_stages, only: receiver_stages_type
+   use thud_text, only: fixed
    implicit none (type, external)
    private
 
@@ -14,6 +16,10 @@ module thud_coupled_phases
    !> Part of the energy that a source keeps which a light floor has caught: then its contact ends. Of the force, times
    !> deflection, likewise.
    real(wp), parameter :: spent_part = 1.0e-12_wp
+
+   !> Newton's iterations for the first force, and the relative change of it that is left when it is found.
+   integer, parameter :: max_iterations = 50
+   real(wp), parameter :: tolerance = 1.0e-12_wp
 
    !> What ends a part of a step: the turning point between compression and restitution, release, touch.
    integer, parameter :: turn = 1, release = 2, touch = 3
@@ -42,9 +48,11 @@ contains
 
    !> Force and velocity of the floor when the source has just touched: the part of the receiver that answers at once
    !> shares the first force with the source, and the cap has no mass yet.
-   pure subroutine begin_contact(source, impact)
+   pure subroutine begin_contact(source, impact, error)
       class(contact_source_type), intent(inout) :: source
       type(impact_type), intent(inout) :: impact
+      !> The force does not converge.
+      type(error_type), allocatable, intent(out) :: error
       real(wp), dimension(source%n_state) :: state, rate, slower, slower_rate
       real(wp) :: length, change
       integer :: k
@@ -57,18 +65,24 @@ contains
          motion%force = 0.0_wp
          length = 1.0e-7_wp*impact%scale
          ! The force grows with the velocity at most by its square: Newton's iterations come from one side.
-         do k = 1, 50
+         do k = 1, max_iterations
             motion%floor_velocity = get_receiver_velocity(impact%receiver, motion%force, motion%motion)
             state = get_relative_state(source, motion)
             slower = state
             slower(2) = state(2) - length
-            call source%get_derivative(0.0_wp, state, rate, valid)
-            call source%get_derivative(0.0_wp, slower, slower_rate, valid)
+            call source%get_derivative(impact%time, state, rate, valid)
+            call source%get_derivative(impact%time, slower, slower_rate, valid)
             change = (rate(place) - motion%force) &
                /(1 + impact%receiver%direct*(rate(place) - slower_rate(place))/(state(2) - slower(2)))
             if (abs(change) <= epsilon(change)*abs(motion%force)) exit
             motion%force = motion%force + change
          end do
+         ! Written so that NaN fails too.
+         if (.not. (valid .and. abs(change) <= tolerance*abs(motion%force))) then
+            error = numerical_error('&drop: '//fixed(1.0e3_wp*impact%time, 3)//' ms after first touch the first force of ' &
+               //'a contact does not converge; allowed: a lower height, or a floor of lower mobility')
+            return
+         end if
          motion%acceleration = rate(2:2*source%n_mass:2)
          impact%peak_force = max(impact%peak_force, motion%force)
       end associate
@@ -118,13 +132,15 @@ contains
    end function get_distance
 
    !> Changes the phase at an event.
-   pure subroutine pass_event(source, event, impact, history)
+   pure subroutine pass_event(source, event, impact, history, error)
       class(contact_source_type), intent(inout) :: source
       !> The event.
       integer, intent(in) :: event
       type(impact_type), intent(inout) :: impact
       !> Gets maxima and the time of release.
       type(force_history_type), intent(inout) :: history
+      !> The first force of a contact does not converge.
+      type(error_type), allocatable, intent(out) :: error
 
       associate (motion => impact%motion)
          select case (event)
@@ -139,7 +155,7 @@ contains
             motion%displacement(1) = motion%motion%displacement
          case default
             motion%displacement(1) = motion%motion%displacement
-            call begin_contact(source, impact)
+            call begin_contact(source, impact, error)
          end select
       end associate
    end subroutine pass_event

@@ -45,6 +45,8 @@ module thud_coupled_step
       real(wp), allocatable :: force(:), acceleration(:, :)
       !> Displacements and velocities of the floor without these forces, m and m/s: [n_stage].
       real(wp), dimension(n_stage) :: free_displacement, free_velocity
+      !> Times of the stages since first touch, s: [n_stage].
+      real(wp) :: time(n_stage)
       !> Displacements, velocities and accelerations of the floor, m, m/s, m/s2: [n_stage].
       real(wp), dimension(n_stage) :: floor_displacement, floor_velocity, floor_acceleration
       !> State relative to the floor at the stages: [n_state, n_stage]; and its rate.
@@ -71,12 +73,12 @@ contains
    end function get_relative_state
 
    !> One step.
-   pure subroutine take_coupled_step(source, stages, scale, start, end, valid, converged)
+   pure subroutine take_coupled_step(source, stages, time, scale, start, end, valid, converged)
       class(contact_source_type), intent(in) :: source
       !> The floor in this step.
       type(receiver_stages_type), intent(in) :: stages
-      !> Scale of velocities, m/s.
-      real(wp), intent(in) :: scale
+      !> Time at the beginning since first touch, s; scale of velocities, m/s.
+      real(wp), intent(in) :: time, scale
       !> Motion at the beginning and at the end.
       type(coupled_state_type), intent(in) :: start
       type(coupled_state_type), intent(out) :: end
@@ -89,6 +91,7 @@ contains
 
       n = size(change)
       allocate (trial%force(n_stage), source=start%force)
+      trial%time = time + stages%interval*radau_node
       trial%acceleration = spread(start%acceleration, 1, n_stage)
       allocate (trial%state(source%n_state, n_stage), trial%rate(source%n_state, n_stage), &
          trial%derivative(source%n_state, 2*source%n_mass, n_stage), source=0.0_wp)
@@ -149,7 +152,7 @@ contains
             state(2*k, :) = start%velocity(k) + h*matmul(radau_integral, trial%acceleration(:, k)) - u
          end do
          do i = 1, n_stage
-            call get_rate(source, state(:, i), trial%rate(:, i), valid)
+            call get_rate(source, trial%time(i), state(:, i), trial%rate(:, i), valid)
             if (.not. valid) return
          end do
       end associate
@@ -172,15 +175,17 @@ contains
             moved = trial%state(:, i)
             ! Towards smaller deflections, which leave no domain.
             moved(j) = moved(j) - length
-            call get_rate(source, moved, rate, valid)
+            call get_rate(source, trial%time(i), moved, rate, valid)
             trial%derivative(:, j, i) = (trial%rate(:, i) - rate)/(trial%state(j, i) - moved(j))
          end do
       end do
    end subroutine differentiate
 
    !> Accelerations, force and loss of the source; alone in flight a mass has none.
-   pure subroutine get_rate(source, state, rate, valid)
+   pure subroutine get_rate(source, time, state, rate, valid)
       class(contact_source_type), intent(in) :: source
+      !> Time since first touch, s.
+      real(wp), intent(in) :: time
       !> State relative to the floor, and its rate: [n_state].
       real(wp), intent(in) :: state(:)
       real(wp), intent(out) :: rate(:)
@@ -188,7 +193,7 @@ contains
       logical, intent(out) :: valid
 
       if (source%touching .or. source%n_mass > 1) then
-         call source%get_derivative(0.0_wp, state, rate, valid)
+         call source%get_derivative(time, state, rate, valid)
       else
          valid = .true.
          rate = 0.0_wp

@@ -189,7 +189,7 @@ contains
       real(wp), intent(in) :: gap, speed
       logical :: yes
       real(wp), dimension(size(motion%amplitude)) :: rate, time
-      real(wp) :: away
+      real(wp) :: away, early, late, middle
       integer :: k
 
       away = speed
@@ -204,11 +204,21 @@ contains
             away = away + real(receiver%residue(k)*motion%amplitude(k), wp)
          end if
       end do
-      ! The gap that is left is convex in time: it is least at one of the times, or never ends to shrink.
       yes = gap < 0.0_wp .or. away < 0.0_wp
-      do k = 1, size(rate)
-         yes = yes .or. gap + away*time(k) < sum(rate*min(time, time(k)))
+      if (yes .or. away >= sum(rate)) return
+      ! The gap that is left is convex in time. It shrinks as long as the poles whose times are not over are faster than the
+      ! line: until one of the times, which bisection finds.
+      early = 0.0_wp
+      late = maxval(time)
+      do while (late - early > spacing(late))
+         middle = early + (late - early)/2
+         if (away < sum(rate, mask=time > middle)) then
+            early = middle
+         else
+            late = middle
+         end if
       end do
+      yes = gap + away*late < sum(rate*min(time, late))
    end function can_strike
 
 end module thud_receiver

@@ -18,6 +18,9 @@ module thud_sampling
    !> Integration steps of one record; more would run for minutes.
    real(wp), parameter :: max_steps = 1.0e8_wp
 
+   !> Relative error of a number of samples by the rounding of duration and rate, which are decimal numbers, and of products.
+   real(wp), parameter :: rounding = 4*epsilon(1.0_wp)
+
    !> Samples that a contact needs to be more than a few spikes.
    real(wp), parameter :: min_contact_samples = 8.0_wp
 
@@ -55,7 +58,7 @@ contains
       type(error_type), allocatable, intent(out) :: error
       real(wp) :: samples
 
-      samples = sampling%duration*sampling%sample_rate
+      samples = count_samples(sampling)
       if (samples > max_samples) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s at sample_rate = ' &
             //to_text(sampling%sample_rate)//' Hz makes '//to_text(samples)//' samples; allowed: up to ' &
@@ -96,15 +99,24 @@ contains
       !> Samples from first touch on, the first one included.
       integer :: n_sample
 
-      n_sample = int(sampling%duration*sampling%sample_rate)
+      n_sample = int(count_samples(sampling))
    end function get_sample_count
 
-   !> Integration steps of a record, or of its beginning.
+   !> Whole sampling intervals in the record, each with a sample at its beginning.
+   pure function count_samples(sampling) result(n_sample)
+      type(sampling_type), intent(in) :: sampling
+      !> Their number, which may be more than an integer holds.
+      real(wp) :: n_sample
+
+      n_sample = aint(sampling%duration*sampling%sample_rate*(1 + rounding))
+   end function count_samples
+
+   !> Integration steps of a record, or of its beginning, from which costs are estimated, also of values not yet checked.
    pure function get_step_count(sampling, time) result(n_step)
       type(sampling_type), intent(in) :: sampling
       !> Length of the beginning, s (default: the whole record).
       real(wp), intent(in), optional :: time
-      !> The steps, as many as do not fit into an integer.
+      !> The steps, not rounded; they may be more than an integer holds.
       real(wp) :: n_step
 
       n_step = sampling%duration

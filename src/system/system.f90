@@ -75,7 +75,8 @@ module thud_system
    procedure(plain_call), bind(c, name='thud_prepare_process') :: prepare_process
    !> Keeps an interrupt from now on; it then stops `write_text`.
    procedure(plain_call), bind(c, name='thud_keep_interrupts') :: keep_interrupts
-   !> Lets signals that the process handles set `latest_signal`, too. Every call of the library begins with it.
+   !> Lets signals that the process handles set `latest_signal`, too, and forks wait for the call. Every call of Python
+   !> begins with it but those that compute nothing: `collect`, `get_progress` and `end_calls`.
    procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
    !> Ends what `begin_call` has begun.
    procedure(plain_call), bind(c, name='thud_end_call') :: end_call

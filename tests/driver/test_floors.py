@@ -134,8 +134,21 @@ def test_points_of_a_plate_move(
     assert 0 < abs(far).max() < scale
     with pytest.raises(thud.InputError, match=naming("&plate", "5.0 m")):
         thud.solve(floor=thud.Plate(point_x=[9.0], point_y=[1.0]))
-    with pytest.raises(thud.InputError, match=naming("point_x", 2, "point_y", 1)):
-        thud.solve(floor=thud.Plate(point_x=[1.0, 2.0], point_y=[1.0]))
+
+
+@pytest.mark.parametrize(
+    ("kind", "group"),
+    [
+        (thud.Plate, "&plate:"),
+        (thud.FloatingFloor, "&floating_floor:"),
+        (thud.JoistFloor, "&joist_floor:"),
+    ],
+)
+def test_points_without_a_second_coordinate_are_refused_in_the_group_of_their_floor(
+    kind: type[thud.Plate | thud.FloatingFloor | thud.JoistFloor], group: str
+) -> None:
+    with pytest.raises(thud.InputError, match=naming(group, "point_x", 2, "point_y", 1)):
+        thud.solve(floor=kind(point_x=[1.0, 2.0], point_y=[1.0]))
 
 
 def test_points_are_of_floors_with_sides(moved: thud.FloorImpact) -> None:

@@ -121,6 +121,43 @@ def test_driver_that_waits_for_another_writer_can_be_ended(tmp_path: Path) -> No
     assert not (tmp_path / "out").exists()
 
 
+def test_threads_of_the_blas_are_those_of_the_process_after_a_call() -> None:
+    code = """
+import ctypes, sys, numpy as np, thud
+with open("/proc/self/maps", encoding="utf-8") as file:
+    paths = {line.split(maxsplit=5)[-1].strip() for line in file if "openblas" in line}
+libraries = [ctypes.CDLL(path) for path in sorted(paths)]
+blas = [library for library in libraries if hasattr(library, "openblas_set_num_threads")]
+if not blas:
+    sys.exit(3)
+for library in blas:
+    library.openblas_set_num_threads(2)
+before = [library.openblas_get_num_threads() for library in blas]
+for work in (
+    lambda: thud.solve(model="modal_ball"),
+    lambda: thud.solve(drop=thud.Drop(height=1000.0), model="modal_ball"),
+    lambda: thud.solve_many({"height": [0.9, 1.0]}, thud.Case(model=thud.ModalBall()), threads=2),
+    lambda: thud.solve_many({"height": np.linspace(0.9, 1.0, 40)}, threads=2),
+    lambda: thud.free_modes(radial_elements=2, polar_elements=32),
+):
+    try:
+        work()
+    except thud.ThudError:
+        pass
+    assert [library.openblas_get_num_threads() for library in blas] == before
+"""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        check=False,
+        env=environment,
+        timeout=6 * LIMIT,
+    )
+    if done.returncode == 3:
+        pytest.skip("no OpenBLAS whose threads can be counted")
+    assert done.returncode == 0
+
+
 def test_interrupt_ends_calls_in_other_threads() -> None:
     with ThreadPoolExecutor(2) as threads:
         futures = [threads.submit(WORK["finite elements"]) for _ in range(2)]
@@ -172,23 +209,32 @@ except KeyboardInterrupt:
     assert done.returncode == 7
 
 
-def test_processes_forked_beside_short_calls_have_no_locked_libraries() -> None:
-    code = """
+@pytest.mark.parametrize(
+    ("work", "forks"),
+    [("thud.solve_case(case)", 60), ("check_case(case)", 300)],
+    ids=["solve", "check"],
+)
+def test_processes_forked_beside_short_calls_have_no_locked_libraries(
+    work: str, forks: int
+) -> None:
+    code = f"""
 import os, signal, threading, thud
+from thud.case import check_case
 case = thud.Case(model=thud.ModalBall(rings=20))
-force = thud.solve_case(case).peak_force
 
 def compute():
     while True:
-        thud.solve_case(case)
+        {work}
 
+{work}
 for _ in range(2):
     threading.Thread(target=compute, daemon=True).start()
-for _ in range(60):
+for _ in range({forks}):
     child = os.fork()
     if not child:
         signal.alarm(20)
-        os._exit(thud.solve_case(case).peak_force != force)
+        {work}
+        os._exit(0)
     code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if code:
         os._exit(abs(code))

@@ -185,6 +185,24 @@ def test_modules_are_named_after_their_files() -> None:
         assert named.findall(path.read_text(encoding="utf-8")) == expected, path
 
 
+def test_every_call_of_python_is_guarded() -> None:
+    """Interrupts end what computes, and forks wait for it, from the first statement to the last."""
+    body = re.compile(r"(?sm)^   subroutine (\w+).*?\n\n(.*?)^   end subroutine")
+    public = re.compile(r"(?m)^   public :: (.*)")
+    unguarded = set()
+    for path in sorted((SOURCES / "api").glob("*.f90")):
+        text = path.read_text(encoding="utf-8")
+        bodies = dict(body.findall(text))
+        for name in re.findall(r"\w+", " ".join(public.findall(text))):
+            lines = [line.partition("!")[0].strip() for line in bodies[name].splitlines()]
+            ends = (lines[0], lines[-1])
+            early = any(re.search(r"\breturn\b", line) for line in lines)
+            if early or ends != ("call begin_call()", "call end_call()"):
+                unguarded.add(name)
+    # These compute nothing.
+    assert unguarded == {"collect", "end_calls", "get_progress"}
+
+
 def test_fortran_names_no_figures_of_the_driver() -> None:
     found = {
         path.relative_to(SOURCES).as_posix()

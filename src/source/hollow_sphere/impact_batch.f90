@@ -1,5 +1,6 @@
 !> Impacts of many balls side by side: their state, steps and parts of a step, and where in a step a phase ends.
 module thud_impact_batch
+   use, intrinsic :: iso_c_binding, only: c_bool
    use thud_constants, only: pi
    use thud_hollow_sphere, only: shell_type
    use thud_kinds, only: wp
@@ -13,8 +14,8 @@ module thud_impact_batch
    public :: add_end, advance, finish_step, get_single, get_watched, impact_batch_type, is_finite, locate
 
    !> Impacts, in the units of `thud_shell_batch` unless stated otherwise. Fastest where it begins with a
-   !> line of the cache, see `thud_cache_line`.
-   type :: impact_batch_type
+   !> line of the cache, see `thud_cache_line`; interoperable, so that it may lie in a buffer.
+   type, bind(c) :: impact_batch_type
       !> Series of the equations.
       type(series_batch_type) :: series
       !> Velocity at first touch: [batch_size].
@@ -38,11 +39,11 @@ module thud_impact_batch
       !> its last step.
       integer :: now
       !> The ball was released: [batch_size].
-      logical :: released(batch_size)
+      logical(c_bool) :: released(batch_size)
       !> A stage has left the domain of the equation: [batch_size].
-      logical :: left(batch_size)
+      logical(c_bool) :: left(batch_size)
       !> The last step led beyond the reach of the series: [batch_size].
-      logical :: strayed(batch_size)
+      logical(c_bool) :: strayed(batch_size)
    end type impact_batch_type
 
 contains

@@ -20,7 +20,7 @@ module thud_shell_batch
    integer, parameter :: batch_size = 32
 
    !> The equations, one lane per ball.
-   type :: shell_batch_type
+   type, bind(c) :: shell_batch_type
       !> K, stiffness of the shell: [batch_size].
       real(wp) :: stiffness(batch_size)
       !> A, absolute pressure of the gas in the undeformed ball: [batch_size].
@@ -38,7 +38,7 @@ module thud_shell_batch
    end type shell_batch_type
 
    !> States, in diameters, steps and masses.
-   type :: state_batch_type
+   type, bind(c) :: state_batch_type
       !> y: [batch_size].
       real(wp) :: deflection(batch_size)
       !> z: [batch_size].

@@ -30,7 +30,7 @@ contains
       !> Number of the last sample that was written.
       integer, intent(out) :: last_sample
       real(wp), dimension(batch_size) :: start, last, length, elastic_force, floor_force
-      logical :: turns(batch_size)
+      logical :: turns(batch_size), released(batch_size)
       integer :: n_step, last_step
 
       n_step = (n_sample - 1)*substeps
@@ -49,9 +49,10 @@ contains
       call turn(impacts, turns)
       start = merge(last + 1, never, turns)
       call march(impacts, .false., start, last, n_step, substeps, n_sample, force, last_step)
-      impacts%released = last < never .and. .not. impacts%left
-      call locate(impacts, .false., impacts%released, length)
-      call finish_step(impacts, impacts%released, length, elastic_force, floor_force)
+      released = last < never .and. .not. impacts%left
+      impacts%released = released
+      call locate(impacts, .false., released, length)
+      call finish_step(impacts, released, length, elastic_force, floor_force)
       impacts%contact = last + length
       last_sample = last_step/substeps + 1
       call get_peaks(force(:, :last_sample), impacts%peak_elastic_force, impacts%peak_force)

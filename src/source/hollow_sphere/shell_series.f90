@@ -35,7 +35,7 @@ module thud_shell_series
    integer, parameter :: series_steps = 16
 
    !> The series.
-   type :: series_batch_type
+   type, bind(c) :: series_batch_type
       !> Deflection about which a lane is expanded: [batch_size].
       real(wp) :: place(batch_size)
       !> Distance up to which the series is used: [batch_size].

@@ -3,7 +3,7 @@
 !>
 !> Sets that cannot be computed have NaN; they leave the others as they are.
 module thud_shell_sets
-   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc
+   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_loc, c_sizeof
    use thud_ball, only: ball_type, get_ball_fields
    use thud_cache_line, only: get_aligned_start, line_length
    use thud_constants, only: pi
@@ -173,7 +173,7 @@ contains
       !> The outcomes: [n_set].
       type(set_outcome_type), intent(out) :: outcomes(:)
       type(impact_batch_type), pointer :: impacts
-      real(wp), target :: buffer(storage_size(impacts)/storage_size(1.0_wp) + line_length)
+      real(wp), target :: buffer(c_sizeof(impacts)/c_sizeof(1.0_wp) + line_length)
       real(wp) :: sampled(block_size)
       real(wp) :: step
       integer :: i

@@ -8,7 +8,7 @@
 module thud_modal_ball
    use thud_ball, only: ball_type
    use thud_ball_motion, only: ball_motion_type, new_ball_motion, take_step
-   use thud_blas_threads, only: use_one_blas_thread
+   use thud_blas_threads, only: restore_blas_threads, use_one_blas_thread
    use thud_constants, only: pi
    use thud_drop, only: drop_type, get_impact_velocity
    use thud_error, only: error_type, input_error, numerical_error
@@ -167,13 +167,15 @@ contains
       call use_one_blas_thread()
       rings = new_surface_rings(options%rings, options%static_harmonics, options%floor_friction == 'stick')
       call prepare(ball, options, rings, floor, interval, step, contact, error)
-      if (allocated(error)) return
-      state = new_ball_motion(step, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
-         merge(drop%gravity, 0.0_wp, options%contact_gravity))
-      if (state%floor_moves) then
-         allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
+      if (.not. allocated(error)) then
+         state = new_ball_motion(step, interval, rings, floor, ball%outer_radius, history%impact_velocity, &
+            merge(drop%gravity, 0.0_wp, options%contact_gravity))
+         if (state%floor_moves) then
+            allocate (history%floor_displacement(n_sample), history%floor_velocity(n_sample), source=0.0_wp)
+         end if
+         call march(ball, sampling, interval, rings, step, contact, state, history, error)
       end if
-      call march(ball, sampling, interval, rings, step, contact, state, history, error)
+      call restore_blas_threads()
    end subroutine solve
 
    !> Modes, their steps and the response of the rings.
