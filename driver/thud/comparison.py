@@ -188,7 +188,8 @@ def compare(
     force
         ``"floor"`` or ``"elastic"``; by default that of each case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases.
+        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases and
+        recordings.
     progress
         Show a progress bar.
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, REPOSITORY, naming
+from conftest import MINIMAL, REPOSITORY, naming, recorded
 
 import thud
 from thud import cli
 from thud.comparison import _cell, _digits
 from thud.criteria import Criterion
+from thud.recordings.config import Config
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,6 +120,18 @@ def test_limits_are_those_of_the_cases() -> None:
     with pytest.raises(thud.InputError, match=naming("&limits: source", "rubber_ball", "tyre")):
         thud.compare([thud.Case(), tyre])
     assert thud.compare([thud.Case(), tyre], source="rubber_ball").source == "rubber_ball"
+
+
+def test_limits_are_those_of_the_recordings_where_no_case_has_others() -> None:
+    ball = recorded(thud.solve())
+    tyre = replace(ball, config=Config(source="tyre"))
+    assert thud.compare([tyre]).source == tyre.conformity().source == "tyre"
+    assert thud.compare({"tyre": tyre, "not stated": ball}).source == "tyre"
+    assert thud.compare([ball]).source == "rubber_ball"
+    case = thud.Case(limits=thud.Limits("tyre"))
+    assert thud.compare([case, ball]).source == "tyre"
+    with pytest.raises(thud.InputError, match=naming("&limits: source", "rubber_ball", "tyre")):
+        thud.compare([thud.Case(), tyre])
 
 
 def test_recording_stands_beside_its_model(tmp_path: Path) -> None:
