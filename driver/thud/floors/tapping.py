@@ -50,18 +50,25 @@ class TappingLevel(Displayed):
     @property
     def weighted(self) -> int:
         """L_n,w, dB: the reference curve of ISO 717-2 shifted by whole decibels."""
-        level = np.round(self.level[RATED], 1)
+        excess = self._tenths - 10 * CURVE
         # From where every excess is above the allowed sum.
-        shift = int(np.floor((level - CURVE).min() - MAX_EXCESS))
-        while np.maximum(level - CURVE - shift, 0).sum() > MAX_EXCESS:
+        shift = int(np.floor(excess.min() / 10 - MAX_EXCESS))
+        while np.maximum(excess - 10 * shift, 0).sum() > 10 * MAX_EXCESS:
             shift += 1
         return AT_500 + shift
 
     @property
     def adaptation(self) -> int:
         """Spectrum adaptation term C_I, dB, of the thirds 100 to 2500 Hz (ISO 717-2 annex A)."""
-        total = 10 * np.log10((10 ** (self.level[3:18] / 10)).sum())
+        # Without that of 3150 Hz.
+        total = 10 * np.log10((10 ** (self._tenths[:-1] / 100)).sum())
         return int(np.floor(total + 0.5)) - 15 - self.weighted
+
+    @property
+    def _tenths(self) -> NDArray[np.float64]:
+        """Rated levels to one decimal, a half rounded up (ISO 717-2), in tenths of a decibel."""
+        tenths: NDArray[np.float64] = np.floor(10 * self.level[RATED] + 0.5)
+        return tenths
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
