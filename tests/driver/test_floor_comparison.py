@@ -166,6 +166,18 @@ def test_floors_without_a_tapping_level_leave_its_cell_empty(found: thud.FloorCo
     assert float(energy[1]) == pytest.approx(1e3 * predictions["thick"].energy.sum(), rel=5e-3)
 
 
+def test_error_of_the_tapping_level_is_no_empty_cell(
+    found: thud.FloorComparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        message = "&room: sound_speed"
+        raise thud.InputError(message)
+
+    monkeypatch.setattr("thud.floors.floor_comparison.tapping_level", refuse)
+    with pytest.raises(thud.InputError, match="sound_speed"):
+        found.rows()
+
+
 @pytest.mark.parametrize("missing", ["model", "floor", "room"])
 def test_case_without_a_level_in_a_room_is_refused(missing: str) -> None:
     case = replace(CASES["thin"], **{missing: None})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from thud.display import Displayed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from thud._schema import FloorOptions
 
 
 # Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
@@ -107,14 +109,13 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     <TappingLevel: L_n,w 71 dB, C_I -11 dB>
     """
     require_kind("floor", floor, Plate)
-    ratio = floor.wave_speed / floor.density
-    if not 1 / WITHIN <= ratio / CONCRETE <= WITHIN:
+    if not _is_near_concrete(floor):
         refuse(
-            f"floor: wave_speed/density = {ratio:.3g} is not that of concrete, which the formula "
-            "of ISO 12354-2 holds",
+            f"floor: wave_speed/density = {floor.wave_speed / floor.density:.3g} is not that of "
+            "concrete, which the formula of ISO 12354-2 holds",
             f"{CONCRETE / WITHIN:.2f} to {CONCRETE * WITHIN:.2f} m4/(kg s)",
         )
-    if (floor.stiffness_ratio, floor.torsion_ratio) != (1, 1):
+    if not _is_isotropic(floor):
         refuse(
             f"floor: stiffness_ratio = {floor.stiffness_ratio:g} and torsion_ratio = "
             f"{floor.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
@@ -126,6 +127,19 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     radiated = time * found["radiation_factor"] * THIRDS / 1000
     level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)
     return TappingLevel(THIRDS, level)
+
+
+def has_tapping_level(floor: FloorOptions) -> TypeGuard[Plate]:
+    """Whether `tapping_level` is for a floor: an isotropic plate, near concrete."""
+    return isinstance(floor, Plate) and _is_near_concrete(floor) and _is_isotropic(floor)
+
+
+def _is_near_concrete(floor: Plate) -> bool:
+    return 1 / WITHIN <= floor.wave_speed / floor.density / CONCRETE <= WITHIN
+
+
+def _is_isotropic(floor: Plate) -> bool:
+    return (floor.stiffness_ratio, floor.torsion_ratio) == (1, 1)
 
 
 def require_room(room: Room | None) -> Room:

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._schema import Plate
-from thud.errors import InputError
-from thud.floors.modal_room import ModalRoom, modal_room
+from thud.floors.modal_room import ModalRoom, ModeCountError, modal_room
 from thud.plot.look import COLOURS, GREY, SIZE, band_axis, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
@@ -48,7 +47,7 @@ def _draw_positions(impact: Impact) -> Figure | None:
         return None
     try:
         return draw_modal_room(modal_room(impact, balls=8, microphones=16))
-    except InputError:  # too many modes, or none: the statistical answer stands alone
+    except ModeCountError:  # the statistical answer stands alone
         return None
 
 
