@@ -12,7 +12,8 @@ import pytest
 from conftest import REPOSITORY, naming, recorded
 
 import thud
-from thud import plot
+from thud import _api, plot
+from thud._api import floor_api
 from thud.cli import main
 from thud.errors import ReportWarning
 from thud.floors.prediction import _force_change
@@ -229,6 +230,20 @@ def test_run_draws_the_chain(tmp_path: Path) -> None:
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
     for name in ("room", "room_decay", "room_positions", "floor_modes"):
         assert (tmp_path / "out" / f"{name}.png").exists()
+
+
+def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved = thud.solve()
+    impact = replace(solved, case=replace(solved.case, floor=thud.Plate(), room=thud.Room()))
+    predicted = []
+
+    def call(function: object, *given: object) -> object:
+        predicted.append(function)
+        return _api.call(function, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("thud.floors.prediction.call", call)
+    assert {"room", "room_decay", "room_positions"} <= set(plot.case_figures(impact))
+    assert predicted.count(floor_api.predict_room) == 1
 
 
 def test_positions_are_drawn_unless_modes_are_none_or_too_many(

@@ -187,7 +187,18 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
         Where the floor is no plate, a position lies outside, or the room has too many modes.
     """
     prediction = predict_level(source, floor, room)
-    floor, room = prediction.floor, prediction.room  # type: ignore[assignment]
+    return positions_below(prediction, balls=balls, microphones=microphones, seed=seed)
+
+
+def positions_below(
+    prediction: RoomPrediction,
+    *,
+    balls: int | ArrayLike = 16,
+    microphones: int | ArrayLike = 32,
+    seed: int = 0,
+) -> ModalRoom:
+    """Compute what `modal_room` does for the impact, the floor and the room of a prediction."""
+    floor, room = prediction.floor, prediction.room
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
     size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
