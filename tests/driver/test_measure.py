@@ -113,6 +113,7 @@ def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
         (["drop.wav", "--height", "-1"], naming("height", -1.0)),
         (["drop.wav", "--config", "no.toml"], naming("no.toml")),
         (["drop.wav", "--channel", "9"], naming("drop.wav", "channel", 9)),
+        (["drop.wav", "--workers", "0"], naming("workers", 0, 1, 1024)),
     ],
 )
 def test_bad_recordings_get_one_sentence(
