@@ -25,7 +25,7 @@ from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 import thud
 from thud import cli
 from thud.recordings import kept, measurement, results
-from thud.recordings.config import Config, read_config
+from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.levels import measure_levels
 from thud.recordings.measurement import measure_window
 from thud.recordings.signal import Signal
@@ -133,6 +133,36 @@ def test_bad_recordings_get_one_sentence(
     assert re.search(words, errors)
     assert errors.count("\n") == 1
     assert not (tmp_path / "outputs").exists()
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        (Config(source="tire"), naming("source", "'tire'", "'tyre'")),  # type: ignore[arg-type]
+        (Config(limits={"octave_600": (1.0, 2.0)}), naming("limits", "octave_500")),
+        (Config(limits={"mass": (3.0, 2.0)}), naming("limits: mass", "minimum < maximum")),
+        (Config(limits={"mass": 2.5}), naming("limits: mass", 2.5)),  # type: ignore[dict-item]
+        (Config(mass=-1.0), naming("mass", -1.0)),
+    ],
+)
+def test_source_and_limits_are_checked_before_anything_is_measured(
+    config: Config, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(measurement, "find_windows")
+    signal = Signal.from_array(np.ones(100), 24_000)
+    with pytest.raises(thud.InputError, match=words):
+        thud.Recording.from_signals([signal], config)
+    with pytest.raises(thud.InputError, match=words):
+        thud.read_recording(FOLDER / "drop_1.wav", config=config)
+
+
+def test_limits_given_from_python_are_those_of_the_verdict() -> None:
+    signal = recorded(thud.solve())
+    limits = {"mass": (2.0, 3.0), "octave_63": (0.0, 99.0)}
+    config = Config(limits=limits, mass=2.5)
+    found = replace(signal, config=checked_config(config)).conformity()
+    spans = {one.name: (one.lower, one.upper) for one in found.decisions}
+    assert {name: spans[name] for name in limits} == limits
 
 
 def example(name: Path | str, tmp_path: Path, *changes: tuple[str, str]) -> thud.Recording:
