@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import pickle
 import re
@@ -24,6 +25,7 @@ from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 
 import thud
 from thud import cli
+from thud.errors import ReportWarning
 from thud.recordings import kept, measurement, results
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.levels import measure_levels
@@ -379,6 +381,31 @@ def test_interrupted_measurement_goes_on_where_it_ended(
     whole = thud.read_recording(file, config=config)
     assert [one.contact_time for one in found.drops] == [one.contact_time for one in whole.drops]
     np.testing.assert_array_equal(found.levels(), whole.levels())
+
+
+def test_drops_that_cannot_be_kept_at_an_interrupt_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (drop,) = recorded(thud.solve()).drops
+    signal = Signal.from_array(drop.force, drop.sample_rate)
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(kept, "replace_file", fail)
+
+    def measure() -> None:
+        with kept.KeptDrops(tmp_path) as drops:
+            drops.open(signal, Config())
+            drops.add(0, drop)
+            raise KeyboardInterrupt
+
+    with (
+        pytest.warns(ReportWarning, match=naming(tmp_path, "No space left")) as told,
+        pytest.raises(KeyboardInterrupt),
+    ):
+        measure()
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
