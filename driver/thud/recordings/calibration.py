@@ -11,6 +11,7 @@ from thud.checks import refuse, require_number
 from thud.recordings.channel import shown_path
 from thud.recordings.formats import read_channels
 from thud.recordings.reading import choose_channels, regular_file
+from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
 from thud.recordings.units import ALLOWED, Calibration, find_unit, require_unit
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-GRAVITY = 9.81
 # Number of means that stand for a record, and of those that a plateau needs.
 MEANS = 4096
 # Samples that are read at once.
