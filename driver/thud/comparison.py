@@ -27,6 +27,7 @@ from thud.plot.levels import common_source
 from thud.plot.look import page_files
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
+from thud.recordings.restitution import Fall
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -37,6 +38,10 @@ if TYPE_CHECKING:
 
 # Endings of namelist files; all others are recordings.
 NAMELISTS = (".nml", ".namelist", "")
+
+# Maximum ratio of the speeds of one drop with recordings: the limits of its height, 1 cm on both
+# sides of 0.85 m or more, make 1.2 %.
+MAX_SPREAD = 1.015
 
 # Criteria after the octaves: name and unit, size of the unit, decimals.
 _ROWS = (
@@ -71,9 +76,8 @@ class Comparison(Displayed):
 
     @property
     def remarks(self) -> list[str]:
-        """What is possible but not plausible, with the names of the impacts."""
-        solved = {n: i for n, i in self.impacts.items() if isinstance(i, Impact)}
-        return [f"{name}: {remark}" for name, i in solved.items() for remark in i.remarks]
+        """What is possible but not plausible, or doubtful, with the names of the impacts."""
+        return [f"{name}: {remark}" for name, i in self.impacts.items() for remark in i.remarks]
 
     def __repr__(self) -> str:
         """Return the names of what is compared."""
@@ -184,11 +188,12 @@ def compare(
     ----------
     impacts
         Cases (which are solved), impacts and recordings, one or more: by name, or in a row, where
-        cases and impacts have the names of their cases.
+        impacts have the names of their cases.
     force
         ``"floor"`` or ``"elastic"``; by default that of each case.
     source
-        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases.
+        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases and
+        recordings.
     progress
         Show a progress bar.
 
@@ -200,7 +205,8 @@ def compare(
     Raises
     ------
     InputError
-        Where there is nothing to compare, or the drops or the limits of the cases differ.
+        Where there is nothing to compare, or the drops or the limits differ; the height of a
+        recording counts where it is known.
 
     Warns
     -----
@@ -225,19 +231,27 @@ def compare(
             run_times[name] = time.perf_counter() - start
         else:
             solved[name] = given
-    speeds = {
-        name: impact.impact_velocity
-        for name, impact in solved.items()
-        if isinstance(impact, Impact)
-    }
-    if len(set(speeds.values())) > 1:
-        listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
-        message = f"&drop: height or gravity differs ({listed}); allowed: cases of the same drop"
-        raise InputError(message)
+    _require_same_drop(solved)
     found = Comparison(solved, run_times, force, common_source(solved, source))
     for remark in found.remarks:
         warnings.warn(remark, PlausibilityWarning, stacklevel=2)
     return found
+
+
+def _require_same_drop(impacts: Mapping[str, Impact | Recording]) -> None:
+    """Raise InputError where drops differ; measured heights differ within their tolerance."""
+    computed = {n: i.impact_velocity for n, i in impacts.items() if isinstance(i, Impact)}
+    falls = {n: Fall(i.config.height) for n, i in impacts.items() if isinstance(i, Recording)}
+    speeds = computed | {n: fall.speed for n, fall in falls.items() if fall.height}
+    if not speeds:
+        return
+    spread = max(speeds.values()) / min(speeds.values())
+    if len(set(computed.values())) > 1 or spread > MAX_SPREAD:
+        listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
+        refuse(
+            f"&drop: height or gravity differs ({listed})",
+            f"the same drop, of recordings within {MAX_SPREAD - 1:.1%} of the speed",
+        )
 
 
 def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
@@ -263,8 +277,8 @@ def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
 
 
 def _name(given: object) -> str:
-    case = given.case if isinstance(given, Impact) else given
-    return case.name if isinstance(case, Case) else type(given).__name__.lower()
+    named = given.case if isinstance(given, Impact) else given
+    return named.name if isinstance(named, Case | Recording) else type(named).__name__.lower()
 
 
 def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -33,8 +32,9 @@ _FORKED: list[bool] = []
 os.register_at_fork(after_in_child=lambda: _FORKED.append(True))
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
+    import pandas as pd
     from numpy.typing import ArrayLike, NDArray
 
     from thud._api import Bundle
@@ -50,7 +50,7 @@ _MAX_CALL = 2**17
 
 @check_keywords
 def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some more
-    parameters: Mapping[str, ArrayLike],
+    parameters: Mapping[str, ArrayLike] | pd.DataFrame,
     case: Case | None = None,
     *,
     model: ModelName | None = None,
@@ -75,7 +75,8 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     Parameters
     ----------
     parameters
-        Arrays of one dimension, or scalars, by the names of keys (entries of lists as
+        Arrays of one dimension, or scalars, by the names of keys, such as the columns of a
+        pandas.DataFrame (entries of lists as
         ``"frequency(2)"``; keys of floor and room whose name another key has with their group, as
         ``"plate.loss_factor"``); they are broadcast against each other.
     case
@@ -135,9 +136,12 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
     if base.model is None or (model is not None and model != base.model.name):
         base = replace(base, model=new_model(HollowSphere.name if model is None else model, {}))
     content = case_text(base)
+    if not hasattr(parameters, "keys"):
+        refuse_value("parameters", parameters, "arrays by their keys")
     # Without parameters there is one drop, that of the case.
+    given = dict(parameters) or {"height": base.drop.height}
     try:
-        columns, numbers = _columns(parameters or {"height": base.drop.height}, base)
+        columns, numbers = _columns(given, base)
     except MemoryError as error:
         refuse("the parameters do not fit in memory", "fewer sets", error)
     shared = {
@@ -290,8 +294,6 @@ def _columns(
     parameters: Mapping[str, ArrayLike], case: Case
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return one array per key, all of one length, and their numbers for the library."""
-    if not isinstance(parameters, Mapping):
-        refuse_value("parameters", parameters, "arrays by their keys")
     assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, users(case))[0] for name in parameters]
     for key in keys:

@@ -6,11 +6,10 @@ import base64
 import fcntl
 import re
 import warnings
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import f90nml
+import f90nml.scanner
 import numpy as np
 
 from thud._schema import SCALARS
@@ -37,6 +36,10 @@ _OWN = {
     "floor_force": "floor_force_N",
 }
 _MOTION = ("time", "deflection", "velocity")
+
+# Where a text ends too early it prints its tables and then raises. To redirect the output meanwhile
+# would take that of other threads.
+f90nml.scanner.print = lambda *_: None
 
 
 def read_results(directory: str | os.PathLike[str]) -> Impact:
@@ -106,10 +109,8 @@ class _Files:
 
 def _new_impact(files: _Files) -> Impact:
     """Return the impact of a result directory."""
-    # The parser prints its tables where a text ends too early.
-    with redirect_stdout(None):
-        case = Case.from_namelist(f90nml.reads(files.read("effective.nml")))
-        numbers = f90nml.reads(files.read("summary.nml"))
+    case = Case.from_text(files.read("effective.nml"))
+    numbers = f90nml.reads(files.read("summary.nml"))
     history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
     remarks = _texts(numbers.get("remarks", {}).get("remark", []))
     if not files.listed:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, REPOSITORY, naming
+from conftest import MINIMAL, REPOSITORY, naming, recorded
 
 import thud
 from thud import cli
 from thud.comparison import _cell, _digits
 from thud.criteria import Criterion
+from thud.errors import PlausibilityWarning
+from thud.recordings.config import Config
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,6 +121,39 @@ def test_limits_are_those_of_the_cases() -> None:
     with pytest.raises(thud.InputError, match=naming("&limits: source", "rubber_ball", "tyre")):
         thud.compare([thud.Case(), tyre])
     assert thud.compare([thud.Case(), tyre], source="rubber_ball").source == "rubber_ball"
+
+
+def test_limits_are_those_of_the_recordings_where_no_case_has_others() -> None:
+    ball = recorded(thud.solve())
+    tyre = replace(ball, config=Config(source="tyre"))
+    assert thud.compare([tyre]).source == tyre.conformity().source == "tyre"
+    assert thud.compare({"tyre": tyre, "not stated": ball}).source == "tyre"
+    assert thud.compare([ball]).source == "rubber_ball"
+    case = thud.Case(limits=thud.Limits("tyre"))
+    assert thud.compare([case, ball]).source == "tyre"
+    with pytest.raises(thud.InputError, match=naming("&limits: source", "rubber_ball", "tyre")):
+        thud.compare([thud.Case(), tyre])
+
+
+def test_recordings_say_what_is_doubtful_and_have_their_names() -> None:
+    ball = replace(recorded(thud.solve()), name="plate 7")
+    assert ball.remarks
+    with pytest.warns(PlausibilityWarning, match="plate 7: "):
+        comparison = thud.compare([ball, ball])
+    assert list(comparison.impacts) == ["plate 7", "plate 7 (2)"]
+    for name in comparison.impacts:
+        assert {f"{name}: {remark}" for remark in ball.remarks} <= set(comparison.remarks)
+
+
+def test_heights_of_recordings_are_those_of_the_drop_within_their_limits() -> None:
+    impact = thud.solve()
+    low, high, other = (recorded(impact, height=height) for height in (0.99, 1.01, 0.9))
+    assert len(thud.compare([impact, low, high, recorded(impact)]).impacts) == 4
+    # v = sqrt(2 g h)
+    with pytest.raises(thud.InputError, match=naming("&drop: height", 4.429, 4.202)):
+        thud.compare([impact, other])
+    with pytest.raises(thud.InputError, match=naming("&drop: height", 4.407, 4.202)):
+        thud.compare([low, other])
 
 
 def test_recording_stands_beside_its_model(tmp_path: Path) -> None:

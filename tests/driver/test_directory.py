@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -22,7 +23,7 @@ from conftest import REPOSITORY, naming
 import thud
 from thud import cli
 from thud.files import own_path
-from thud.studies import evaluation, fit
+from thud.studies import blocks, evaluation, fit
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
 from thud.studies.sweep import KIND
@@ -62,6 +63,24 @@ def test_zarr_holds_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     found = thud.sweep({"name": "b", **HEIGHTS}, tmp_path)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.zarr", "b.zarr"]
     assert values(found).identical(expected)
+
+
+def test_blocks_are_compared_with_their_checksums_once_for_all_variables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checked = Counter[Path]()
+    written = []
+    require, grid = blocks._require_whole, blocks.grid_of  # noqa: SLF001
+    monkeypatch.setattr(
+        blocks, "_require_whole", lambda path: (checked.update([path]), require(path))
+    )
+    monkeypatch.setattr(blocks, "grid_of", lambda *some: (written.append(some), grid(*some))[1])
+    # Each variable is written by itself.
+    monkeypatch.setattr(blocks, "LARGE", 1)
+    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
+    assert len(written) > 2
+    # The first block also tells what there is.
+    assert set(checked.values()) <= {1, 2}
 
 
 def test_command_writes_zarr(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -245,6 +245,7 @@ def test_scalars_and_defaults() -> None:
         ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, naming("height", "masked")),
         ({"momentum_flux": "some"}, {}, naming("momentum_flux", "'some'", "'none'")),
         ([1], {}, naming("parameters", [1])),
+        (np.ones(2), {}, naming("parameters")),
         ({}, {"threads": 0}, naming("threads", 0, 1, 1024)),
         ({}, {"threads": 1.5}, naming("threads", 1.5)),
         ({}, {"substeps": 1.5}, naming("&sampling: substeps", 1.5)),
@@ -478,3 +479,17 @@ def test_choices_are_those_of_their_words() -> None:
         assert peak == pytest.approx(thud.solve(momentum_flux=str(word)).peak_force, rel=1e-9)
     with pytest.raises(thud.InputError, match="'some'"):
         thud.solve_many({"momentum_flux": ["none", "some"]})
+
+
+def test_columns_of_a_table_are_parameters() -> None:
+    pandas = pytest.importorskip("pandas", reason="the extra studies is not installed")
+    columns = {"height": [0.5, 1.0], "momentum_flux": ["retarding", "none"]}
+    # Rows have any index.
+    found = thud.solve_many(pandas.DataFrame(columns, index=[7, 7]))
+    expected = thud.solve_many(columns)
+    assert list(found.parameters) == list(expected.parameters)
+    np.testing.assert_array_equal(found.restitution, expected.restitution)
+    with pytest.raises(thud.InputError, match=naming("'heigth'", "'height'")):
+        thud.solve_many(pandas.DataFrame({"heigth": [1.0]}))
+    # Without columns there is the drop of the case.
+    assert len(thud.solve_many(pandas.DataFrame())) == 1

@@ -81,8 +81,24 @@ def test_rating_of_the_tapping_machine_is_the_least_shift_that_is_allowed() -> N
             if np.maximum(tenths - 10 * (REFERENCE + n), 0).sum() <= 320
         ]  # fmt: skip
         assert found.weighted == 60 + min(shifts)
-        energy = sum(10 ** (one / 10) for one in level[3:18])
+        energy = sum(10 ** (one / 100) for one in tenths[:-1])
         assert found.adaptation == math.floor(10 * math.log10(energy) + 0.5) - 15 - found.weighted
+
+
+def test_adaptation_is_that_of_the_rounded_levels() -> None:
+    # 10 lg 15 = 11.761 dB: 62.51 dB before the levels are rounded, 62.46 dB after.
+    found, rounded = (thud.TappingLevel(THIRDS, np.full(19, one)) for one in (50.745, 50.7))
+    assert found.weighted == rounded.weighted
+    assert found.adaptation == rounded.adaptation == 62 - 15 - found.weighted
+
+
+def test_halves_of_a_tenth_are_rounded_up() -> None:
+    # Excesses of 29.8 dB and one of 2.25 dB: 32.1 dB, of which 32 dB are allowed.
+    level = np.concatenate([np.zeros(3), REFERENCE + 2.0])
+    level[[3, 4]] += (0.25, -0.2)
+    assert thud.TappingLevel(THIRDS, level).weighted == 61
+    level[3] -= 0.01
+    assert thud.TappingLevel(THIRDS, level).weighted == 60
 
 
 def test_tapping_level_is_the_formula_of_iso_12354_2() -> None:
@@ -148,6 +164,18 @@ def test_floors_without_a_tapping_level_leave_its_cell_empty(found: thud.FloorCo
     *_, energy, last = page.rows()
     assert last[1:] == (f"{tapping.weighted} ({tapping.adaptation})", "", "")
     assert float(energy[1]) == pytest.approx(1e3 * predictions["thick"].energy.sum(), rel=5e-3)
+
+
+def test_error_of_the_tapping_level_is_no_empty_cell(
+    found: thud.FloorComparison, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        message = "&room: sound_speed"
+        raise thud.InputError(message)
+
+    monkeypatch.setattr("thud.floors.floor_comparison.tapping_level", refuse)
+    with pytest.raises(thud.InputError, match="sound_speed"):
+        found.rows()
 
 
 @pytest.mark.parametrize("missing", ["model", "floor", "room"])

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 import pickle
 import re
 import subprocess
 import sys
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,17 +21,22 @@ import pytest
 import soundfile
 from conftest import REPOSITORY, naming, recorded
 from synthetic import make_recording
+from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 
 import thud
 from thud import cli
+from thud.errors import ReportWarning
 from thud.recordings import kept, measurement, results
-from thud.recordings.config import Config, read_config
+from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.levels import measure_levels
 from thud.recordings.measurement import measure_window
+from thud.recordings.signal import Signal
 from thud.recordings.verdict import average_estimates
 from thud.report.data import report_data
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from thud.recordings.drops import Window
     from thud.recordings.estimates import Drop
 
@@ -107,6 +115,7 @@ def test_record_of_an_unknown_ball_cannot_be_decided() -> None:
         (["drop.wav", "--height", "-1"], naming("height", -1.0)),
         (["drop.wav", "--config", "no.toml"], naming("no.toml")),
         (["drop.wav", "--channel", "9"], naming("drop.wav", "channel", 9)),
+        (["drop.wav", "--workers", "0"], naming("workers", 0, 1, 1024)),
     ],
 )
 def test_bad_recordings_get_one_sentence(
@@ -126,6 +135,36 @@ def test_bad_recordings_get_one_sentence(
     assert re.search(words, errors)
     assert errors.count("\n") == 1
     assert not (tmp_path / "outputs").exists()
+
+
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        (Config(source="tire"), naming("source", "'tire'", "'tyre'")),  # type: ignore[arg-type]
+        (Config(limits={"octave_600": (1.0, 2.0)}), naming("limits", "octave_500")),
+        (Config(limits={"mass": (3.0, 2.0)}), naming("limits: mass", "minimum < maximum")),
+        (Config(limits={"mass": 2.5}), naming("limits: mass", 2.5)),  # type: ignore[dict-item]
+        (Config(mass=-1.0), naming("mass", -1.0)),
+    ],
+)
+def test_source_and_limits_are_checked_before_anything_is_measured(
+    config: Config, words: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(measurement, "find_windows")
+    signal = Signal.from_array(np.ones(100), 24_000)
+    with pytest.raises(thud.InputError, match=words):
+        thud.Recording.from_signals([signal], config)
+    with pytest.raises(thud.InputError, match=words):
+        thud.read_recording(FOLDER / "drop_1.wav", config=config)
+
+
+def test_limits_given_from_python_are_those_of_the_verdict() -> None:
+    signal = recorded(thud.solve())
+    limits = {"mass": (2.0, 3.0), "octave_63": (0.0, 99.0)}
+    config = Config(limits=limits, mass=2.5)
+    found = replace(signal, config=checked_config(config)).conformity()
+    spans = {one.name: (one.lower, one.upper) for one in found.decisions}
+    assert {name: spans[name] for name in limits} == limits
 
 
 def example(name: Path | str, tmp_path: Path, *changes: tuple[str, str]) -> thud.Recording:
@@ -344,6 +383,31 @@ def test_interrupted_measurement_goes_on_where_it_ended(
     np.testing.assert_array_equal(found.levels(), whole.levels())
 
 
+def test_drops_that_cannot_be_kept_at_an_interrupt_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (drop,) = recorded(thud.solve()).drops
+    signal = Signal.from_array(drop.force, drop.sample_rate)
+
+    def fail(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(kept, "replace_file", fail)
+
+    def measure() -> None:
+        with kept.KeptDrops(tmp_path) as drops:
+            drops.open(signal, Config())
+            drops.add(0, drop)
+            raise KeyboardInterrupt
+
+    with (
+        pytest.warns(ReportWarning, match=naming(tmp_path, "No space left")) as told,
+        pytest.raises(KeyboardInterrupt),
+    ):
+        measure()
+    assert len(told) == 1
+
+
 @pytest.mark.parametrize("error", [KeyboardInterrupt, OSError(28, "No space left on device")])
 def test_measurement_interrupted_in_its_report_is_not_measured_again(
     error: type[BaseException] | BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -401,6 +465,34 @@ def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> Non
     one, two = (thud.read_recording(file, config=config, workers=n) for n in (1, 2))
     assert [drop.name for drop in two.drops] == [drop.name for drop in one.drops]
     np.testing.assert_allclose(two.levels(), one.levels(), rtol=0, atol=1e-9)
+
+
+def test_measurements_in_threads_leave_those_of_matrix_products_as_they_were() -> None:
+    time = np.arange(0, 0.02, 1 / 24_000)
+    force, _ = make_recording(1500 * np.sin(np.pi * time / 0.02), 24_000, noise_db=60)
+    begun, allowed = ([Event(), Event()] for _ in range(2))
+
+    def signals(i: int) -> Iterator[Signal]:
+        begun[i].set()
+        assert allowed[i].wait(60)
+        yield Signal.from_array(force, 24_000, f"{i}")
+
+    def used() -> set[int]:
+        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+    with threadpool_limits(2, "blas"), ThreadPoolExecutor(2) as threads:
+        # Others may set the number, too.
+        OpenBLASController.clear_controlling_thread()
+        measured = []
+        for i in range(2):
+            measured.append(threads.submit(thud.Recording.from_signals, signals(i), Config()))
+            assert begun[i].wait(60)
+        # The first one ends before the second.
+        for i in range(2):
+            assert used() == {1}
+            allowed[i].set()
+            measured[i].result()
+        assert used() == {2}
 
 
 def test_outliers_of_all_quantities_are_marked() -> None:

@@ -12,7 +12,10 @@ import pytest
 from conftest import REPOSITORY, naming, recorded
 
 import thud
+from thud import _api, plot
+from thud._api import floor_api
 from thud.cli import main
+from thud.errors import ReportWarning
 from thud.floors.prediction import _force_change
 
 if TYPE_CHECKING:
@@ -227,6 +230,43 @@ def test_run_draws_the_chain(tmp_path: Path) -> None:
     assert main(["run", str(case), "--output", str(tmp_path / "out"), "--quiet"]) == 0
     for name in ("room", "room_decay", "room_positions", "floor_modes"):
         assert (tmp_path / "out" / f"{name}.png").exists()
+
+
+def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved = thud.solve()
+    impact = replace(solved, case=replace(solved.case, floor=thud.Plate(), room=thud.Room()))
+    predicted = []
+
+    def call(function: object, *given: object) -> object:
+        predicted.append(function)
+        return _api.call(function, *given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("thud.floors.prediction.call", call)
+    assert {"room", "room_decay", "room_positions"} <= set(plot.case_figures(impact))
+    assert predicted.count(floor_api.predict_room) == 1
+
+
+def test_positions_are_drawn_unless_modes_are_none_or_too_many(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    impact = thud.solve()
+
+    def drawn(floor: thud.Plate, room: thud.Room) -> set[str]:
+        case = replace(impact.case, floor=floor, room=room)
+        return set(plot.case_figures(replace(impact, case=case)))
+
+    plate, room = thud.Plate(), thud.Room()
+    assert "room_positions" in drawn(plate, room)
+    # A stiff plate without modes below 400 Hz.
+    assert "room_positions" not in drawn(thud.Plate(length=1, width=1, thickness=1), room)
+
+    def refuse(*_: object, **_more: object) -> None:
+        message = "balls have another shape"
+        raise thud.InputError(message)
+
+    monkeypatch.setattr("thud.floors.modal_room._positions", refuse)
+    with pytest.warns(ReportWarning, match="room_positions is not drawn .balls"):
+        assert "room_positions" not in drawn(plate, room)
 
 
 def test_impact_on_the_floor_itself_is_of_the_contact_force() -> None:

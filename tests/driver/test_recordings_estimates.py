@@ -23,7 +23,7 @@ from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
 from thud.recordings.levels import measure_levels
 from thud.recordings.quantities import average_mass, average_restitution, drop_quantities
-from thud.recordings.restitution import Fall
+from thud.recordings.restitution import GRAVITY, Fall
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -258,19 +258,19 @@ def propagated(function: Callable[..., float], *estimates: Estimate) -> Estimate
 
 IMPULSE, CONTACT = Estimate(22.0, 0.05), Estimate(0.02, 2e-4)
 FLIGHTS = Estimate(0.7, 2e-3), Estimate(0.5, 1e-3)
-FALL = Fall(1.2, 2.4, 0.01, 0.02, 0.003, 9.8)
-LANDING = np.sqrt(2 * 9.8 * 1.2)
+FALL = Fall(1.2, 2.4, 0.01, 0.02, 0.003)
+LANDING = np.sqrt(2 * GRAVITY * 1.2)
 
 
 def by_impulse(impulse: float, contact: float, mass: float = 2.4, height: float = 1.2) -> float:
     """Return (J - m g t_c)/(m v0) - 1, of the momentum before and after."""
-    speed = np.sqrt(2 * 9.8 * height)
-    return (impulse - mass * 9.8 * contact) / (mass * speed) - 1
+    speed = np.sqrt(2 * GRAVITY * height)
+    return (impulse - mass * GRAVITY * contact) / (mass * speed) - 1
 
 
 def by_flight(flight: float, height: float = 1.2) -> float:
     """Return v/v0 of a ball that flies for a time: it comes back with the velocity g T/2."""
-    return 9.8 * flight / 2 / np.sqrt(2 * 9.8 * height)
+    return GRAVITY * flight / 2 / np.sqrt(2 * GRAVITY * height)
 
 
 def same(found: Estimate, expected: Estimate) -> None:
@@ -329,7 +329,7 @@ def test_effective_mass_has_the_uncertainty_of_its_parts() -> None:
     same(
         found,
         propagated(
-            lambda impulse, contact, e: impulse / (LANDING * (1 + e) + 9.8 * contact),
+            lambda impulse, contact, e: impulse / (LANDING * (1 + e) + GRAVITY * contact),
             IMPULSE, CONTACT, back,
         ),
     )  # fmt: skip
@@ -386,10 +386,10 @@ def test_mean_mass_has_calibration_and_height() -> None:
 
     def at(height: float) -> float:
         # v0 e = g T/2 does not change with the height.
-        speed = np.sqrt(2 * 9.8 * height)
+        speed = np.sqrt(2 * GRAVITY * height)
         return float(np.mean([
             drop.impulse.value
-            / (speed + LANDING * drop.restitutions["bounces"].value + 9.8 * CONTACT.value)
+            / (speed + LANDING * drop.restitutions["bounces"].value + GRAVITY * CONTACT.value)
             for drop in found
         ]))  # fmt: skip
 

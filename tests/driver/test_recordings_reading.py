@@ -25,6 +25,7 @@ from recording_files import DURATION, PEAK, SOUND, WITH_UNIT, WRITERS, broadcast
 
 from thud.errors import InputError
 from thud.levels import force_exposure_levels, get_bands
+from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
@@ -935,6 +936,26 @@ def test_calibration_record_gives_newtons_per_unit(seed: int) -> None:
     assert abs(value / 250.0 - 1) < 4.5 * found.uncertainty + 1e-4
     assert 1e-4 < found.uncertainty < 0.02
     assert found.origin == "2 steps of 5.02 kg in recording"
+
+
+@pytest.mark.parametrize("count", [0, 5, 10_007, 60_000])
+@pytest.mark.parametrize("block", [1, 100, 2**20])
+def test_means_of_a_calibration_are_those_of_its_parts_however_it_is_read(
+    count: int, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = np.random.default_rng(count).normal(size=count)
+    opened = []
+
+    def read(start: int, stop: int) -> NDArray[np.float64]:
+        opened.append(stop - start)
+        return values[start:stop]
+
+    monkeypatch.setattr(calibration, "BLOCK", block)
+    found = calibration._means(read, count)  # noqa: SLF001
+    width = max(1, count // calibration.MEANS)
+    parts = values[: count - count % width].reshape(-1, width)
+    np.testing.assert_array_equal(found, [part.mean() for part in parts])
+    assert len(opened) <= math.ceil(count / max(width, block - width + 1))
 
 
 def test_calibration_record_of_a_file(tmp_path: Path) -> None:

@@ -33,6 +33,7 @@ from thud.recordings.recording import Recording
 from thud.report.data import read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
+from thud.report.pdf import html_to_pdf
 from thud.report.write import write_report
 
 if TYPE_CHECKING:
@@ -365,7 +366,7 @@ def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
     assert not re.search(r"\bnan\b|\bNone\b|\binf\b", words)
 
 
-@pytest.mark.parametrize("library", [None, "print('no'); raise OSError('no libpango')"])
+@pytest.mark.parametrize("library", [None, "raise OSError('no libpango')"])
 def test_without_weasyprint_there_is_a_page_and_a_sentence(
     one: Recording,
     tmp_path: Path,
@@ -388,6 +389,39 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
     assert [path.name for path in paths] == ["report.json", "report.html"]
     assert sorted(path.name for path in folder.glob("report.*")) == ["report.html", "report.json"]
     assert not capsys.readouterr().out
+
+
+def test_nothing_is_printed_where_a_library_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip(
+        "weasyprint", reason="the extra report is not installed", exc_type=ImportError
+    )
+    # Its module that loads the libraries, and finds none.
+    for name in [name for name in sys.modules if name.split(".")[0] == "weasyprint"]:
+        monkeypatch.delitem(sys.modules, name)
+
+    def load(*_: object) -> None:
+        message = "no libpango"
+        raise OSError(message)
+
+    monkeypatch.setattr("ctypes.CDLL", load)
+    monkeypatch.setattr("cffi.FFI.dlopen", load)
+    with pytest.raises(ImportError, match="no libpango"):
+        html_to_pdf("<p>")
+    assert not capsys.readouterr().out
+
+
+def test_screen_of_others_is_theirs_while_a_pdf_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in [name for name in sys.modules if name.split(".")[0] == "weasyprint"]:
+        monkeypatch.delitem(sys.modules, name)
+    (tmp_path / "weasyprint.py").write_text("print('of another thread')")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(ImportError):
+        html_to_pdf("<p>")
+    assert capsys.readouterr().out == "of another thread\n"
 
 
 def test_missing_font_is_told(

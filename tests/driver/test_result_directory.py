@@ -14,8 +14,10 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
+import f90nml
 import pytest
 from conftest import MINIMAL, REPOSITORY, naming
 
@@ -490,6 +492,38 @@ def test_results_without_their_manifest_are_read_with_a_remark(
     with pytest.warns(PlausibilityWarning, match=naming("files")):
         found = thud.read_results(out)
     assert len(found.remarks) == len(whole.remarks) + 1
+
+
+def test_damaged_results_print_nothing_and_leave_the_screen_to_others(
+    run: Run,
+    case_file: CaseFile,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    run(case_file("&case name = 'it''s' /\n" + MINIMAL), "-o", "out")
+    out = tmp_path / "out"
+    screens = []
+
+    def reads(text: str, parse: Callable[[str], object] = f90nml.reads) -> object:
+        screens.append(sys.stdout)
+        return parse(text)
+
+    monkeypatch.setattr("f90nml.reads", reads)
+    assert thud.read_results(out).case.name == "it's"
+    (out / ".thud").unlink()
+    for name in ("effective.nml", "summary.nml"):
+        content = (out / name).read_bytes()
+        ends = {random.Random(0).randrange(len(content)) for _ in range(100)}  # noqa: S311
+        # Behind a quotation mark, a sign and an exponent, too.
+        for end in sorted(ends | {content.find(mark) + 1 for mark in (b"'", b"-", b"e")}):
+            for damaged in (content[:end], content[:end] + b"'" + content[end:]):
+                (out / name).write_bytes(damaged)
+                with suppress(thud.InputError):
+                    thud.read_results(out)
+        (out / name).write_bytes(content)
+    assert set(screens) == {sys.stdout}
+    assert not capsys.readouterr().out
 
 
 def test_snapshots_outside_the_directory_are_not_read(

@@ -56,7 +56,7 @@ def measure(options: argparse.Namespace) -> int:
             low_pass=options.low_pass or None,
             config=options.config,
             progress=not options.quiet and sys.stderr.isatty(),
-            workers=options.workers or len(os.sched_getaffinity(0)),
+            workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
             keep=kept,
         )
         verdict = recording.conformity()

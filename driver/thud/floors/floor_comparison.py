@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud._schema import Plate
 from thud.case import Case
 from thud.checks import refuse, require_kind
 from thud.display import MAKERS, Displayed
-from thud.errors import InputError, ThudError
+from thud.errors import ThudError
 from thud.files import Results
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.rating import CLASSES
-from thud.floors.tapping import tapping_level
+from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact import compute
 from thud.levels import get_bands
 
@@ -142,10 +141,7 @@ def compare_floors(
 
 def _tapping(one: RoomPrediction) -> str:
     """Return the reference level of the tapping machine, of the floors that have one."""
-    if not isinstance(one.floor, Plate):
+    if not has_tapping_level(one.floor):
         return ""
-    try:
-        found = tapping_level(one.floor, one.room)
-    except InputError:  # not concrete
-        return ""
+    found = tapping_level(one.floor, one.room)
     return f"{found.weighted} ({found.adaptation})"

@@ -27,6 +27,7 @@ from thud.checks import (
     require_whole,
 )
 from thud.display import MAKERS, Displayed
+from thud.errors import InputError
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.levels import get_bands
 from thud.recordings.bank import band_filters
@@ -54,6 +55,10 @@ WAITED, FAST = 60.0, 0.125
 REFERENCE_PRESSURE = 2e-5
 # Maximum number of positions of either kind, of modes, and of modes times spectral lines: memory.
 MAX_POSITIONS, MAX_MODES, MAX_VALUES = 1000, 20000, 2 * 10**7
+
+
+class ModeCountError(InputError):
+    """A floor or a room has no modes in the bands, or more than can be computed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -182,7 +187,18 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
         Where the floor is no plate, a position lies outside, or the room has too many modes.
     """
     prediction = predict_level(source, floor, room)
-    floor, room = prediction.floor, prediction.room  # type: ignore[assignment]
+    return positions_below(prediction, balls=balls, microphones=microphones, seed=seed)
+
+
+def positions_below(
+    prediction: RoomPrediction,
+    *,
+    balls: int | ArrayLike = 16,
+    microphones: int | ArrayLike = 32,
+    seed: int = 0,
+) -> ModalRoom:
+    """Compute what `modal_room` does for the impact, the floor and the room of a prediction."""
+    floor, room = prediction.floor, prediction.room
     require_kind("floor", floor, Plate)
     assert isinstance(floor, Plate)  # noqa: S101 - for the type checker
     size = (floor.length, floor.width, room.volume / (floor.length * floor.width))
@@ -201,11 +217,12 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
     duration = _duration(min(losses.min(), decay.min()))
     omega, force = _spectrum(prediction.source, duration)
     if len(omega) * len(orders) > MAX_VALUES:
-        refuse(
-            f"room: {len(orders)} modes below {HIGHEST:g} Hz ring for {duration:.1f} s",
+        message = (
+            f"room: {len(orders)} modes below {HIGHEST:g} Hz ring for {duration:.1f} s; allowed: "
             "a smaller volume or reverberation time; in large rooms the statistical prediction "
-            "holds",
+            "holds"
         )
+        raise ModeCountError(message)
     mass = found["surface_mass"] * floor.length * floor.width / 4
     plate = _receptance(omega, plate_frequency, losses) * (1j * omega) / mass
     stiffness = room.air_density * room.sound_speed**2 / (room.volume * _norms(orders))
@@ -268,10 +285,11 @@ def _plate_modes(floor: Plate) -> tuple[Array, Array]:
     frequency = plate_frequencies(floor, numbers)
     keep = frequency <= HIGHEST
     if not keep.any():
-        refuse(
-            f"floor: its first natural frequency is {frequency.min():.0f} Hz",
-            f"a floor with modes below {HIGHEST:g} Hz",
+        message = (
+            f"floor: its first natural frequency is {frequency.min():.0f} Hz; allowed: a floor "
+            f"with modes below {HIGHEST:g} Hz"
         )
+        raise ModeCountError(message)
     _require_modes("floor: the plate has", int(keep.sum()))
     return numbers[keep], frequency[keep]
 
@@ -294,10 +312,11 @@ def _grid(most: list[int]) -> Array:
 
 def _require_modes(what: str, count: int) -> None:
     if count > MAX_MODES:
-        refuse(
-            f"{what} about {count} modes below {HIGHEST:g} Hz",
-            f"at most {MAX_MODES}; there the statistical prediction holds",
+        message = (
+            f"{what} about {count} modes below {HIGHEST:g} Hz; allowed: at most {MAX_MODES}; "
+            "there the statistical prediction holds"
         )
+        raise ModeCountError(message)
 
 
 def _norms(orders: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from thud.display import Displayed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
+
+    from thud._schema import FloorOptions
 
 
 # Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.
@@ -50,18 +52,25 @@ class TappingLevel(Displayed):
     @property
     def weighted(self) -> int:
         """L_n,w, dB: the reference curve of ISO 717-2 shifted by whole decibels."""
-        level = np.round(self.level[RATED], 1)
+        excess = self._tenths - 10 * CURVE
         # From where every excess is above the allowed sum.
-        shift = int(np.floor((level - CURVE).min() - MAX_EXCESS))
-        while np.maximum(level - CURVE - shift, 0).sum() > MAX_EXCESS:
+        shift = int(np.floor(excess.min() / 10 - MAX_EXCESS))
+        while np.maximum(excess - 10 * shift, 0).sum() > 10 * MAX_EXCESS:
             shift += 1
         return AT_500 + shift
 
     @property
     def adaptation(self) -> int:
         """Spectrum adaptation term C_I, dB, of the thirds 100 to 2500 Hz (ISO 717-2 annex A)."""
-        total = 10 * np.log10((10 ** (self.level[3:18] / 10)).sum())
+        # Without that of 3150 Hz.
+        total = 10 * np.log10((10 ** (self._tenths[:-1] / 100)).sum())
         return int(np.floor(total + 0.5)) - 15 - self.weighted
+
+    @property
+    def _tenths(self) -> NDArray[np.float64]:
+        """Rated levels to one decimal, a half rounded up (ISO 717-2), in tenths of a decibel."""
+        tenths: NDArray[np.float64] = np.floor(10 * self.level[RATED] + 0.5)
+        return tenths
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, a third each."""
@@ -100,14 +109,13 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     <TappingLevel: L_n,w 71 dB, C_I -11 dB>
     """
     require_kind("floor", floor, Plate)
-    ratio = floor.wave_speed / floor.density
-    if not 1 / WITHIN <= ratio / CONCRETE <= WITHIN:
+    if not _is_near_concrete(floor):
         refuse(
-            f"floor: wave_speed/density = {ratio:.3g} is not that of concrete, which the formula "
-            "of ISO 12354-2 holds",
+            f"floor: wave_speed/density = {floor.wave_speed / floor.density:.3g} is not that of "
+            "concrete, which the formula of ISO 12354-2 holds",
             f"{CONCRETE / WITHIN:.2f} to {CONCRETE * WITHIN:.2f} m4/(kg s)",
         )
-    if (floor.stiffness_ratio, floor.torsion_ratio) != (1, 1):
+    if not _is_isotropic(floor):
         refuse(
             f"floor: stiffness_ratio = {floor.stiffness_ratio:g} and torsion_ratio = "
             f"{floor.torsion_ratio:g}, but the formula of ISO 12354-2 is for isotropic floors",
@@ -119,6 +127,19 @@ def tapping_level(floor: Plate, room: Room | None = None) -> TappingLevel:
     radiated = time * found["radiation_factor"] * THIRDS / 1000
     level = 155 - 30 * np.log10(found["surface_mass"]) + 10 * np.log10(radiated)
     return TappingLevel(THIRDS, level)
+
+
+def has_tapping_level(floor: FloorOptions) -> TypeGuard[Plate]:
+    """Whether `tapping_level` is for a floor: an isotropic plate, near concrete."""
+    return isinstance(floor, Plate) and _is_near_concrete(floor) and _is_isotropic(floor)
+
+
+def _is_near_concrete(floor: Plate) -> bool:
+    return 1 / WITHIN <= floor.wave_speed / floor.density / CONCRETE <= WITHIN
+
+
+def _is_isotropic(floor: Plate) -> bool:
+    return (floor.stiffness_ratio, floor.torsion_ratio) == (1, 1)
 
 
 def require_room(room: Room | None) -> Room:

@@ -1,8 +1,9 @@
 """Figures, each in a file of its own.
 
 A file holds the function that draws its figure, as wide as a column of a journal page, and declares
-its use: ``thud-driver run`` adds ``IMPACT_FIGURES``, ``MODES_FIGURES`` and ``COMPRESSION_FIGURES``
-to the results of a case, ``thud-driver figures`` draws ``DOCUMENTATION_FIGURES``.
+its use: ``thud-driver run`` adds ``IMPACT_FIGURES``, ``ROOM_FIGURES``, ``MODES_FIGURES`` and
+``COMPRESSION_FIGURES`` to the results of a case, ``thud-driver figures`` draws
+``DOCUMENTATION_FIGURES``.
 """
 
 import importlib
@@ -23,7 +24,8 @@ except ValueError as error:
     )
 
 from thud.compression import CompressionCurve
-from thud.display import draw_all
+from thud.display import draw_all, left_out
+from thud.floors.prediction import predict_level
 from thud.free_modes import FreeModes
 from thud.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
@@ -73,12 +75,21 @@ def case_figures(
     modes: FreeModes | None = None,
     curve: CompressionCurve | None = None,
 ) -> dict[str, Figure]:
-    """Draw the figures of a case: of its impact, its free modes, its slow compression.
+    """Draw the figures of a case: of its impact, the level below, free modes, slow compression.
 
     Return the figures by the names of their files, without those that have nothing to show or, with
     a warning, cannot be drawn.
     """
-    given = {"IMPACT_FIGURES": impact, "MODES_FIGURES": modes, "COMPRESSION_FIGURES": curve}
+    prediction = None
+    if impact and impact.case.room:
+        with left_out("the level in the room"):
+            prediction = predict_level(impact)
+    given = {
+        "IMPACT_FIGURES": impact,
+        "ROOM_FIGURES": prediction,
+        "MODES_FIGURES": modes,
+        "COMPRESSION_FIGURES": curve,
+    }
     return draw_all(
         {
             name: partial(draw, results)

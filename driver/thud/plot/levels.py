@@ -28,6 +28,8 @@ from thud.plot.look import (
     octave_boxes,
     own_style,
 )
+from thud.recordings.config import Config
+from thud.recordings.recording import Recording
 
 
 @own_style()
@@ -90,20 +92,24 @@ def draw_levels(
 
 
 def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = None) -> LimitsSource:
-    """Return a source of limits, or without it that of the cases.
+    """Return a source of limits, or without it that of the cases and recordings.
+
+    The default source of a recording is none that was stated: it counts only where no other is.
 
     Raises
     ------
     InputError
-        Where the cases differ in it.
+        Where they differ in it.
     """
-    found = {i.case.limits.source for i in impacts.values() if isinstance(i, Impact)}
-    if source is None and len(found) > 1:
-        what = f"&limits: source differs ({', '.join(sorted(found))})"
-        refuse(what, "cases with one source, or the choice of one")
     if source is not None:
         return source
-    return found.pop() if found else "rubber_ball"
+    found = {i.case.limits.source for i in impacts.values() if isinstance(i, Impact)}
+    recorded = {i.config.source for i in impacts.values() if isinstance(i, Recording)}
+    found |= recorded - {Config.source}
+    if len(found) > 1:
+        what = f"&limits: source differs ({', '.join(sorted(found))})"
+        refuse(what, "cases and recordings with one source, or the choice of one")
+    return found.pop() if found else Config.source
 
 
 def draw_tolerance(

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud._schema import Plate
-from thud.errors import InputError
-from thud.floors.modal_room import ModalRoom, modal_room
+from thud.floors.modal_room import ModalRoom, ModeCountError, positions_below
 from thud.plot.look import COLOURS, GREY, SIZE, band_axis, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.impact import Impact
+    from thud.floors.prediction import RoomPrediction
 
 
 @own_style()
@@ -42,14 +41,14 @@ def draw_modal_room(found: ModalRoom) -> Figure:
     return figure
 
 
-def _draw_positions(impact: Impact) -> Figure | None:
-    """Draw the levels of positions below the plate of a case."""
-    if not isinstance(impact.case.floor, Plate) or impact.case.room is None:
+def _draw_positions(found: RoomPrediction) -> Figure | None:
+    """Draw the levels of positions below a plate."""
+    if not isinstance(found.floor, Plate):
         return None
     try:
-        return draw_modal_room(modal_room(impact, balls=8, microphones=16))
-    except InputError:  # too many modes, or none: the statistical answer stands alone
+        return draw_modal_room(positions_below(found, balls=8, microphones=16))
+    except ModeCountError:  # the statistical answer stands alone
         return None
 
 
-IMPACT_FIGURES = {"room_positions": _draw_positions}
+ROOM_FIGURES = {"room_positions": _draw_positions}

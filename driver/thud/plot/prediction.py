@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.floors.prediction import RoomPrediction, predict_level
 from thud.plot.look import (
     COLOURS,
     GREY,
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
+    from thud.floors.prediction import RoomPrediction
     from thud.floors.survey import RoomLevels
-    from thud.impact import Impact
 
 
 # How far below the lowest maximum a decay is drawn, dB.
@@ -112,14 +111,4 @@ def _style(line: Line2D) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _draw_room(impact: Impact) -> Figure | None:
-    """Draw the prediction of a case that has a room."""
-    return draw_prediction(predict_level(impact)) if impact.case.room else None
-
-
-def _draw_decay(impact: Impact) -> Figure | None:
-    """Draw the decay in the room of a case that has one."""
-    return draw_decay(predict_level(impact)) if impact.case.room else None
-
-
-IMPACT_FIGURES = {"room": _draw_room, "room_decay": _draw_decay}
+ROOM_FIGURES = {"room": draw_prediction, "room_decay": draw_decay}

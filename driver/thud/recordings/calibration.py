@@ -11,6 +11,7 @@ from thud.checks import refuse, require_number
 from thud.recordings.channel import shown_path
 from thud.recordings.formats import read_channels
 from thud.recordings.reading import choose_channels, regular_file
+from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
 from thud.recordings.units import ALLOWED, Calibration, find_unit, require_unit
 
@@ -20,9 +21,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-GRAVITY = 9.81
 # Number of means that stand for a record, and of those that a plateau needs.
 MEANS = 4096
+# Samples that are read at once.
+BLOCK = 2**20
 PLATEAU = 8
 # Shares of the step at which it counts as gone up and down, and of a plateau left out at its ends.
 UP, DOWN = 0.6, 0.4
@@ -118,8 +120,12 @@ def _source(
 def _means(samples: Callable[[int, int], NDArray[np.float64]], count: int) -> NDArray[np.float64]:
     """Return the means of equal parts of a record."""
     width = max(1, count // MEANS)
-    values = (samples(start, start + width).mean() for start in range(0, count - width + 1, width))
-    return np.fromiter(values, float)
+    # Whole parts in each block: to read is to open the file.
+    step = width * max(1, BLOCK // width)
+    stop = count - count % width
+    blocks = (samples(start, min(start + step, stop)) for start in range(0, stop, step))
+    means = [block.reshape(-1, width).mean(axis=1) for block in blocks]
+    return np.concatenate([np.zeros(0), *means])
 
 
 def _steps(level: NDArray[np.float64], name: str) -> list[tuple[float, float]]:

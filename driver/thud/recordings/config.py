@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ from thud.recordings.units import read_chain, require_unit
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable
 
     from thud._schema import LimitsSource
     from thud.recordings.plate import PlateCheck
@@ -159,11 +160,16 @@ def read_config(path: str | os.PathLike[str]) -> Config:
 
 
 def checked_config(config: Config) -> Config:
-    """Return a configuration; raise InputError where a number is not within its range."""
+    """Return a configuration; raise InputError where a number is not within its range.
+
+    So it is where source or limits, which only the verdict needs, are not allowed.
+    """
     for key in NUMBERS:
         value = getattr(config, key, None)
         if value is not None:
             check_key(key, value, key)
+    for key in ("source", "limits"):
+        check_key(key, getattr(config, key), key)
     return config
 
 
@@ -257,9 +263,9 @@ def _source(value: object, place: str) -> str:
     return str(value)
 
 
-def _table(value: object, place: str, known: list[str]) -> dict[str, object]:
+def _table(value: object, place: str, known: list[str]) -> Mapping[str, object]:
     """Return a table of which all keys are known."""
-    if not isinstance(value, dict):
+    if not isinstance(value, Mapping):
         refuse(f"{place} = {shown(value)} is not allowed", "a table")
     _require_known(value, known, place)
     return value
@@ -302,7 +308,7 @@ def _limits(value: object, place: str) -> dict[str, tuple[float, float]]:
     criteria = judge(octaves, 0.0, 0.0, 0, 0.0, 0.0).criteria
     found = {}
     for key, span in _table(value, place, [one.name for one in criteria]).items():
-        if not isinstance(span, list) or len(span) != 2:  # noqa: PLR2004 - minimum, maximum
+        if not isinstance(span, list | tuple) or len(span) != 2:  # noqa: PLR2004 - minimum, maximum
             refuse(f"{place}: {key} = {shown(span)} is not allowed", "[minimum, maximum]")
         low, high = (_number(one, f"{place}: {key}", -1e6, 1e6) for one in span)
         if not low < high:

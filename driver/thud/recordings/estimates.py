@@ -18,7 +18,7 @@ from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.levels import measure_levels
 from thud.recordings.noise import Noise
-from thud.recordings.restitution import Fall
+from thud.recordings.restitution import GRAVITY, Fall
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -128,7 +128,6 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
     calibration_uncertainty: float = 0.0,
     mass_uncertainty: float = 0.0,
     height_uncertainty: float = 0.0,
-    gravity: float = 9.81,
 ) -> Drop:
     """Return what one drop tells.
 
@@ -142,8 +141,6 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         Mass of the source, kg.
     calibration_uncertainty, mass_uncertainty, height_uncertainty
         Standard uncertainties, relative, kg and m; they weight the ways to the restitution.
-    gravity
-        Acceleration of free fall, m/s2.
 
     Raises
     ------
@@ -171,13 +168,11 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
             f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
         )
     impulse = _impulse(contact)
-    fall = Fall(
-        height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty, gravity
-    )
+    fall = Fall(height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty)
     if height and landings:
         flight = _between(contact.end, landings[0][0]).value
         peak = _peak_of(window.bounces[0]) / contact.peak
-        if not peak / UNLIKE < gravity * flight / (2 * fall.speed) < peak * UNLIKE:
+        if not peak / UNLIKE < GRAVITY * flight / (2 * fall.speed) < peak * UNLIKE:
             landings = []
             unlike = (
                 f"the pulse {1e3 * flight:.0f} ms behind the contact has {peak:.2g} of its peak: "

@@ -8,12 +8,13 @@ import io
 import pickle
 import sys
 import time
+import warnings
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from thud._api import version
-from thud.errors import InputError
+from thud.errors import InputError, ReportWarning
 from thud.files import is_regular, replace_file, uninterrupted
 from thud.recordings.estimates import Drop
 
@@ -65,8 +66,14 @@ class KeptDrops:
         if self.folder is None:
             return
         if kind is not None and not issubclass(kind, InputError):
-            with suppress(OSError):
+            try:
                 self._write()
+            except OSError as failure:
+                message = (
+                    f"{self.folder}: the last drops are not kept ({failure.strerror}); the same "
+                    "call measures them again"
+                )
+                warnings.warn(message, ReportWarning, stacklevel=2)
             return
         # Those of other signals belong to another measurement.
         files = [p for one in self._digests for p in self._files(one)]

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
-from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from thud.checks import refuse
@@ -20,6 +19,7 @@ from thud.recordings.estimates import measure_drop
 from thud.recordings.kept import KeptDrops
 from thud.recordings.plate_correction import correct_window
 from thud.recordings.ringing import tell_ringing
+from thud.threads import limit_threads, one_thread
 
 if TYPE_CHECKING:
     import os
@@ -101,7 +101,7 @@ def measure_signals(
     uncertainties: list[float | None] = []
     # Its many small products are slower by threads.
     keeping = nullcontext(keep) if isinstance(keep, KeptDrops) else KeptDrops(keep)
-    with _one_thread(), keeping as kept, _Processes(workers) as processes:
+    with one_thread(), keeping as kept, _Processes(workers) as processes:
         for given in signals:
             signal = given
             if config.calibration_uncertainty is not None:
@@ -158,7 +158,7 @@ class _Processes(ExitStack):
         """Start the processes where it is worth it, and wait for nothing."""
         if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - one is this process
             return
-        self._pool = self.enter_context(process_pool(self.workers, _one_thread))
+        self._pool = self.enter_context(process_pool(self.workers, limit_threads))
         with no_interrupt_in_processes():
             for _ in range(self.workers):
                 self._pool.submit(int)
@@ -182,11 +182,6 @@ class _Processes(ExitStack):
         finally:
             for one in calls:
                 one.cancel()
-
-
-def _one_thread() -> threadpool_limits:
-    """Limit matrix products to one thread: also those of SciPy, which this module loads."""
-    return threadpool_limits(1, "blas")
 
 
 def measure_window(window: Window, config: Config) -> Drop:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from thud.checks import require_whole
 from thud.ensemble import MAX_THREADS
-from thud.recordings.config import Config, checked_config, read_config
+from thud.recordings.config import Config, read_config
 from thud.recordings.reading import open_signals
 from thud.recordings.recording import Recording
 
@@ -89,7 +89,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     }  # fmt: skip
     given = {key: value for key, value in given.items() if value is not None}
     require_whole("workers", workers, 1, MAX_THREADS)
-    known = checked_config(replace(known, **given))
+    known = replace(known, **given)
     files = [paths] if isinstance(paths, str | os.PathLike) else paths
     signals = (
         signal

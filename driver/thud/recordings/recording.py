@@ -105,14 +105,12 @@ class Recording(Displayed):
         InputError
             One sentence: what cannot be measured.
         """
-        config = checked_config(
-            Config(
-                height=height,
-                mass=mass,
-                height_uncertainty=height_uncertainty,
-                mass_uncertainty=mass_uncertainty,
-                calibration_uncertainty=calibration_uncertainty,
-            )
+        config = Config(
+            height=height,
+            mass=mass,
+            height_uncertainty=height_uncertainty,
+            mass_uncertainty=mass_uncertainty,
+            calibration_uncertainty=calibration_uncertainty,
         )
         signal = Signal.from_array(force, sample_rate, name)
         doubts = doubt(scan(signal.read, signal.n_sample, name), 1.0, name, assumed=False)
@@ -136,7 +134,7 @@ class Recording(Displayed):
             One sentence: what cannot be measured.
         """
         drops, origins, uncertainty = measure_signals(
-            signals, config, progress=progress, workers=workers, keep=keep
+            signals, checked_config(config), progress=progress, workers=workers, keep=keep
         )
         name = Path(origins[0].path or origins[0].name).stem
         return cls(name, drops, origins, config, uncertainty)

@@ -6,11 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from thud._schema import Drop
 from thud.recordings.contact import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+# Acceleration of free fall, m/s2: that of a model by default.
+GRAVITY = Drop.gravity
 IMPULSE, BOUNCES = "impulse", "bounces"
 
 
@@ -24,8 +27,6 @@ class Fall:
         Drop height of the lowest point, m, and mass, kg.
     calibration, mass_uncertainty, height_uncertainty : float
         Standard uncertainties, which all drops share: of the force, relative, and in kg and m.
-    gravity : float
-        Acceleration of free fall, m/s2.
     """
 
     height: float | None = None
@@ -33,26 +34,25 @@ class Fall:
     calibration: float = 0.0
     mass_uncertainty: float = 0.0
     height_uncertainty: float = 0.0
-    gravity: float = 9.81
 
     @property
     def speed(self) -> float:
         """Velocity at first touch, m/s; NaN without the height."""
-        return math.sqrt(2 * self.gravity * self.height) if self.height else math.nan
+        return math.sqrt(2 * GRAVITY * self.height) if self.height else math.nan
 
     def restitutions(
         self, impulse: Estimate, contact_time: Estimate, flights: Sequence[Estimate]
     ) -> tuple[dict[str, Estimate], tuple[str, ...]]:
         """Return the restitution by each way that is known, and remarks."""
         ways: dict[str, Estimate] = {}
-        speed, gravity = self.speed, self.gravity
+        speed = self.speed
         if self.height and self.mass:
             momentum = self.mass * speed
-            value = impulse.value / momentum - 1 - gravity * contact_time.value / speed
-            doubt = (impulse.uncertainty / momentum, gravity * contact_time.uncertainty / speed)
+            value = impulse.value / momentum - 1 - GRAVITY * contact_time.value / speed
+            doubt = (impulse.uncertainty / momentum, GRAVITY * contact_time.uncertainty / speed)
             ways[IMPULSE] = Estimate(value, math.hypot(*doubt))
         if self.height and flights:
-            scale = gravity / (2 * speed)
+            scale = GRAVITY / (2 * speed)
             ways[BOUNCES] = Estimate(scale * flights[0].value, scale * flights[0].uncertainty)
         elif len(flights) > 1:
             one, two = flights[:2]
@@ -110,11 +110,11 @@ class Fall:
         if restitution is None or not self.height:
             return Estimate.unknown()
         speed = self.speed
-        change = speed * (1 + restitution.value) + self.gravity * contact_time.value
+        change = speed * (1 + restitution.value) + GRAVITY * contact_time.value
         value = impulse.value / change
         parts = (
             impulse.uncertainty / change,
             value * speed * restitution.uncertainty / change,
-            value * self.gravity * contact_time.uncertainty / change,
+            value * GRAVITY * contact_time.uncertainty / change,
         )
         return Estimate(value, math.hypot(*parts))

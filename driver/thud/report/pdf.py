@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
+import ctypes
 import logging
 
 NEEDED = (
     "pip install weasyprint, and Debian's libpango-1.0-0, libpangoft2-1.0-0 and "
     "libharfbuzz-subset0, or print report.html with a browser"
+)
+# What WeasyPrint loads.
+LIBRARIES = (
+    "libgobject-2.0.so.0",
+    "libpango-1.0.so.0",
+    "libharfbuzz.so.0",
+    "libfontconfig.so.1",
+    "libpangoft2-1.0.so.0",
 )
 
 
@@ -21,10 +28,11 @@ def html_to_pdf(page: str) -> bytes:
         Where WeasyPrint or a library that it needs is missing.
     """
     try:
-        # It prints where a library is missing.
-        with contextlib.redirect_stdout(io.StringIO()):
-            from weasyprint import HTML  # noqa: PLC0415 - optional
-            from weasyprint.urls import URLFetcher  # noqa: PLC0415
+        # WeasyPrint prints where one is missing.
+        for library in LIBRARIES:
+            ctypes.CDLL(library)
+        from weasyprint import HTML  # noqa: PLC0415 - optional
+        from weasyprint.urls import URLFetcher  # noqa: PLC0415
     except OSError as error:
         raise ImportError(str(error)) from error
     # Fonts have tables that it does not use, and says so.

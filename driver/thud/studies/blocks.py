@@ -116,7 +116,8 @@ class Blocks:
         try:
             with _named(self.path):
                 for i in range(0, len(names), together):
-                    grid = grid_of(self._study, _join(paths, names[i : i + together]))
+                    found = _join(paths, names[i : i + together], known_whole=i > 0)
+                    grid = grid_of(self._study, found)
                     grid.to_zarr(part, mode="a" if i else "w", consolidated=False)
                 part.rename(self.path)
         finally:
@@ -190,11 +191,16 @@ def read_sweep(path: str | os.PathLike[str]) -> xr.Dataset:
         return _loaded(dataset)
 
 
-def _join(paths: list[Path], names: list[str] | None = None) -> xr.Dataset:
-    """Return blocks as one dataset, or some variables of them with all coordinates."""
+def _join(
+    paths: list[Path], names: list[str] | None = None, *, known_whole: bool = False
+) -> xr.Dataset:
+    """Return blocks as one dataset, or some variables of them with all coordinates.
+
+    Of blocks that are known to be whole only these are read.
+    """
     parts = []
     for path in paths:
-        with _open(path) as dataset:
+        with _open(path, known_whole=known_whole) as dataset:
             parts.append(_loaded(dataset if names is None else dataset[names]))
     return xr.concat(
         parts, "set", data_vars="minimal", coords="minimal", compat="override",
@@ -213,7 +219,7 @@ def _loaded(dataset: xr.Dataset) -> xr.Dataset:
 
 
 @contextmanager
-def _open(path: Path) -> Iterator[xr.Dataset]:
+def _open(path: Path, *, known_whole: bool = False) -> Iterator[xr.Dataset]:
     with _readable(path):
         with uninterrupted():
             if path.suffix == ".zarr":
@@ -223,7 +229,8 @@ def _open(path: Path) -> Iterator[xr.Dataset]:
                     raise ValueError(message)
                 dataset = _open_zarr(path)
             else:
-                _require_whole(path)
+                if not known_whole:
+                    _require_whole(path)
                 # Whole files are renamed to this name, so that no lock is needed; some file
                 # systems have none.
                 dataset = xr.open_dataset(

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.linalg import cho_solve
-from threadpoolctl import threadpool_limits
 
 from thud.checks import refuse
 from thud.errors import InputError, NumericalError
@@ -27,6 +26,7 @@ from thud.studies.emulation.surrogate import (
 from thud.studies.evaluation import LEVELS, SCALARS
 from thud.studies.parameter import Parameter
 from thud.studies.sets import SetStudy
+from thud.threads import one_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -210,7 +210,7 @@ def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[s
     shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
     kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
     process = GaussianProcessRegressor(kernel)
-    with warnings.catch_warnings(), threadpool_limits(1):
+    with warnings.catch_warnings(), one_thread():
         # A parameter without effect ends at the longest length.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(points, normal[:, chosen])
