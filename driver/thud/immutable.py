@@ -92,6 +92,11 @@ def _kept(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object
         return value._make(_kept(entry, keep_array) for entry in value)
     if type(value) in {list, tuple}:
         return tuple(_kept(entry, keep_array) for entry in value)  # type: ignore[attr-defined]
+    return _kept_table(value, keep_array)
+
+
+def _kept_table(value: object, keep_array: Callable[[NDArray[Any]], object]) -> object:
+    """Return a dataset as a copy, and what has the values of an array as it is kept."""
     # Who has a dataset has imported xarray.
     xarray = sys.modules.get("xarray")
     if xarray is not None and isinstance(value, xarray.Dataset):

@@ -187,16 +187,18 @@ def test_heads_have_a_time() -> None:
 
 def test_answers_have_to_be_read() -> None:
     before = "from thud.explorer import connections; connections.HEAD_TIME = 0.5"
+    count = 20_000
+    ask = b"GET /page/page.js HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * count
+    read = 0
     with serve(before=before) as server:
         host, port, _ = place_of(server[0])
-        ask = b"GET /page/page.js HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 1000
-        with socket.create_connection((host, port), 20) as connection:
+        # What was sent may still be read; then the connection is gone.
+        with socket.create_connection((host, port), 20) as connection, suppress(ConnectionError):
             connection.sendall(ask)
             time.sleep(5)
-            with pytest.raises(ConnectionResetError):
-                connection.sendall(ask)
-                while connection.recv(2**20):
-                    pass
+            while part := connection.recv(2**20):
+                read += len(part)
+    assert read < count * 1000
 
 
 def test_version_6_of_this_machine_is_served() -> None:
