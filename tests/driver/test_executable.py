@@ -152,6 +152,7 @@ BAD_CASES = {
         f"{MINIMAL}&sampling rate = 1 /",
         naming("&sampling: rate", "line 4", "'sample_rate'"),
     ),
+    "open quote at the start of a line": (f"{MINIMAL}\n'\n", naming("quote", "line 5")),
     "wrong type": ("&ball mass = 'heavy' / &drop / &model /", naming("&ball: mass", "'heavy'")),
     "two values": ("&ball mass = 1 2 / &drop / &model /", naming("&ball: mass", "1 2", "kg")),
     "unit in the value": (

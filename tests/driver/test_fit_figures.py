@@ -70,6 +70,11 @@ def test_level_target_has_no_ellipse_of_one_parameter() -> None:
     assert list(figures) == ["fit"]
     assert labels(figures["fit"]) == ["Standard deviation of the target", "Target", "Fit"]
     assert figures["fit"].axes[1].get_xlabel() == "Octave band, Hz"
+    spans = [
+        (one.get_paths()[0].vertices[:, 1].min(), one.get_paths()[0].vertices[:, 1].max())
+        for one in figures["fit"].axes[0].collections
+    ]
+    assert np.allclose(spans, [(level - 0.5, level + 0.5) for level in levels])
 
 
 @pytest.mark.parametrize("known", [True, False])

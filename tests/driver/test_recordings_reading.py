@@ -537,6 +537,25 @@ def test_flac_without_a_length_is_refused(tmp_path: Path) -> None:
     assert "samples" in refusal(path)
 
 
+@pytest.mark.parametrize("kind", ["int64", "uint64", "float32", "int8"])
+def test_matrices_of_other_numbers(kind: str, tmp_path: Path) -> None:
+    force = np.rint(half_sine(8000.0) / (20 if kind == "int8" else 1)).astype(kind)
+    path = tmp_path / "plate.mat"
+    scipy.io.savemat(path, {"Force": force, "Fs": 8000.0})
+    (signal,) = open_signals(path, calibration=5.0, unit="V")
+    np.testing.assert_array_equal(signal.samples(0, signal.n_sample), 5.0 * force)
+
+
+def test_universal_file_of_single_precision(tmp_path: Path) -> None:
+    path = write_pulse(tmp_path, "text.uff")
+    head = path.read_text().splitlines()[:13]
+    head[8] = head[8].replace("         4", "         2", 1)
+    force = half_sine(8000.0)
+    rows = ["".join(f"{v:13.5e}" for v in force[i : i + 6]) for i in range(0, len(force), 6)]
+    path.write_text("\n".join([*head, *rows, "    -1", ""]))
+    np.testing.assert_allclose(read_all(path)[1], force, rtol=1e-5, atol=1e-9)
+
+
 @pytest.mark.parametrize("shape", [(-1, 1), (1, -1), (-1, 2), (2, -1)])
 @pytest.mark.parametrize("kind", ["h5", "mat"])
 def test_columns_of_a_matrix(shape: tuple[int, int], kind: str, tmp_path: Path) -> None:
@@ -1019,6 +1038,7 @@ height = 1.0
 f0 = 950.0
 Q = 30.0
 f0_uncertainty = 0.01
+linearity = [[100.0, 101.0], [1000.0, 990.0]]
 [limits]
 octave_500 = [10.0, 15.0]
 """
@@ -1030,7 +1050,9 @@ def test_configuration_is_read(tmp_path: Path) -> None:
     assert found.calibration == "4.1 pC/N, 10 mV/pC"
     assert found.calibration_uncertainty == 0.005
     assert found.instruments == ("force plate 9281", "charge amplifier 5015")
-    assert found.plate == PlateConfig(950.0, 30.0, 0.01)
+    assert found.plate == PlateConfig(
+        950.0, 30.0, 0.01, linearity=((100.0, 101.0), (1000.0, 990.0))
+    )
     assert found.limits == {"octave_500": (10.0, 15.0)}
     assert (found.channel, found.unit, found.polarity) == (1, "V", "negative")
 
