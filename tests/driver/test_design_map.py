@@ -137,6 +137,9 @@ def test_ball_is_that_of_the_paper_only_if_all_of_it_is() -> None:
     axes: dict[str, Any] = {"mass": {"values": [2, 3]}, "height": {"values": [0.5, 1.5]}}
     result = thud.design_map({"parameters": axes})
     assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
+    # The values of the case for what is varied do not count.
+    result = thud.design_map({"case": {"drop": {"height": 1.4}}, "parameters": axes})
+    assert (result.mark, result.mark_name) == ((2.5, 1.0), "paper's ball")
     for fixed in ({"outer_radius": 0.07}, {"gravity": 1.6}):
         result = thud.design_map({"fixed": fixed, "parameters": axes})
         assert (result.mark, result.mark_name) == ((2.5, 1.0), "case")
