@@ -215,6 +215,11 @@ contains
       call new_material(options%material, ball, material, error)
       if (allocated(error)) return
       contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
+      if (contacts%quiet > huge(1.0_wp)) then
+         error = input_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is not to be told from 0; ' &
+            //'allowed: a higher one')
+         return
+      end if
       if (sampling%duration <= options%flight_before + contacts%quiet) then
          error = input_error('&sampling: duration = '//to_text(sampling%duration)//' s is too short: a contact is over ' &
             //'after '//to_text(contacts%quiet)//' s without touch, in which shear waves cross the ball; allowed: ' &

@@ -99,6 +99,11 @@ def test_mode_shapes_are_grids_for_anybody(case_file: CaseFile) -> None:
     assert table["harmonic"].tolist() == [1, 2, 3, 4]
 
 
+def test_modulus_that_vanishes_is_refused() -> None:
+    with pytest.raises(thud.InputError, match=naming("&ball: youngs_modulus")):
+        thud.solve(model=thud.FiniteElement(**COARSE), ball=thud.Ball(youngs_modulus=5e-324))
+
+
 def test_modes_alone_need_no_drop(
     case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
