@@ -1037,8 +1037,8 @@ height = 1.0
 [plate]
 f0 = 950.0
 Q = 30.0
-f0_uncertainty = 0.01
 linearity = [[100.0, 101.0], [1000.0, 990.0]]
+f0_uncertainty = 0.01
 [limits]
 octave_500 = [10.0, 15.0]
 """
@@ -1078,7 +1078,7 @@ def test_configuration_is_read(tmp_path: Path) -> None:
         ('"RB-07"', "7", naming("serial", 7)),
         ("= 2.5", "= ", naming("TOML")),
         (
-            "[plate]\nf0 = 950.0\nQ = 30.0\nf0_uncertainty = 0.01",
+            LAB[LAB.index("[plate]") : LAB.index("[limits]")],
             "plate = 3",
             naming("plate", 3),
         ),
