@@ -1079,7 +1079,7 @@ def test_configuration_is_read(tmp_path: Path) -> None:
         ("= 2.5", "= ", naming("TOML")),
         (
             LAB[LAB.index("[plate]") : LAB.index("[limits]")],
-            "plate = 3",
+            "plate = 3\n",
             naming("plate", 3),
         ),
     ],
