@@ -220,7 +220,8 @@ contains
             error = line_error(table, quoted(trim(cells(i)))//' has another decimal mark than the numbers before it; ' &
                //'allowed: one decimal mark in a table')
             return
-         else if (table%decimal == ' ' .and. may_be_group(cells(i))) then
+         end if
+         if (table%decimal == ' ' .and. may_be_group(cells(i))) then
             doubtful = i
          else
             table%decimal = cells(i)(at:at)
