@@ -216,7 +216,7 @@ contains
       if (allocated(error)) return
       contacts%quiet = 2*ball%outer_radius/sqrt(material%shear_modulus/material%density)
       if (contacts%quiet > huge(1.0_wp)) then
-         error = input_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is not to be told from 0; ' &
+         error = input_error('&ball: youngs_modulus = '//to_text(ball%youngs_modulus)//' Pa is too low to compute with; ' &
             //'allowed: a higher one')
          return
       end if
