@@ -46,6 +46,8 @@ RADIATORS = ("plate", "floating_floor", "joist_floor")
 NEEDED = (
     "modes", "mesh", "room", "compression", "measured_modes", "measured_mobility", "hunt_crossley",
 )  # fmt: skip
+# Samples beyond which the results of a case count as grown memory.
+MANY_SAMPLES = 500_000
 NO_NUMBER = re.compile(rb"(?i)(?<![a-z_])(nan|inf|infinity)(?![a-z_])|\*\*\*")
 
 
@@ -85,7 +87,8 @@ def _tried(path: Path, effective: bytes, chance: random.Random) -> tuple[str, st
         fraction = MEAN_TIME / (cost + FILE_TIME)
     if any(b"'%s'" % floor.encode() in effective for floor in RADIATORS):
         fraction *= OVER_RADIATOR
-    if dice > fraction:
+    sampling = dict(re.findall(rb"^ +(sample_rate|duration) += (\S+)", effective, re.MULTILINE))
+    if dice > fraction or math.prod(map(float, sampling.values())) > MANY_SAMPLES:
         return "accepted", ""
     # With sanitizers all takes ten times as long.
     if SANITIZED and chance.random() < 0.8:
