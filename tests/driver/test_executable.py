@@ -84,6 +84,18 @@ def test_effective_input_gives_the_same_bytes(
     assert read_bytes(tmp_path / "first") == before
 
 
+def test_rows_after_a_gentle_contact_are_zero(
+    run: Run, case_file: CaseFile, tmp_path: Path
+) -> None:
+    path = case_file("&ball / &drop height = 0.01 / &model /")
+    assert run(path, "-o", "out").returncode == 0
+    table = np.genfromtxt(tmp_path / "out/force.csv", delimiter=",", skip_header=1)[:, 1:]
+    last = np.flatnonzero(table.any(axis=1))[-1]
+    assert last == np.flatnonzero(thud.solve(drop=thud.Drop(0.01)).floor_force)[-1]
+    # The contact ends with numbers that are all small.
+    assert 0.1 < np.abs(table[last]).max() < 1
+
+
 @pytest.mark.parametrize(("bands", "count"), [("octave", 5), ("third", 15), ("both", 20)], ids=str)
 def test_bands_are_those_asked_for(
     run: Run, case_file: CaseFile, tmp_path: Path, bands: str, count: int

@@ -11,6 +11,7 @@ import pytest
 from conftest import naming
 
 import thud
+from thud._api import call_direct, level_api
 from thud.criteria import Conformity, Criterion
 from thud.levels import (
     BANDWIDTHS,
@@ -159,6 +160,11 @@ def test_criteria_are_single_numbers(value: object) -> None:
 def test_nominal_tyre_conforms() -> None:
     assert thud.judge([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
     assert not thud.judge([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
+
+
+def test_library_says_by_one_what_is_met() -> None:
+    *_, met = call_direct(level_api.judge, "tyre", np.zeros(5), 0.02, 0.8, 2, 7.3, 0.85, 10)
+    assert met.tolist() == [0, 0, 0, 0, 0, 1, 1, 0, 1, 1]
 
 
 def criteria_of(source: str, **changes: float) -> thud.Conformity:

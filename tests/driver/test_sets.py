@@ -86,6 +86,7 @@ def test_sets_that_fail_say_why(run: Run, case: Path, tmp_path: Path) -> None:
     rows = rows_of(tmp_path / "outputs/ball_sets/sets.csv")
     assert [row["status"] for row in rows] == ["0", "2", "1"]
     assert re.search(naming("&drop: height", "500.0 m"), rows[1]["reason"])
+    assert rows[1]["reason"].startswith("&drop")
     assert re.search(naming("&ball: mass", -2.5, "1.0e-12"), rows[2]["reason"])
     assert float(rows[0]["restitution"]) == pytest.approx(0.889, abs=1e-3)
     assert rows[1]["contact_time_s"] == rows[2]["floor_conforms"] == ""
@@ -175,6 +176,7 @@ def test_bad_tables_are_refused(
         (["--sets", "."], "directory"),
         (["--threads", "2"], naming("--threads", "--sets")),
         (["--sets", "table.csv", "--threads", "0"], naming("--threads", "'0'", 1, 1024)),
+        (["--sets", "table.csv", "--threads", "1025"], naming("--threads", "'1025'", 1, 1024)),
         (["--sets", "table.csv", "--threads", "2x"], naming("--threads", "'2x'", 1, 1024)),
         (["--sets", "table.csv", "-o", "."], naming("--output .")),
         (["--sets", "table.csv", "-o", "table.csv"], naming("--output", "table.csv")),
@@ -187,6 +189,11 @@ def test_bad_arguments_are_refused(
     result = run(case, *arguments)
     assert result.returncode == 1
     assert re.search(words, result.stderr.splitlines()[0])
+
+
+def test_greatest_number_of_threads_is_taken(run: Run, case: Path) -> None:
+    # What is missing is a table, or memory for so many.
+    assert "--threads" not in run(case, "--sets", "none.csv", "--threads", "1024").stderr
 
 
 @pytest.mark.parametrize(
@@ -334,6 +341,20 @@ def test_nothing_is_written_where_results_have_no_place(
     assert "sets.csv" in result.stderr
     assert (tmp_path / "o/sets.nml").read_bytes() == before
     assert sorted(path.name for path in (tmp_path / "o").iterdir()) == FILES
+
+
+def test_results_replace_neither_case_nor_table(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "o").mkdir()
+    (tmp_path / "table.csv").write_text("height\n1\n")
+    for source, arguments in {
+        case: ["o/sets.csv", "--sets", "table.csv"],
+        tmp_path / "table.csv": [case, "--sets", "o/sets.csv"],
+    }.items():
+        (tmp_path / "o/sets.csv").write_bytes(source.read_bytes())
+        result = run(*arguments, "-o", "o", "--replace")
+        assert result.returncode == 1
+        assert re.search(naming("o/sets.csv"), result.stderr)
+        assert (tmp_path / "o/sets.csv").read_bytes() == source.read_bytes()
 
 
 def test_results_of_single_drops_and_of_sets_are_kept_apart(
