@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Self
 
-from thud.key import Group, Key
+from thud.base.key import Group, Key
 
 __all__ = [
 {names}]
@@ -38,9 +38,9 @@ Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
 from collections.abc import Sequence
 from typing import Literal, TypedDict, Unpack, overload
 
-from thud._schema import (
+from thud.base.schema import (
 {names})
-from thud.impact import Impact
+from thud.impact.impact import Impact
 '''
 # A model is given by name, in its place or as a keyword; the first is the default.
 CALL = '''

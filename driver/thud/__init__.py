@@ -11,16 +11,16 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING
 
-from thud._api import version
-from thud._schema import *  # noqa: F403 - the groups and models that the library declares
-from thud._schema import __all__ as _groups
-from thud.case import Case, read_case, write_case
-from thud.checks import suggestion
-from thud.compression import CompressionCurve, compress
-from thud.criteria import Conformity, Criterion
-from thud.display import MAKERS
-from thud.ensemble import solve_many
-from thud.errors import (
+from thud.base.bridge import version
+from thud.base.schema import *  # noqa: F403 - the groups and models that the library declares
+from thud.base.schema import __all__ as _groups
+from thud.case.case import Case, read_case, write_case
+from thud.base.checks import suggestion
+from thud.impact.compression import CompressionCurve, compress
+from thud.level.criteria import Conformity, Criterion
+from thud.base.display import MAKERS
+from thud.impact.ensemble import solve_many
+from thud.base.errors import (
     FitWarning,
     InputError,
     LockWarning,
@@ -29,29 +29,29 @@ from thud.errors import (
     ThudError,
     WorkerWarning,
 )
-from thud.extras import require_extra
-from thud.floor_impact import FloorEnergy, FloorImpact, new_floor_impact
-from thud.floors.mobility import mobility
-from thud.free_modes import FreeModes, free_modes, loss_factors
-from thud.impact import Impact, solve_case
-from thud.levels import Bands, force_exposure_levels, get_bands, judge
-from thud.motion import Motion
-from thud.outcomes import Ensemble
-from thud.results import read_results
+from thud.base.extras import require_extra
+from thud.impact.floor_impact import FloorEnergy, FloorImpact, new_floor_impact
+from thud.impact.mobility import mobility
+from thud.impact.free_modes import FreeModes, free_modes, loss_factors
+from thud.impact.impact import Impact, solve_case
+from thud.level.levels import Bands, force_exposure_levels, get_bands, judge
+from thud.impact.motion import Motion
+from thud.impact.outcomes import Ensemble
+from thud.impact.results import read_results
 from thud.studies import kinds
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     # For type checkers, the calls of `solve` by model and what is imported at first use.
-    from thud import comparison as comparison
+    from thud.comparison import comparison
     from thud import plot as plot
     from thud._solve import solve as solve
-    from thud.comparison import Comparison as Comparison
-    from thud.comparison import compare as compare
-    from thud.comparison import read_all as read_all
-    from thud.compression_fit import CompressionFit as CompressionFit
-    from thud.compression_fit import fit_compression as fit_compression
+    from thud.comparison.comparison import Comparison as Comparison
+    from thud.comparison.comparison import compare as compare
+    from thud.comparison.comparison import read_all as read_all
+    from thud.studies.compression_fit import CompressionFit as CompressionFit
+    from thud.studies.compression_fit import fit_compression as fit_compression
     from thud.floors.floor_comparison import FloorComparison as FloorComparison
     from thud.floors.floor_comparison import compare_floors as compare_floors
     from thud.floors.impedance import BallImpedance as BallImpedance
@@ -89,9 +89,9 @@ if TYPE_CHECKING:
     from thud.studies.sweep import sweep as sweep
     from thud.studies.uncertainty import Uncertainty as Uncertainty
     from thud.studies.uncertainty import uncertainty as uncertainty
-    from thud.units import quantity as quantity
+    from thud.base.units import quantity as quantity
 else:
-    from thud.impact import solve
+    from thud.impact.impact import solve
 
 __version__ = version()
 

@@ -6,7 +6,7 @@ Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
 from collections.abc import Sequence
 from typing import Literal, TypedDict, Unpack, overload
 
-from thud._schema import (
+from thud.base.schema import (
     Ball,
     Drop,
     FiniteElementLaw,
@@ -18,7 +18,7 @@ from thud._schema import (
     ModelName,
     ModelOptions,
 )
-from thud.impact import Impact
+from thud.impact.impact import Impact
 
 class SamplingOptions(TypedDict, total=False):
     sample_rate: float

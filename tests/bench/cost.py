@@ -13,9 +13,9 @@ import sys
 import time
 from typing import Any
 
-from thud._schema import FLOORS
-from thud.ensemble import get_cost
-from thud.errors import ThudError
+from thud.base.schema import FLOORS
+from thud.impact.ensemble import get_cost
+from thud.base.errors import ThudError
 from thud.explorer.answer import MAX_SAMPLES, answer_case, new_case
 from thud.explorer.form import form
 

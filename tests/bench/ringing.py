@@ -20,7 +20,7 @@ import numpy as np
 import scipy.signal
 
 import thud
-from thud.levels import peak_count, record_force
+from thud.level.levels import peak_count, record_force
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from synthetic import band_limited, make_recording

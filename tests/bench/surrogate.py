@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import thud
-from thud.tables import format_rows
+from thud.base.tables import format_rows
 
 STUDY = Path(__file__).parents[2] / "inputs/studies/flagship.toml"
 # Sets whose time is measured.

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import thud
-from thud.columns import read_table
-from thud.record import read_record
+from thud.base.columns import read_table
+from thud.recordings.record import read_record
 
 FLAGSHIP = (REPOSITORY / "inputs/rubber_ball_100cm.nml").read_text()
 

@@ -11,7 +11,7 @@ import pytest
 from test_figure_look import assert_clean
 
 import thud
-from thud.comparison import _cell
+from thud.comparison.comparison import _cell
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 

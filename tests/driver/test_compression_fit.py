@@ -9,7 +9,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.stats import t
 
 import thud
-from thud.compression_fit import _doubts, _ratio
+from thud.studies.compression_fit import _doubts, _ratio
 
 TRUE = thud.Ball(youngs_modulus=1.83e6)
 START = thud.Ball(youngs_modulus=3e6)

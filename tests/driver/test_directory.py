@@ -22,7 +22,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.files import own_path
+from thud.base.files import own_path
 from thud.studies import blocks, evaluation, fit
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space

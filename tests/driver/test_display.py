@@ -12,12 +12,12 @@ import xarray as xr
 from conftest import recorded
 
 import thud
-from thud.display import html_table
+from thud.base.display import html_table
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from thud.display import Displayed
+    from thud.base.display import Displayed
 
 MASS = {"mass": {"low": 2.4, "high": 2.6}}
 

@@ -16,8 +16,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import thud
-from thud import ensemble
-from thud.outcomes import FURTHER
+from thud.impact import ensemble
+from thud.impact.outcomes import FURTHER
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -25,8 +25,8 @@ from starlette.testclient import TestClient
 
 import thud
 from thud import cli
-from thud._schema import FLOORS, MODELS
-from thud.case import check_case
+from thud.base.schema import FLOORS, MODELS
+from thud.case.case import check_case
 from thud.explorer import server
 from thud.explorer.answer import new_case
 from thud.explorer.form import form

@@ -17,9 +17,9 @@ from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
 import thud
-from thud import export_force
+from thud.export import force_files as export_force
 from thud.cli.export import EXPORT, KINDS
-from thud.export_force import EXPORTS, BlockedForce, blocked_force
+from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.recordings.read_recording import read_recording
 from thud.recordings.reading import open_signals
 

@@ -17,7 +17,7 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.files import Results, locked, replace_file
+from thud.base.files import Results, locked, replace_file
 
 
 @pytest.fixture

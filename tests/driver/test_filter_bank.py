@@ -11,7 +11,7 @@ from conftest import naming
 from scipy.signal import butter, freqz_sos, sosfilt
 
 import thud
-from thud.levels import BANDWIDTHS
+from thud.level.levels import BANDWIDTHS
 from thud.recordings.bank import band_filters, filter_levels
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.files import locked
+from thud.base.files import locked
 from thud.studies.fit import KIND
 
 if TYPE_CHECKING:

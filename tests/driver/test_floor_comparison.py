@@ -13,8 +13,8 @@ import pytest
 from conftest import REPOSITORY, naming
 
 import thud
-from thud._api import call, floor_api
-from thud.case import case_text
+from thud.base.bridge import call, floor_api
+from thud.case.case import case_text
 from thud.cli import main
 from thud.floors.rating import CLASS_LIMITS
 from thud.floors.tapping import THIRDS

@@ -17,7 +17,7 @@ from conftest import MINIMAL, REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.files import MANIFEST, PART
+from thud.base.files import MANIFEST, PART
 from thud.plot import look
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(look, "_picture", lambda *_: b"picture")
     monkeypatch.setattr("thud.plot.documentation_figures", lambda: {"figure1": object})
     monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
-    monkeypatch.setattr("thud.recordings.results.page_contents", lambda *_: {"report.html": b"p"})
+    monkeypatch.setattr("thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"})
 
     def run(name: str, *more: str) -> int:
         words = [*WRITERS[name].words, "-q", "-o", "out", *more]

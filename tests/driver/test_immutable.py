@@ -19,7 +19,7 @@ import xarray as xr
 from conftest import recorded
 
 import thud
-from thud import immutable
+from thud.base import immutable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

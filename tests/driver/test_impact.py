@@ -10,8 +10,8 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.contact_time import contact_span
-from thud.levels import peak_count
+from thud.impact.contact_time import contact_span
+from thud.level.levels import peak_count
 
 
 def test_arrays_share_one_clock() -> None:

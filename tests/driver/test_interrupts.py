@@ -19,8 +19,8 @@ import pytest
 from conftest import MINIMAL, naming
 
 import thud
-from thud.files import uninterrupted
-from thud.levels import peak_count, record_force
+from thud.base.files import uninterrupted
+from thud.level.levels import peak_count, record_force
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -219,7 +219,7 @@ def test_processes_forked_beside_short_calls_have_no_locked_libraries(
 ) -> None:
     code = f"""
 import os, signal, threading, thud
-from thud.case import check_case
+from thud.case.case import check_case
 case = thud.Case(model=thud.ModalBall(rings=20))
 
 def compute():

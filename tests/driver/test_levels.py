@@ -11,9 +11,9 @@ import pytest
 from conftest import naming
 
 import thud
-from thud._api import call_direct, level_api
-from thud.criteria import Conformity, Criterion
-from thud.levels import (
+from thud.base.bridge import call_direct, level_api
+from thud.level.criteria import Conformity, Criterion
+from thud.level.levels import (
     BANDWIDTHS,
     RECORDED_BAND,
     SOURCES,

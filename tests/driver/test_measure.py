@@ -25,7 +25,7 @@ from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 
 import thud
 from thud import cli
-from thud.errors import ReportWarning
+from thud.base.errors import ReportWarning
 from thud.recordings import kept, measurement, results
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.levels import measure_levels

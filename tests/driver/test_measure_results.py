@@ -18,8 +18,8 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import cli
-from thud.errors import ReportWarning
-from thud.files import Results
+from thud.base.errors import ReportWarning
+from thud.base.files import Results
 from thud.recordings import results
 from thud.report.rows import HEAD
 from thud.report.write import PDF

@@ -16,7 +16,7 @@ from conftest import REPOSITORY, naming
 from PIL import Image
 
 import thud
-from thud.levels import record_force
+from thud.level.levels import record_force
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

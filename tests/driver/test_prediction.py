@@ -13,9 +13,9 @@ from conftest import REPOSITORY, naming, recorded
 
 import thud
 from thud import _api, plot
-from thud._api import floor_api
+from thud.base.bridge import floor_api
 from thud.cli import main
-from thud.errors import ReportWarning
+from thud.base.errors import ReportWarning
 from thud.floors.prediction import _force_change
 
 if TYPE_CHECKING:

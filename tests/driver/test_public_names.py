@@ -18,7 +18,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud import impact, units
-from thud._schema import KEYS, MODELS
+from thud.base.schema import KEYS, MODELS
 from thud.studies import kinds
 from thud.studies.parameter import fitted
 

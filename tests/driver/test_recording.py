@@ -9,8 +9,8 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.columns import read_table
-from thud.record import read_record
+from thud.base.columns import read_table
+from thud.recordings.record import read_record
 from thud.recordings.formats.text import read_channels
 
 if TYPE_CHECKING:

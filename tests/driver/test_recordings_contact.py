@@ -11,7 +11,7 @@ from scipy import stats
 from scipy.ndimage import uniform_filter1d
 from synthetic import half_sine, make_drop
 
-from thud.levels import record_force
+from thud.level.levels import record_force
 from thud.recordings import calibration, contact, drops, estimates, flanks
 from thud.recordings.contact import Contact, cells_between, even_edges
 from thud.recordings.plate import Plate, correct_plate

@@ -14,8 +14,8 @@ from scipy.stats import chi2
 from synthetic import band_limited, coloured_noise, half_sine, make_drop, make_recording
 
 import thud
-from thud.contact_time import contact_span
-from thud.levels import record_force
+from thud.impact.contact_time import contact_span
+from thud.level.levels import record_force
 from thud.recordings.config import Config
 from thud.recordings.contact import Estimate
 from thud.recordings.drops import find_windows

@@ -18,7 +18,7 @@ import pytest
 from conftest import REPOSITORY, naming
 from recording_files import WRITERS, half_sine
 
-from thud.errors import InputError
+from thud.base.errors import InputError
 from thud.recordings import probe
 from thud.recordings.reading import open_signals
 

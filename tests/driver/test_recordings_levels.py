@@ -18,7 +18,7 @@ from scipy.stats import t as student
 from synthetic import make_drop
 
 import thud
-from thud.levels import RECORDED_BAND
+from thud.level.levels import RECORDED_BAND
 from thud.recordings.band_noise import band_noise
 from thud.recordings.contact import Estimate, cells_between, even_edges
 from thud.recordings.levels import (

@@ -22,8 +22,8 @@ import soundfile
 from conftest import REPOSITORY, naming
 from recording_files import DURATION, PEAK, SOUND, WITH_UNIT, WRITERS, broadcast_chunk, half_sine
 
-from thud.errors import InputError
-from thud.levels import force_exposure_levels, get_bands
+from thud.base.errors import InputError
+from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile

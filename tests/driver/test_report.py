@@ -22,9 +22,9 @@ from synthetic import make_recording
 from test_figure_look import assert_clean
 
 import thud
-from thud.errors import ReportWarning
-from thud.files import Results
-from thud.levels import record_force
+from thud.base.errors import ReportWarning
+from thud.base.files import Results
+from thud.level.levels import record_force
 from thud.plot.recording import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Estimate

@@ -22,8 +22,8 @@ import pytest
 from conftest import MINIMAL, REPOSITORY, naming
 
 import thud
-from thud.errors import PlausibilityWarning
-from thud.files import HEAD, PART, Results, locked, own_path
+from thud.base.errors import PlausibilityWarning
+from thud.base.files import HEAD, PART, Results, locked, own_path
 
 sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, library

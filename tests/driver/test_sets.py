@@ -14,8 +14,8 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.keys import put
-from thud.levels import SOURCES
+from thud.case.keys import put
+from thud.level.levels import SOURCES
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

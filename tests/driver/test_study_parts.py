@@ -14,7 +14,7 @@ from conftest import naming
 from scipy.stats import norm
 
 import thud
-from thud._schema import KEYS
+from thud.base.schema import KEYS
 from thud.studies import designs
 from thud.studies.design_map import KIND as DESIGN
 from thud.studies.design_map import DesignMap, _mark

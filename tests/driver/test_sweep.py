@@ -22,11 +22,11 @@ from scipy.stats import qmc
 
 import thud
 from thud import cli, tables, units
-from thud._schema import MODELS
-from thud.ensemble import get_cost
-from thud.keys import known_keys, put
+from thud.base.schema import MODELS
+from thud.impact.ensemble import get_cost
+from thud.case.keys import known_keys, put
 from thud.studies import designs, directory, evaluation, fit, sweep
-from thud.units import MULTIPLES, scaled
+from thud.base.units import MULTIPLES, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Callable

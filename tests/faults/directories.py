@@ -17,7 +17,7 @@ from forks import Order, fail, forks
 from injection import ERRORS, KILLS, PATIENCE, executable, library
 
 import thud
-from thud.files import Results
+from thud.base.files import Results
 
 if TYPE_CHECKING:
     import random

@@ -9,13 +9,13 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import thud
-from thud._schema import FLOORS, KEYS, MODELS
+from thud.base.schema import FLOORS, KEYS, MODELS
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Callable
 
-    from thud.key import Group, Key
+    from thud.base.key import Group, Key
 
 LUMPED = ("hollow_sphere", "hunt_crossley", "two_mass", "measured_modes")
 WEIGHTS = (4, 3, 1, 2)

@@ -10,13 +10,13 @@ import numpy as np
 from edge_cases import LUMPED
 
 import thud
-from thud._schema import KEYS
+from thud.base.schema import KEYS
 
 if TYPE_CHECKING:
     import random
     from collections.abc import Callable, Iterable
 
-    from thud.key import Group, Key
+    from thud.base.key import Group, Key
 
 # Changes of contact time and restitution by steps half as long, measured up to 2e-6; of levels by
 # four times as many samples, measured up to 0.19 dB where no remark tells of the rate.

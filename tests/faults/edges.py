@@ -16,7 +16,7 @@ from edge_comparisons import COMPARISONS, is_of_step
 from edge_laws import BALANCE, get_fault
 
 import thud
-from thud.case import case_text
+from thud.case.case import case_text
 
 if TYPE_CHECKING:
     import random

@@ -11,7 +11,7 @@ from forks import Order, forks
 from kills import judge_end, undisturbed
 from scenarios import NEW, OUT, SCENARIOS, make
 
-from thud.files import MANIFEST, PART
+from thud.base.files import MANIFEST, PART
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable

@@ -14,7 +14,7 @@ from directories import files_of
 from forks import WORK, Order, forks
 from scenarios import NEW, OLD, OUT, SCENARIOS, inputs, make
 
-from thud.files import MANIFEST
+from thud.base.files import MANIFEST
 
 if TYPE_CHECKING:
     import random

@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from recording_files import WRITERS, half_sine
 
-from thud.errors import InputError
+from thud.base.errors import InputError
 from thud.recordings.reading import open_signals
 
 if TYPE_CHECKING:

@@ -14,14 +14,14 @@ from attempts import SANITIZED
 from sentences import fault_of
 
 import thud
-from thud._api import api, call, ensemble_api
-from thud._schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
-from thud.case import case_text
+from thud.base.bridge import api, call, ensemble_api
+from thud.base.schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
+from thud.case.case import case_text
 
 if TYPE_CHECKING:
     import random
 
-    from thud.key import Key
+    from thud.base.key import Key
 
 NUMBERS = [
     "0", "-1", "1e-300", "1e300", "1e-160", "1e160", "nan", "inf", "-0.0", "1d0", "1e", "2*1.0",

@@ -30,7 +30,7 @@ HIDDEN = {"x86-64-v4": "", "x86-64-v3": "-AVX512F", "x86-64": "-AVX2,-AVX512F"}
 TOLERANCE = 1e-9  # dB
 LEVELS = """
 import json, thud
-from thud import _api
+from thud.base import bridge as _api
 levels = {model: list(thud.solve(thud.Ball(), model=model).levels()) for model in MODELS}
 print(json.dumps({"compiler": _api.compiler(), "levels": levels}))
 """

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import thud
-from thud.levels import BANDWIDTHS
+from thud.level.levels import BANDWIDTHS
 from thud.recordings.bank import filter_levels
 
 library = pytest.importorskip("pyoctaveband")

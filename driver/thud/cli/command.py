@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tqdm import tqdm
 
-from thud.display import draw_all, left_out
-from thud.errors import InputError, LockWarning, ReportWarning, ThudError, WorkerWarning
-from thud.files import Results
+from thud.base.display import draw_all, left_out
+from thud.base.errors import InputError, LockWarning, ReportWarning, ThudError, WorkerWarning
+from thud.base.files import Results
 
 if TYPE_CHECKING:
     import argparse

@@ -7,9 +7,9 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.cli.command import QUIET, Command, argument
-from thud.files import own_path
+from thud.base.files import own_path
 
 if TYPE_CHECKING:
     import argparse

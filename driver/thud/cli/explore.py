@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.cli.command import QUIET, Command, argument
-from thud.extras import require_extra
+from thud.base.extras import require_extra
 
 if TYPE_CHECKING:
     import argparse

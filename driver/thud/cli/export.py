@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from thud.case import read_case
-from thud.checks import refuse
+from thud.case.case import read_case
+from thud.base.checks import refuse
 from thud.cli.command import QUIET, Command, argument, output, results_of, tell
-from thud.impact import compute
+from thud.impact.impact import compute
 
 if TYPE_CHECKING:
     import argparse
 
-    from thud.impact import Impact
+    from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
 
 # By option: what it writes.
@@ -28,7 +28,7 @@ KINDS = {
 
 def run_export(options: argparse.Namespace) -> int:
     """Write the blocked force in the formats that are asked for; return the exit code."""
-    from thud import export_force  # noqa: PLC0415 - SciPy takes its time
+    from thud.export import force_files as export_force  # noqa: PLC0415 - SciPy takes its time
 
     chosen = [kind for kind in KINDS if getattr(options, kind)]
     if not chosen:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.cli.command import PAGE, results_of, tell
-from thud.display import draw_all
-from thud.errors import PlausibilityWarning
-from thud.tables import format_rows
+from thud.base.display import draw_all
+from thud.base.errors import PlausibilityWarning
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def compare_cases(options: argparse.Namespace) -> int:
     """Compare cases and recordings; return the exit code."""
-    from thud import comparison  # noqa: PLC0415 - matplotlib takes its time
+    from thud.comparison import comparison  # noqa: PLC0415 - matplotlib takes its time
 
     results = results_of(options, "comparison", options.cases)
     results.require(f"comparison{ending}" for ending in PAGE)

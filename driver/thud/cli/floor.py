@@ -6,15 +6,15 @@ import sys
 import warnings
 from typing import TYPE_CHECKING
 
-from thud.case import read_case
+from thud.case.case import read_case
 from thud.cli.command import PAGE, QUIET, Command, argument, output, results_of, tell
-from thud.errors import InputError, PlausibilityWarning
-from thud.tables import format_rows
+from thud.base.errors import InputError, PlausibilityWarning
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse
 
-    from thud.case import Case
+    from thud.case.case import Case
 
 
 def compare(options: argparse.Namespace) -> int:

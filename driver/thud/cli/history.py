@@ -6,8 +6,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from thud.cli.command import results_of
-from thud.display import draw_all
-from thud.tables import format_rows
+from thud.base.display import draw_all
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy take their time.
-    from thud.plot.history import draw_history  # noqa: PLC0415
+    from thud.report.history_figure import draw_history  # noqa: PLC0415
     from thud.plot.look import picture_files  # noqa: PLC0415
     from thud.report.history import read_history  # noqa: PLC0415
 

@@ -17,8 +17,8 @@ from thud.cli.command import (
     results_of,
     tell,
 )
-from thud.levels import SOURCES
-from thud.tables import format_rows
+from thud.level.levels import SOURCES
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
-from thud.tables import format_rows
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import argparse

@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud._api import api, call, text
-from thud.case import Case, read_case
+from thud.base.bridge import api, call, text
+from thud.case.case import Case, read_case
 from thud.cli.command import exit_code, sentence
-from thud.compression import new_curve
-from thud.display import left_out
-from thud.errors import InputError, ThudError
-from thud.files import Results
-from thud.free_modes import new_modes
-from thud.impact import new_impact
+from thud.impact.compression import new_curve
+from thud.base.display import left_out
+from thud.base.errors import InputError, ThudError
+from thud.base.files import Results
+from thud.impact.free_modes import new_modes
+from thud.impact.impact import new_impact
 
 if TYPE_CHECKING:
     import argparse
 
-    from thud._api import Bundle
+    from thud.base.bridge import Bundle
 
 NOT_CONFORMING = 3
 

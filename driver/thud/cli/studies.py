@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, tell
-from thud.display import left_out
-from thud.errors import NumericalError, ThudError
+from thud.base.display import left_out
+from thud.base.errors import NumericalError, ThudError
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:

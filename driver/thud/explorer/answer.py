@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.case import tables_case
-from thud.checks import refuse, shown
-from thud.ensemble import get_cost
-from thud.errors import ThudError
-from thud.floor_impact import FloorImpact
+from thud.case.case import tables_case
+from thud.base.checks import refuse, shown
+from thud.impact.ensemble import get_cost
+from thud.base.errors import ThudError
+from thud.impact.floor_impact import FloorImpact
 from thud.floors.prediction import predict_level
-from thud.impact import compute
-from thud.keys import plain_words
-from thud.levels import get_bands
+from thud.impact.impact import compute
+from thud.case.keys import plain_words
+from thud.level.levels import get_bands
 from thud.plot.force_history import contact_force
 from thud.plot.look import FORCE_WORDS
 from thud.recordings.read_recording import read_recording
@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.case import Case
-    from thud.criteria import Criterion
-    from thud.impact import Impact
+    from thud.case.case import Case
+    from thud.level.criteria import Criterion
+    from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
 
     Answer = dict[str, Any]

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.case import check_case
-from thud.checks import refuse, require_number, shown
-from thud.comparison import compare
+from thud.case.case import check_case
+from thud.base.checks import refuse, require_number, shown
+from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
-from thud.impact import compute
-from thud.keys import find_key, known_keys, users
+from thud.impact.impact import compute
+from thud.case.keys import find_key, known_keys, users
 from thud.plot.comparison_html import comparison_html
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from thud.key import Key
+    from thud.base.key import Key
 
     Values = dict[str, dict[str, Any]]
 

@@ -7,15 +7,15 @@ import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from thud._schema import FLOORS, GROUPS, KEYS, MODELS
-from thud.case import OPTIONAL
-from thud.keys import plain_words
-from thud.units import handy_unit, power_of, scaled
+from thud.base.schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.case.case import OPTIONAL
+from thud.case.keys import plain_words
+from thud.base.units import handy_unit, power_of, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from thud.key import Group, Key
+    from thud.base.key import Group, Key
 
 # A slider spans this part to this multiple of the value that it starts with.
 SPAN = 3.0

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import anyio
 from tqdm import tqdm
 
-from thud._api import progress
-from thud.errors import InputError, ThudError
+from thud.base.bridge import progress
+from thud.base.errors import InputError, ThudError
 from thud.explorer.answer import answer_case, answer_quickly, answer_recording, new_case
 from thud.explorer.downloads import DOWNLOADS
 

@@ -19,9 +19,9 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, PlainTextResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from thud._api import version
-from thud.case import read_case
-from thud.checks import refuse, shown
+from thud.base.bridge import version
+from thud.case.case import read_case
+from thud.base.checks import refuse, shown
 from thud.cli.command import channel_of
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import form

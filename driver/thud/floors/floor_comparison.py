@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.case import Case
-from thud.checks import refuse, require_kind
-from thud.display import MAKERS, Displayed
-from thud.errors import ThudError
-from thud.files import Results
+from thud.case.case import Case
+from thud.base.checks import refuse, require_kind
+from thud.base.display import MAKERS, Displayed
+from thud.base.errors import ThudError
+from thud.base.files import Results
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.rating import CLASSES
 from thud.floors.tapping import has_tapping_level, tapping_level
-from thud.impact import compute
-from thud.levels import get_bands
+from thud.impact.impact import compute
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     import os

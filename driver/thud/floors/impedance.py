@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import call, floor_api
-from thud._schema import BandSet, InfinitePlate
-from thud.case import Case, case_text
-from thud.checks import refuse, refuse_value, require_array, require_kind, require_real
-from thud.display import MAKERS, Displayed
-from thud.floor_impact import new_floor_impact
-from thud.impact import Impact
-from thud.levels import force_exposure_levels, get_bands
+from thud.base.bridge import call, floor_api
+from thud.base.schema import BandSet, InfinitePlate
+from thud.case.case import Case, case_text
+from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
+from thud.base.display import MAKERS, Displayed
+from thud.impact.floor_impact import new_floor_impact
+from thud.impact.impact import Impact
+from thud.level.levels import force_exposure_levels, get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud._schema import FloorOptions
+    from thud.base.schema import FloorOptions
 
 # From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)

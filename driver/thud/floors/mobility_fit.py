@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import f90nml
 import numpy as np
 
-from thud._api import call, mobility_api
-from thud._schema import MeasuredMobility
-from thud.case import Case
-from thud.checks import (
+from thud.base.bridge import call, mobility_api
+from thud.base.schema import MeasuredMobility
+from thud.case.case import Case
+from thud.base.checks import (
     refuse,
     refuse_value,
     require_array,
@@ -23,11 +23,11 @@ from thud.checks import (
     require_whole,
     shown,
 )
-from thud.columns import read_titled
-from thud.display import MAKERS, Displayed
-from thud.errors import NumericalError, ThudError
-from thud.floors.mobility import mobility
-from thud.levels import get_bands
+from thud.base.columns import read_titled
+from thud.base.display import MAKERS, Displayed
+from thud.base.errors import NumericalError, ThudError
+from thud.impact.mobility import mobility
+from thud.level.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
 
 if TYPE_CHECKING:

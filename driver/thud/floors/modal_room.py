@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
-from thud._api import call, floor_api
-from thud._schema import Plate, Room
-from thud.case import Case, case_text
-from thud.checks import (
+from thud.base.bridge import call, floor_api
+from thud.base.schema import Plate, Room
+from thud.case.case import Case, case_text
+from thud.base.checks import (
     refuse,
     refuse_value,
     require_array,
@@ -26,17 +26,17 @@ from thud.checks import (
     require_real,
     require_whole,
 )
-from thud.display import MAKERS, Displayed
-from thud.errors import InputError
+from thud.base.display import MAKERS, Displayed
+from thud.base.errors import InputError
 from thud.floors.prediction import RoomPrediction, predict_level
-from thud.levels import get_bands
+from thud.level.levels import get_bands
 from thud.recordings.bank import band_filters
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.impact import Impact
+    from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
 
     Array = NDArray[np.float64]

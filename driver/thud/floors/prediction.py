@@ -8,22 +8,22 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud._api import call, floor_api, text
-from thud.case import Case, case_text
-from thud.checks import refuse, require_kind
-from thud.display import MAKERS, Displayed
-from thud.floor_impact import FloorImpact, new_floor_impact
+from thud.base.bridge import call, floor_api, text
+from thud.case.case import Case, case_text
+from thud.base.checks import refuse, require_kind
+from thud.base.display import MAKERS, Displayed
+from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.floors.rating import Rating, rated_bands, rating, standardised_level
 from thud.floors.survey import RoomLevels
-from thud.impact import Impact
-from thud.levels import BANDWIDTHS, get_bands
+from thud.impact.impact import Impact
+from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud._schema import FloorOptions, Room
+    from thud.base.schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
 # Change of the force by a floor that gives way, dB, from which it is remarked.

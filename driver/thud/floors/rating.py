@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._api import call_direct, level_api
-from thud.checks import refuse, refuse_value, require_array, require_real
-from thud.display import Displayed
-from thud.levels import BANDWIDTHS
+from thud.base.bridge import call_direct, level_api
+from thud.base.checks import refuse, refuse_value, require_array, require_real
+from thud.base.display import Displayed
+from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
 
 # Levels beyond it, dB, are none of sound.
 LARGEST_LEVEL = 1000.0

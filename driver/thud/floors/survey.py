@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._api import level_api
-from thud.checks import refuse
-from thud.columns import read_titled
-from thud.display import MAKERS, Displayed
+from thud.base.bridge import level_api
+from thud.base.checks import refuse
+from thud.base.columns import read_titled
+from thud.base.display import MAKERS, Displayed
 from thud.floors.rating import Rating, rated_bands, rating, require_volume, standardised_level
-from thud.levels import BANDWIDTHS
+from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
     import os
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
 
 # Rounded mid frequencies in a decade (ISO 3, R10), and how far a title may be from one.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
-from thud._api import call, floor_api
-from thud._schema import Plate, Room
-from thud.case import Case, case_text
-from thud.checks import refuse, require_kind
-from thud.display import Displayed
+from thud.base.bridge import call, floor_api
+from thud.base.schema import Plate, Room
+from thud.case.case import Case, case_text
+from thud.base.checks import refuse, require_kind
+from thud.base.display import Displayed
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud._schema import FloorOptions
+    from thud.base.schema import FloorOptions
 
 
 # Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.

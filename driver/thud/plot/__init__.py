@@ -12,7 +12,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 
 try:
     from matplotlib.figure import Figure
@@ -23,11 +23,11 @@ except ValueError as error:
         error,
     )
 
-from thud.compression import CompressionCurve
-from thud.display import draw_all, left_out
+from thud.impact.compression import CompressionCurve
+from thud.base.display import draw_all, left_out
 from thud.floors.prediction import predict_level
-from thud.free_modes import FreeModes
-from thud.impact import Impact
+from thud.impact.free_modes import FreeModes
+from thud.impact.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
 from thud.plot.compression import compression as compression
 from thud.plot.design_map import draw_design_map as draw_design_map
@@ -35,7 +35,7 @@ from thud.plot.fit import draw_fit as draw_fit
 from thud.plot.floor import draw_floor as draw_floor
 from thud.plot.floor_mobilities import floor_mobilities as floor_mobilities
 from thud.plot.force_history import force_history as force_history
-from thud.plot.history import draw_history as draw_history
+from thud.report.history_figure import draw_history as draw_history
 from thud.plot.impedance import ball_impedances as ball_impedances
 from thud.plot.level_changes import level_changes as level_changes
 from thud.plot.levels import levels as levels

@@ -6,8 +6,8 @@ from textwrap import fill
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
-from thud._schema import LevelsForce, LimitsSource
-from thud.impact import Impact
+from thud.base.schema import LevelsForce, LimitsSource
+from thud.impact.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
 from thud.plot.look import (

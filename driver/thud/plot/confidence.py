@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from thud.keys import plain_words
+from thud.case.keys import plain_words
 from thud.plot.look import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure, own_style
 
 if TYPE_CHECKING:

@@ -2,8 +2,8 @@
 
 from functools import cache, lru_cache
 
-from thud._schema import Ball, InfinitePlate
-from thud.impact import Impact, solve
+from thud.base.schema import Ball, InfinitePlate
+from thud.impact.impact import Impact, solve
 
 
 @lru_cache(maxsize=4)

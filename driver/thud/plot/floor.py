@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from thud.levels import BANDWIDTHS, get_bands, record_force
+from thud.level.levels import BANDWIDTHS, get_bands, record_force
 from thud.plot.examples import solve_chipboard
 from thud.plot.force_history import TIME_LABEL
 from thud.plot.look import (
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.floor_impact import FloorImpact
-    from thud.impact import Impact
+    from thud.impact.floor_impact import FloorImpact
+    from thud.impact.impact import Impact
 
 THIRDS = BANDWIDTHS[1]
 # Contact times that are drawn.

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._schema import FloatingFloor, FloorOptions, JoistFloor, Plate
-from thud.checks import refuse_value, require_kind
-from thud.floors.mobility import mobility
+from thud.base.schema import FloatingFloor, FloorOptions, JoistFloor, Plate
+from thud.base.checks import refuse_value, require_kind
+from thud.impact.mobility import mobility
 from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:

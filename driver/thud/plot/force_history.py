@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud._schema import Drop, LevelsForce
-from thud.impact import Impact, solve
-from thud.levels import record_force
+from thud.base.schema import Drop, LevelsForce
+from thud.impact.impact import Impact, solve
+from thud.level.levels import record_force
 from thud.plot.examples import solve_published
 from thud.plot.look import (
     SIZE,

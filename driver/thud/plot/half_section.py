@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
-from thud.errors import InputError
+from thud.base.errors import InputError
 from thud.plot.look import SIZE
 
 # Of monotonic lightness, for any colour vision and for print.

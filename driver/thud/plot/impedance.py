@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from thud._schema import FloatingFloor, JoistFloor, Plate
+from thud.base.schema import FloatingFloor, JoistFloor, Plate
 from thud.floors.impedance import ball_impedance
-from thud.floors.mobility import mobility
-from thud.impact import solve
+from thud.impact.mobility import mobility
+from thud.impact.impact import solve
 from thud.plot.examples import solve_published
 from thud.plot.look import (
     COLOURS,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud._schema import FloorOptions
+    from thud.base.schema import FloorOptions
     from thud.floors.impedance import BallImpedance
 
 # Frequencies of the impedances of the floors, Hz.

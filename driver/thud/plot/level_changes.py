@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from thud._schema import LevelsForce, ModalBall
-from thud.impact import Impact, solve
+from thud.base.schema import LevelsForce, ModalBall
+from thud.impact.impact import Impact, solve
 from thud.plot.look import (
     SIZE,
     empty_axes,

@@ -8,10 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud._schema import Ball, BandSet, Drop, Levels, LevelsForce, LevelsMethod, LimitsSource
-from thud.checks import refuse
-from thud.impact import Impact, solve
-from thud.levels import octave_limits
+from thud.base.schema import Ball, BandSet, Drop, Levels, LevelsForce, LevelsMethod, LimitsSource
+from thud.base.checks import refuse
+from thud.impact.impact import Impact, solve
+from thud.level.levels import octave_limits
 from thud.plot.look import (
     SIZE,
     Curve,

@@ -16,13 +16,13 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from thud._schema import BandSet, LevelsForce
-from thud.checks import require_kind, shown
-from thud.display import draw_all, left_out
-from thud.errors import InputError
-from thud.files import Results, replace_file
-from thud.impact import Impact
-from thud.levels import get_bands
+from thud.base.schema import BandSet, LevelsForce
+from thud.base.checks import require_kind, shown
+from thud.base.display import draw_all, left_out
+from thud.base.errors import InputError
+from thud.base.files import Results, replace_file
+from thud.impact.impact import Impact
+from thud.level.levels import get_bands
 from thud.recordings.recording import Recording
 
 Curve = TypeVar("Curve", bound=Impact | Recording)

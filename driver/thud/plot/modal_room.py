@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._schema import Plate
+from thud.base.schema import Plate
 from thud.floors.modal_room import ModalRoom, ModeCountError, positions_below
 from thud.plot.look import COLOURS, GREY, SIZE, band_axis, empty_axes, legend_above, own_style
 

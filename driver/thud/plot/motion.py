@@ -14,11 +14,11 @@ from matplotlib.patheffects import withStroke
 from matplotlib.quiver import Quiver, QuiverKey
 from numpy.typing import NDArray
 
-from thud.checks import require_kind
-from thud.errors import InputError
-from thud.files import replace_file
-from thud.impact import Impact
-from thud.motion import Motion
+from thud.base.checks import require_kind
+from thud.base.errors import InputError
+from thud.base.files import replace_file
+from thud.impact.impact import Impact
+from thud.impact.motion import Motion
 from thud.plot.examples import solve_chipboard, solve_published
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure, own_style

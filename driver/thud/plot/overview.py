@@ -2,8 +2,8 @@
 
 from matplotlib.figure import Figure
 
-from thud._schema import LimitsSource
-from thud.impact import Impact
+from thud.base.schema import LimitsSource
+from thud.impact.impact import Impact
 from thud.plot.force_history import draw_forces
 from thud.plot.levels import draw_levels
 from thud.plot.look import SIZE, dress, legend_above, level_label, new_figure, own_style

@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud._schema import Plate
-from thud.checks import require_kind, require_whole
+from thud.base.schema import Plate
+from thud.base.checks import require_kind, require_whole
 from thud.floors.modal_room import plate_frequencies
 from thud.plot.look import SIZE, WIDTH, new_figure, own_style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.impact import Impact
+    from thud.impact.impact import Impact
 
 # Maximum number of shapes, points along a side, and levels of a contour.
 MAX_SHAPES, POINTS = 30, 60

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.checks import require_choice
-from thud.levels import BANDWIDTHS, record_force
+from thud.base.checks import require_choice
+from thud.level.levels import BANDWIDTHS, record_force
 from thud.plot.force_history import MARGIN, TIME_LABEL
 from thud.plot.levels import draw_tolerance
 from thud.plot.look import COLOURS, GREY, SIZE, empty_axes, legend_above, octave_axis, own_style
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
     from thud.recordings.estimates import Drop
     from thud.recordings.recording import Recording
 

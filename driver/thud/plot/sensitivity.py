@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.keys import plain_words
+from thud.case.keys import plain_words
 from thud.plot.look import COLOURS, FORCE_WORDS, HATCHES, SIZE, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:

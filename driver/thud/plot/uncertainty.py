@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from thud.levels import octave_limits
+from thud.level.levels import octave_limits
 from thud.plot.look import (
     COLOURS,
     FORCE_WORDS,

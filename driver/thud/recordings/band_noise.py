@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.levels import Bands
+    from thud.level.levels import Bands
     from thud.recordings.estimates import Drop
 
 # Functionals whose energy is less than this part of the largest one add nothing.

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import butter, resample, sosfilt, zpk2sos
 
-from thud.checks import refuse, require_array, require_number, require_real
-from thud.levels import get_bands
+from thud.base.checks import refuse, require_array, require_number, require_real
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
 
 # Order of the Butterworth low-pass of which each filter is the band-pass: six poles. Order 2 misses
 # the mask of class 1 by 18 dB.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse, require_number
+from thud.base.checks import refuse, require_number
 from thud.recordings.channel import shown_path
 from thud.recordings.formats import read_channels
 from thud.recordings.reading import choose_channels, regular_file

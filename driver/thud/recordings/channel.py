@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from thud.checks import refuse
-from thud.errors import InputError
-from thud.extras import packages
+from thud.base.checks import refuse
+from thud.base.errors import InputError
+from thud.base.extras import packages
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

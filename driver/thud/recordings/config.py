@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.checks import refuse, require_choice, require_number, shown
-from thud.errors import InputError
-from thud.levels import SOURCES, get_bands, judge
+from thud.base.checks import refuse, require_choice, require_number, shown
+from thud.base.errors import InputError
+from thud.level.levels import SOURCES, get_bands, judge
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
 from thud.recordings.plate import Plate, check_plate
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Callable
 
-    from thud._schema import LimitsSource
+    from thud.base.schema import LimitsSource
     from thud.recordings.plate import PlateCheck
     from thud.recordings.units import Calibration
 

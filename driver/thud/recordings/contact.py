@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.ndimage import convolve1d, uniform_filter1d
 
-from thud.immutable import Immutable
-from thud.levels import RECORDED_BAND
+from thud.base.immutable import Immutable
+from thud.level.levels import RECORDED_BAND
 from thud.recordings.flanks import SMOOTHING, Flank, Posterior, find_touch
 from thud.recordings.noise import Background, fit_background
 from thud.recordings.plate import correct_plate

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 from tqdm import tqdm
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse
-from thud.immutable import Immutable
-from thud.levels import RECORDED_BAND, record_force
+from thud.base.checks import refuse
+from thud.base.immutable import Immutable
+from thud.level.levels import RECORDED_BAND, record_force
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.levels import measure_levels
@@ -23,7 +23,7 @@ from thud.recordings.restitution import GRAVITY, Fall
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
     from thud.recordings.drops import Window
 
 __all__ = ["Drop", "Estimate", "measure_drop"]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from thud.contact_time import AVERAGED, THRESHOLD, average_within
+from thud.impact.contact_time import AVERAGED, THRESHOLD, average_within
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

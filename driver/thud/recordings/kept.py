@@ -13,9 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from thud._api import version
-from thud.errors import InputError, ReportWarning
-from thud.files import is_regular, replace_file, uninterrupted
+from thud.base.bridge import version
+from thud.base.errors import InputError, ReportWarning
+from thud.base.files import is_regular, replace_file, uninterrupted
 from thud.recordings.estimates import Drop
 
 if TYPE_CHECKING:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse, require_choice
-from thud.immutable import Immutable
-from thud.levels import force_exposure_levels, get_bands
+from thud.base.checks import refuse, require_choice
+from thud.base.immutable import Immutable
+from thud.level.levels import force_exposure_levels, get_bands
 from thud.recordings.band_noise import band_noise
 from thud.recordings.bank import filter_levels
 from thud.recordings.low_pass import attenuation, low_pass_force
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
     from thud.recordings.estimates import Drop
 
 METHODS = ("exact", "fft", "filter")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
-from thud.levels import RECORDED_BAND
+from thud.level.levels import RECORDED_BAND
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

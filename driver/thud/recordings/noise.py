@@ -11,7 +11,7 @@ from scipy.linalg import cho_solve, lapack, solve_triangular
 from scipy.special import chdtri, ndtri
 from scipy.stats import qmc
 
-from thud.immutable import Immutable
+from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.fft import next_fast_len
 
-from thud.checks import refuse, refuse_value, require_number
-from thud.levels import get_bands
+from thud.base.checks import refuse, refuse_value, require_number
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet
+    from thud.base.schema import BandSet
 
 # What the standard asks of a force plate: flat between these frequencies, Hz, up to this force, N,
 # and linear to this share. It gives no tolerance for "flat"; that of the linearity is taken.

@@ -11,8 +11,8 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.checks import refuse
-from thud.errors import InputError
+from thud.base.checks import refuse
+from thud.base.errors import InputError
 from thud.recordings.channel import guarded, shown_path
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.levels import RECORDED_BAND, peak_count
+from thud.level.levels import RECORDED_BAND, peak_count
 from thud.recordings.contact import Estimate
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
 from thud.recordings.restitution import BOUNCES, IMPULSE, Fall

@@ -6,8 +6,8 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from thud.checks import require_whole
-from thud.ensemble import MAX_THREADS
+from thud.base.checks import require_whole
+from thud.impact.ensemble import MAX_THREADS
 from thud.recordings.config import Config, read_config
 from thud.recordings.reading import open_signals
 from thud.recordings.recording import Recording
@@ -15,7 +15,7 @@ from thud.recordings.recording import Recording
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from thud._schema import LimitsSource
+    from thud.base.schema import LimitsSource
     from thud.recordings.kept import KeptDrops
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.checks import refuse, require_choice, require_kind, require_number, shown
+from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
 from thud.recordings.channel import MIB, Channel, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES, doubt, find_sign, scan
 from thud.recordings.formats import read_channels

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.checks import refuse
-from thud.display import MAKERS, Displayed
+from thud.base.checks import refuse
+from thud.base.display import MAKERS, Displayed
 from thud.recordings.config import Config, checked_config
 from thud.recordings.excursion import doubt, scan
 from thud.recordings.levels import average_levels, compare_methods, measure_levels
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud._schema import BandSet, LevelsForce, LimitsSource
+    from thud.base.schema import BandSet, LevelsForce, LimitsSource
     from thud.recordings.estimates import Drop
     from thud.recordings.kept import KeptDrops
     from thud.recordings.levels import AverageLevels

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse, require_array, require_number, require_real
-from thud.immutable import Immutable
+from thud.base.checks import refuse, require_array, require_number, require_real
+from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
     from collections.abc import Callable

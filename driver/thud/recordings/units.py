@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from thud.checks import refuse, refuse_value, shown
+from thud.base.checks import refuse, refuse_value, shown
 
 # By unit: the unit it is a multiple of, and the multiple.
 UNITS: dict[str, tuple[str, float]] = {

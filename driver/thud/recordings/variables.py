@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.recordings.channel import Channel
 from thud.recordings.grid import even_grid
 from thud.recordings.signal import ArraySamples

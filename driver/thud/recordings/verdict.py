@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import t as student
 
-from thud.checks import refuse, shown
-from thud.display import Displayed
-from thud.immutable import Immutable
-from thud.levels import SOURCES, judge
+from thud.base.checks import refuse, shown
+from thud.base.display import Displayed
+from thud.base.immutable import Immutable
+from thud.level.levels import SOURCES, judge
 from thud.recordings.levels import WITHIN_REPEATABILITY
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud._schema import LimitsSource
+    from thud.base.schema import LimitsSource
     from thud.recordings.estimates import Estimate
     from thud.recordings.levels import AverageLevels
 

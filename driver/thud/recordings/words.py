@@ -6,7 +6,7 @@ import math
 import re
 from typing import TYPE_CHECKING
 
-from thud.columns import GROUPING, MARKS, to_number
+from thud.base.columns import GROUPING, MARKS, to_number
 from thud.recordings.units import UNITS, find_unit
 
 if TYPE_CHECKING:

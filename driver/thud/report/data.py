@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud._api import version
-from thud.levels import BANDWIDTHS, get_bands, judge
+from thud.base.bridge import version
+from thud.level.levels import BANDWIDTHS, get_bands, judge
 from thud.recordings.verdict import CONFIDENCE
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from thud._schema import BandSet, LimitsSource
+    from thud.base.schema import BandSet, LimitsSource
     from thud.recordings.estimates import Drop, Estimate
     from thud.recordings.recording import Recording
     from thud.recordings.verdict import Decision

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import t as student
 
-from thud.checks import refuse
-from thud.files import read_input
-from thud.immutable import Immutable
+from thud.base.checks import refuse
+from thud.base.files import read_input
+from thud.base.immutable import Immutable
 from thud.recordings.verdict import VERDICTS
 from thud.report.data import FORMAT, read_date
 from thud.report.rows import Style, criterion_row, limits_of, number, style_of

@@ -8,7 +8,7 @@ import math
 import re
 from typing import TYPE_CHECKING, Any
 
-from thud.display import left_out
+from thud.base.display import left_out
 from thud.plot.look import own_style
 from thud.recordings.levels import BACKGROUND, MARGIN
 from thud.recordings.verdict import VERDICTS

@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.display import draw_all
-from thud.errors import ReportWarning
-from thud.files import Results, content_of
+from thud.base.display import draw_all
+from thud.base.errors import ReportWarning
+from thud.base.files import Results, content_of
 
 if TYPE_CHECKING:
     import os

@@ -17,12 +17,12 @@ from contextlib import contextmanager, suppress
 from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
-from thud._api import api
-from thud.checks import refuse, refuse_value, require_choice, require_whole, shown
-from thud.ensemble import MAX_THREADS
-from thud.errors import NumericalError, ThudError, WorkerWarning
-from thud.extras import require_extra
-from thud.processes import no_interrupt_in_processes, process_pool
+from thud.base.bridge import api
+from thud.base.checks import refuse, refuse_value, require_choice, require_whole, shown
+from thud.impact.ensemble import MAX_THREADS
+from thud.base.errors import NumericalError, ThudError, WorkerWarning
+from thud.base.extras import require_extra
+from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.checks import refuse
-from thud.files import (
+from thud.base.checks import refuse
+from thud.base.files import (
     is_failure,
     is_regular,
     is_temporary,

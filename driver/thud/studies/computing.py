@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from tqdm import tqdm
 
-from thud._api import version
-from thud.checks import refuse
+from thud.base.bridge import version
+from thud.base.checks import refuse
 from thud.studies.backends import run_blocks
 from thud.studies.blocks import Blocks, read_sweep
 from thud.studies.dataset import disk_space, grid_of, new_dataset

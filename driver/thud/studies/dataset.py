@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from thud._api import compiler, version
+from thud.base.bridge import compiler, version
 from thud.floors.rating import rated_bands
-from thud.levels import BANDWIDTHS, get_bands
-from thud.outcomes import FURTHER, ROOM_LEVEL
+from thud.level.levels import BANDWIDTHS, get_bands
+from thud.impact.outcomes import FURTHER, ROOM_LEVEL
 from thud.studies.designs import makers
 from thud.studies.evaluation import LEVELS, SCALARS, level_names
 
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet
-    from thud.case import Case
+    from thud.base.schema import BandSet
+    from thud.case.case import Case
     from thud.studies.parameter import Parameter
     from thud.studies.sets import Columns, SetStudy
 

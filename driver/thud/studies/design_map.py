@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.case import Case
-from thud.checks import refuse
-from thud.display import Displayed
-from thud.keys import DENSITY
-from thud.outcomes import RATING
+from thud.case.case import Case
+from thud.base.checks import refuse
+from thud.base.display import Displayed
+from thud.case.keys import DENSITY
+from thud.impact.outcomes import RATING
 from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.checks import LARGEST_SEED, refuse, refuse_value, require_whole, require_words
+from thud.base.checks import LARGEST_SEED, refuse, refuse_value, require_whole, require_words
 from thud.studies.parameter import MAX_VALUES, Parameter
 
 if TYPE_CHECKING:

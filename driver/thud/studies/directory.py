@@ -9,8 +9,8 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
-from thud.checks import refuse
-from thud.files import Results, is_directory, is_failure, locked, refuse_foreign, remove
+from thud.base.checks import refuse
+from thud.base.files import Results, is_directory, is_failure, locked, refuse_foreign, remove
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud import _schema as schema
-from thud._api import version
-from thud.checks import refuse
-from thud.ensemble import solve_many
-from thud.impact import FORCES
-from thud.levels import BANDWIDTHS, peak_count
-from thud.outcomes import FURTHER
+from thud.base import schema
+from thud.base.bridge import version
+from thud.base.checks import refuse
+from thud.impact.ensemble import solve_many
+from thud.impact.impact import FORCES
+from thud.level.levels import BANDWIDTHS, peak_count
+from thud.impact.outcomes import FURTHER
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet, LevelsForce
-    from thud.case import Case
+    from thud.base.schema import BandSet, LevelsForce
+    from thud.case.case import Case
     from thud.studies.emulation.surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]

@@ -9,17 +9,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.case import Case, check_case
-from thud.checks import (
+from thud.case.case import Case, check_case
+from thud.base.checks import (
     LARGEST_SEED,
     refuse,
     refuse_value,
     require_kind,
     require_whole,
 )
-from thud.errors import FitWarning, InputError
-from thud.files import read_input
-from thud.key import check_keywords
+from thud.base.errors import FitWarning, InputError
+from thud.base.files import read_input
+from thud.base.key import check_keywords
 from thud.studies.directory import FORMATS
 from thud.studies.emulation.answered_levels import answered, confirmed, within_region
 from thud.studies.emulation.plan import read_plan
@@ -32,7 +32,7 @@ from thud.studies.fitting.result import Fit, file_ends
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
-from thud.units import scaled
+from thud.base.units import scaled
 
 if TYPE_CHECKING:
     import os
@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
-    from thud.files import Results
-    from thud.impact import Impact
+    from thud.base.files import Results
+    from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
@@ -114,8 +114,8 @@ def fit(  # noqa: PLR0913 - options of a search
 
     Examples
     --------
-    >>> from thud.case import Ball
-    >>> from thud.impact import solve
+    >>> from thud.case.case import Ball
+    >>> from thud.impact.impact import solve
     >>> truth = solve(Ball(youngs_modulus=1.8e6))
     >>> round(fit(truth, ["youngs_modulus"]).values["youngs_modulus"])
     1800000

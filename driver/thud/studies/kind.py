@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Literal, TypedDict, TypeVar, Unpack
 
-from thud.checks import refuse, require_words
+from thud.base.checks import refuse, require_words
 from thud.studies.directory import take
 from thud.studies.study import Study, named_files, read_common, read_tables
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud.case import Case
-    from thud.files import Results
-    from thud.keys import Value
+    from thud.case.case import Case
+    from thud.base.files import Results
+    from thud.case.keys import Value
     from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source

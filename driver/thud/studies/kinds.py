@@ -5,9 +5,9 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
 
-from thud.checks import require_choice
-from thud.errors import InputError
-from thud.extras import require_extra
+from thud.base.checks import require_choice
+from thud.base.errors import InputError
+from thud.base.extras import require_extra
 
 if TYPE_CHECKING:
     from collections.abc import Callable

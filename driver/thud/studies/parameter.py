@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import ndtri
 
-from thud.checks import (
+from thud.base.checks import (
     LARGEST,
     refuse,
     refuse_value,
@@ -20,10 +20,10 @@ from thud.checks import (
     require_words,
     shown,
 )
-from thud.immutable import Plain
-from thud.key import Key
-from thud.keys import Value, find_key
-from thud.units import power_of, scaled
+from thud.base.immutable import Plain
+from thud.base.key import Key
+from thud.case.keys import Value, find_key
+from thud.base.units import power_of, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 import xarray as xr
 
-from thud.checks import refuse
-from thud.display import Displayed
-from thud.levels import get_bands
-from thud.outcomes import FURTHER
+from thud.base.checks import refuse
+from thud.base.display import Displayed
+from thud.level.levels import get_bands
+from thud.impact.outcomes import FURTHER
 from thud.studies.dataset import coordinate
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind

@@ -7,9 +7,9 @@ from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
-from thud._schema import KEYS
-from thud.checks import refuse, require_choice
-from thud.keys import OF_FILES, users
+from thud.base.schema import KEYS
+from thud.base.checks import refuse, require_choice
+from thud.case.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
@@ -24,7 +24,7 @@ from thud.studies.parameter import varied
 from thud.studies.sets import SetStudy
 from thud.studies.study import table_of
 from thud.studies.temperature import read_temperature
-from thud.tables import format_rows
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import os
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from thud.case import Case
-    from thud.files import Results
-    from thud.keys import Value
+    from thud.case.case import Case
+    from thud.base.files import Results
+    from thud.case.keys import Value
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
     from thud.studies.study import Study

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from thud._api import version
-from thud._schema import MODELS
-from thud.case import Case, check_case, new_model, read_case, tables_case
-from thud.checks import refuse, refuse_value, require_kind, require_words, shown
-from thud.errors import InputError
-from thud.files import read_input
-from thud.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
+from thud.base.bridge import version
+from thud.base.schema import MODELS
+from thud.case.case import Case, check_case, new_model, read_case, tables_case
+from thud.base.checks import refuse, refuse_value, require_kind, require_words, shown
+from thud.base.errors import InputError
+from thud.base.files import read_input
+from thud.case.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
 from thud.studies.parameter import Parameter, checked, quantity
 
 if TYPE_CHECKING:

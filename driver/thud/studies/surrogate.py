@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.parameter import Parameter
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud.case import Case
-    from thud.files import Results
-    from thud.keys import Value
+    from thud.case.case import Case
+    from thud.base.files import Results
+    from thud.case.keys import Value
     from thud.studies.kind import How
     from thud.studies.sets import SetStudy
     from thud.studies.study import Source, Study

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Unpack
 
 import xarray as xr
 
-from thud.levels import BANDWIDTHS
+from thud.level.levels import BANDWIDTHS
 from thud.studies.set_kind import SetKind
-from thud.tables import format_rows
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import os

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.checks import refuse, refuse_value, require_words
-from thud.keys import TEMPERATURE
+from thud.base.checks import refuse, refuse_value, require_words
+from thud.case.keys import TEMPERATURE
 from thud.studies.parameter import checked
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.case import Case
+    from thud.case.case import Case
     from thud.studies.parameter import Parameter
 
 _WORDS = ("reference", "coefficient", "c1", "c2")

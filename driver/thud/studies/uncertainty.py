@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Unpack
 import numpy as np
 from scipy.stats import binomtest
 
-from thud.checks import refuse
-from thud.display import Displayed
-from thud.levels import get_bands, octave_limits
-from thud.outcomes import RATING
+from thud.base.checks import refuse
+from thud.base.display import Displayed
+from thud.level.levels import get_bands, octave_limits
+from thud.impact.outcomes import RATING
 from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud._schema import LimitsSource
-    from thud.case import Case
-    from thud.keys import Value
+    from thud.base.schema import LimitsSource
+    from thud.case.case import Case
+    from thud.case.keys import Value
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter
     from thud.studies.sets import SetStudy

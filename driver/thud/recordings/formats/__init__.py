@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, NamedTuple
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.recordings.channel import Channel, guarded, shown_path
 from thud.recordings.probe import look
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.recordings.channel import MIB, Channel, guarded, library, shown_path, shown_text
 from thud.recordings.grid import even_grid
 from thud.recordings.words import (

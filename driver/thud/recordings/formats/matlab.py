@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.recordings.channel import MIB, WHOLE, require_small, shown_path, shown_text
 from thud.recordings.variables import channels_of_variables
 

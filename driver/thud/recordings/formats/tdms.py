@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.recordings.channel import BoundedFile, Channel, guarded, library, shown_path
 from thud.recordings.words import DATE, UNIT, find_rate, find_word, text_of
 

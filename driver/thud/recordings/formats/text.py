@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
-from thud.checks import refuse
-from thud.columns import (
+from thud.base.checks import refuse
+from thud.base.columns import (
     GROUPING,
     DecimalMark,
     find_decimal,

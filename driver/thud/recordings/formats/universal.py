@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.checks import refuse
+from thud.base.checks import refuse
 from thud.recordings.channel import Channel, library, require_small, shown_path
 from thud.recordings.grid import even_grid
 from thud.recordings.signal import ArraySamples

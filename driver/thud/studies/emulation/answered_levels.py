@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from thud.checks import refuse
-from thud.errors import NumericalError
-from thud.immutable import freeze
-from thud.impact import Impact, compute
-from thud.levels import BANDWIDTHS
+from thud.base.checks import refuse
+from thud.base.errors import NumericalError
+from thud.base.immutable import freeze
+from thud.impact.impact import Impact, compute
+from thud.level.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
 from thud.studies.study import value_in
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.case import Case
+    from thud.case.case import Case
     from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range

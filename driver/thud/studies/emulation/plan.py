@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from thud.checks import (
+from thud.base.checks import (
     LARGEST_SEED,
     refuse_value,
     require_number,
     require_whole,
     require_words,
 )
-from thud.extras import require_extra
+from thud.base.extras import require_extra
 from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:

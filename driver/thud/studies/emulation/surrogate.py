@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import binom
 
-from thud._api import version
-from thud.case import Case, case_text
-from thud.checks import refuse, require_kind
-from thud.display import Displayed
-from thud.extras import require_extra
-from thud.files import is_failure, read_input, replace_file
-from thud.keys import OF_FILES, put
-from thud.levels import get_bands
+from thud.base.bridge import version
+from thud.case.case import Case, case_text
+from thud.base.checks import refuse, require_kind
+from thud.base.display import Displayed
+from thud.base.extras import require_extra
+from thud.base.files import is_failure, read_input, replace_file
+from thud.case.keys import OF_FILES, put
+from thud.level.levels import get_bands
 from thud.studies.emulation.verdict import judge_many
 from thud.studies.study import value_in
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from scipy.linalg import cho_solve
 
-from thud.checks import refuse
-from thud.errors import InputError, NumericalError
-from thud.extras import require_extra
-from thud.keys import find_key
+from thud.base.checks import refuse
+from thud.base.errors import InputError, NumericalError
+from thud.base.extras import require_extra
+from thud.case.keys import find_key
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
 from thud.studies.designs import unit_sets
@@ -26,13 +26,13 @@ from thud.studies.emulation.surrogate import (
 from thud.studies.evaluation import LEVELS, SCALARS
 from thud.studies.parameter import Parameter
 from thud.studies.sets import SetStudy
-from thud.threads import one_thread
+from thud.base.threads import one_thread
 
 if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from thud.files import Results
+    from thud.base.files import Results
     from thud.studies.emulation.plan import Plan
     from thud.studies.kind import How
     from thud.studies.sets import Columns

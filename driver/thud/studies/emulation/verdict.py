@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.levels import judge
+from thud.level.levels import judge
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud._schema import LimitsSource
+    from thud.base.schema import LimitsSource
 
     Values = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numpy as np
 from scipy import stats
 from scipy.signal import ZoomFFT
 
-from thud.checks import refuse
-from thud.immutable import freeze
-from thud.impact import Impact
+from thud.base.checks import refuse
+from thud.base.immutable import freeze
+from thud.impact.impact import Impact
 from thud.studies.fitting.misfit import GAIN, SHIFT, Misfit
 from thud.studies.fitting.record_noise import (
     MIN_QUIET,
@@ -26,7 +26,7 @@ from thud.studies.fitting.residual_tests import UNLIKELY, residual_doubts
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.record import Record
+    from thud.recordings.record import Record
     from thud.recordings.noise import Background
     from thud.studies.fitting.force_target import ForceTarget
 

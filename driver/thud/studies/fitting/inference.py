@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 from scipy.linalg import qr
 
-from thud.checks import refuse_value
+from thud.base.checks import refuse_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.checks import refuse, require_choice, shown
-from thud.immutable import Plain, freeze
-from thud.impact import FORCES
-from thud.levels import BANDWIDTHS, get_bands
+from thud.base.checks import refuse, require_choice, shown
+from thud.base.immutable import Plain, freeze
+from thud.impact.impact import FORCES
+from thud.level.levels import BANDWIDTHS, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
 # Relative step of the derivatives of a contact time: its end moves from ring to ring of the modal
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud._schema import BandSet, LevelsForce
-    from thud.impact import Impact
+    from thud.base.schema import BandSet, LevelsForce
+    from thud.impact.impact import Impact
 
 
 @dataclass(frozen=True, eq=False)

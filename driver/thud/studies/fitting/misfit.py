@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from thud.checks import refuse_value, require_number
-from thud.impact import compute
+from thud.base.checks import refuse_value, require_number
+from thud.impact.impact import compute
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from thud.case import Case
-    from thud.impact import Impact
+    from thud.case.case import Case
+    from thud.impact.impact import Impact
 
 # Relative step of the central differences. The forces are smooth to 1e-13, but have kinks where a
 # sample enters or leaves the contact: 1e-3 would step over these, 1e-5 rarely does, and derivatives

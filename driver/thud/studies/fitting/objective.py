@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.errors import NumericalError, ThudError
+from thud.base.errors import NumericalError, ThudError
 from thud.studies.fitting.ranges import with_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
     from tqdm import tqdm
 
-    from thud.case import Case
-    from thud.impact import Impact
+    from thud.case.case import Case
+    from thud.impact.impact import Impact
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from thud.immutable import freeze
+from thud.base.immutable import freeze
 from thud.recordings.contact import QUIET, cells_between
 from thud.recordings.drops import CELL, FOOT, MARGIN
 from thud.recordings.noise import (

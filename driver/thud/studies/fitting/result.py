@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from thud._api import version
-from thud.case import case_text
-from thud.display import Displayed, left_out
-from thud.files import Results
-from thud.immutable import Immutable
-from thud.key import check_keywords
+from thud.base.bridge import version
+from thud.case.case import case_text
+from thud.base.display import Displayed, left_out
+from thud.base.files import Results
+from thud.base.immutable import Immutable
+from thud.base.key import check_keywords
 from thud.studies.fitting.inference import coverage_factor
 from thud.studies.fitting.misfit import SHIFT
-from thud.tables import format_rows
-from thud.units import handy_unit
+from thud.base.tables import format_rows
+from thud.base.units import handy_unit
 
 if TYPE_CHECKING:
     import os
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.case import Case
-    from thud.impact import Impact
+    from thud.case.case import Case
+    from thud.impact.impact import Impact
     from thud.studies.fitting.misfit import Misfit
 
 # By parameter: name of a unit, and how many SI units it is.

@@ -10,7 +10,7 @@ from scipy import stats
 from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
-from thud.errors import InputError, NumericalError, ThudError
+from thud.base.errors import InputError, NumericalError, ThudError
 from thud.studies.fitting.inference import (
     INSEPARABLE,
     Inference,
@@ -25,14 +25,14 @@ from thud.studies.fitting.inference import (
 from thud.studies.fitting.objective import Objective, new_parts
 from thud.studies.fitting.residual_tests import UNLIKELY
 from thud.studies.fitting.result import Fit, FittedTarget
-from thud.units import handy_unit
+from thud.base.units import handy_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
-    from thud.case import Case
+    from thud.case.case import Case
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.objective import Part
     from thud.studies.fitting.ranges import Range

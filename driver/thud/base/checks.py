@@ -1,0 +1,144 @@
+"""Checks of arguments."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NoReturn, get_args
+
+import numpy as np
+
+from thud.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Container, Iterable
+    from types import UnionType
+
+    from numpy.typing import ArrayLike, NDArray
+
+# Former words of studies, and those that replace them.
+OLD_WORDS = {"base": "case", "lower": "low", "upper": "high", "level": "confidence"}
+# Longer values are shown by their kind.
+LONGEST_SHOWN = 80
+# No key takes a larger number, and Python refuses to print much larger ones.
+LARGEST = 10**300
+# Maximum seed of the libraries that draw points.
+LARGEST_SEED = 2**32 - 1
+
+
+def refuse(what: str, allowed: str, cause: Exception | None = None) -> NoReturn:
+    """Raise InputError: what cannot be used, and what is allowed."""
+    message = f"{what}; allowed: {allowed}"
+    raise InputError(message) from cause
+
+
+def refuse_value(place: str, value: object, allowed: str) -> NoReturn:
+    """Raise InputError for a value."""
+    refuse(f"{place} = {shown(value)} is not allowed", allowed)
+
+
+def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
+    """Raise InputError where an argument is not of a kind."""
+    if not isinstance(value, kind):
+        expected = getattr(kind, "__name__", None) or " or ".join(
+            k.__name__ for k in get_args(kind)
+        )
+        refuse_value(name, value, f"an object of {expected}")
+
+
+def require_choice(name: str, value: object, allowed: Iterable[str]) -> None:
+    """Raise InputError where a word is not one of those that are allowed."""
+    choices = list(allowed)
+    if not isinstance(value, str) or value not in choices:
+        what = f"{name} = {shown(value)} is not known{suggestion(value, choices)}"
+        refuse(what, ", ".join(map(repr, choices)))
+
+
+def suggestion(word: object, known: Collection[str]) -> str:
+    """Return the known word that a misspelt one probably means, as part of a sentence.
+
+    >>> suggestion("heigth", ["gravity", "height"])
+    " (did you mean 'height'?)"
+    """
+    import difflib  # noqa: PLC0415 - for errors only
+
+    by_small = {name.lower(): name for name in known}
+    if not isinstance(word, str) or len(word) > LONGEST_SHOWN:
+        return ""
+    close = difflib.get_close_matches(word.lower(), by_small, 1, cutoff=0.7)
+    return f" (did you mean {by_small[close[0]]!r}?)" if close else ""
+
+
+def require_array(name: str, values: ArrayLike, dimensions: Container[int]) -> NDArray[Any]:
+    """Return an array; raise InputError where it is ragged, masked or of other dimensions."""
+    allowed = "one dimension" + (", or a scalar" if 0 in dimensions else "")
+    try:
+        array = np.asarray(values)
+    except (TypeError, ValueError) as error:  # rows of different length
+        refuse(f"{name} is not an array of numbers", allowed, error)
+    if array.ndim not in dimensions:
+        refuse(f"{name} has {array.ndim} dimensions", allowed)
+    if np.ma.is_masked(values):
+        refuse(f"{name} has masked entries", "values only")
+    return array
+
+
+def require_real(name: str, array: NDArray[Any], kinds: str = "iuf") -> NDArray[np.float64]:
+    """Return an array as float64; raise InputError where it holds other than real numbers."""
+    if array.size and array.dtype.kind not in kinds:
+        refuse(f"{name} is not an array of real numbers", "one dimension of them")
+    return np.ascontiguousarray(array, dtype=np.float64)
+
+
+def require_pair(name: str, values: ArrayLike) -> tuple[float, float]:
+    """Return two finite numbers; raise InputError for anything else."""
+    array = require_real(name, require_array(name, values, dimensions=(1,)))
+    if array.shape != (2,) or not np.isfinite(array).all():
+        refuse_value(name, values, "two finite numbers")
+    return float(array[0]), float(array[1])
+
+
+def require_whole(name: str, value: Any, low: int, high: int) -> None:  # noqa: ANN401
+    """Raise InputError where a value is not a whole number from low to high."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not whole or not low <= value <= high:
+        refuse_value(name, value, f"whole numbers from {low} to {high}")
+
+
+def require_number(name: str, value: Any) -> None:  # noqa: ANN401 - that is the question
+    """Raise InputError where a value is not a finite number."""
+    number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(
+        value, bool
+    )
+    if not number or not -LARGEST <= (value if isinstance(value, int) else float(value)) <= LARGEST:
+        refuse_value(name, value, "finite numbers")
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: by its kind where it is long or has several lines."""
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return "a very large number"
+    # Files write lists, which objects keep as tuples.
+    text = repr(list(value) if type(value) is tuple else value)
+    fits = len(text) <= LONGEST_SHOWN and "\n" not in text
+    if fits:
+        return text
+    if isinstance(value, str):
+        return f"a text of {len(value)} characters"
+    return f"an object of {type(value).__name__}"
+
+
+def require_words(
+    place: str, given: Iterable[str], known: Iterable[str], also: Iterable[str] = ()
+) -> None:
+    """Raise InputError where a word is not known; of a former word, name the new one.
+
+    What was meant may be one of other words, too.
+    """
+    allowed = list(known)
+    for word in given:
+        if word not in allowed:
+            new = OLD_WORDS.get(word)
+            listed = ", ".join(allowed)
+            if new in allowed:
+                refuse(f"{place}: {word!r} is now {new!r}", listed)
+            hint = suggestion(word, [*allowed, *also])
+            refuse(f"{place}: {shown(word)} is not known{hint}", listed)

@@ -1,0 +1,242 @@
+"""Files of numbers in columns, as instruments and spreadsheets write them."""
+
+from __future__ import annotations
+
+import csv
+import errno
+import itertools
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, TextIO
+
+import numpy as np
+
+from thud.base.checks import refuse
+from thud.base.errors import InputError
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+# The first of these that a line contains separates its columns; otherwise blanks do.
+SEPARATORS = ("\t", ";", ",")
+# Either of the two may be the decimal mark; the other one then groups digits, as these do.
+MARKS = {".": "point", ",": "comma"}
+GROUPING = " \N{NO-BREAK SPACE}\N{NARROW NO-BREAK SPACE}'\N{RIGHT SINGLE QUOTATION MARK}"
+QUOTED = re.compile(r'"[^"]*"')
+# Maximum length of a line.
+LONGEST = 2**16
+ALLOWED = (
+    "columns of time, s, and force, N, separated by commas, semicolons, tabs or "
+    "blanks (decimal commas with semicolons, tabs and blanks, or in quotes)"
+)
+
+
+def _numbers(decimal: str) -> re.Pattern[str]:
+    """Return the pattern of numbers with a decimal mark: groups begin with 1 to 3 digits.
+
+    A comma that ends a number, as in ``0, 1.5``, separates columns: digits follow a decimal comma.
+    """
+    mark = re.escape(decimal)
+    fraction = rf"(?:{mark}\d{'+' if decimal == ',' else '*'})?"
+    grouping = "".join(other for other in MARKS if other != decimal) + GROUPING
+    return re.compile(
+        rf"[-+]?(?:nan|inf(?:inity)?|(?:\d+{fraction}|{mark}\d+)(?:e[-+]?\d+)?"
+        rf"|[1-9]\d{{0,2}}(?P<group>[{grouping}])\d{{3}}(?:(?P=group)\d{{3}})*{fraction})",
+        re.ASCII | re.IGNORECASE,
+    )
+
+
+NUMBERS = {decimal: _numbers(decimal) for decimal in MARKS}
+
+
+class DecimalMark(NamedTuple):
+    """The decimal mark of all numbers of a table.
+
+    Attributes
+    ----------
+    mark : str
+        Point or comma.
+    line : int
+        Number of the line that shows it; 0 where none has to.
+    """
+
+    mark: str = "."
+    line: int = 0
+
+    def wrong(self, cell: str) -> str:
+        """Return what is wrong with a cell that is not a number."""
+        reason = f"{cell[:40]!r} is not a number"
+        if is_number(cell) and self.line:
+            reason += f" with the decimal {MARKS[self.mark]} of line {self.line}"
+        return reason
+
+
+def read_table(path: str | os.PathLike[str]) -> NDArray[np.float64]:
+    """Return the numbers of a file of columns, shape (n_row, n_column); see `read_titled`."""
+    return read_titled(path, ALLOWED)[1]
+
+
+def read_titled(
+    path: str | os.PathLike[str], allowed: str
+) -> tuple[list[str], NDArray[np.float64]]:
+    """Return the titles of a file of columns and its numbers, shape (n_row, n_column).
+
+    The titles are the cells of the line above the first number, none where there is no such line.
+
+    Commas, semicolons, tabs or blanks separate the columns, as in the first line of numbers; cells
+    may stand in quotes. The decimal mark is that of the whole table, see `find_decimal`. Empty
+    lines, comments after ``#`` and lines above the first number are skipped.
+
+    Raises
+    ------
+    InputError
+        Names the file, and the line that is not numeric or has another number of columns.
+    """
+    try:
+        if not Path(path).is_file():  # to open a pipe could block
+            raise FileNotFoundError(errno.ENOENT, "no such regular file", str(path))
+        # A header may be in another encoding than UTF-8.
+        with Path(path).open(encoding="utf-8-sig", errors="replace") as text:
+            lines = [strip_comment(line) for line in read_lines(text, str(path), allowed)]
+    except InputError:  # is a ValueError
+        raise
+    except (OSError, ValueError) as error:
+        message = f"{path}: cannot be read ({error}); allowed: {allowed}"
+        raise InputError(message) from error
+    filled: Iterator[tuple[int, str]] = (
+        (number, line) for number, line in enumerate(lines, start=1) if line
+    )
+    titles: list[str] = []
+    separator: str | None = None
+    for number, line in filled:
+        separator = find_separator(line)
+        cells = split_line(line, separator)
+        if any(map(is_number, cells)):
+            filled = itertools.chain([(number, line)], filled)
+            break
+        titles = cells
+    rows = [(number, split_line(line, separator), '"' in line) for number, line in filled]
+    if not rows:
+        refuse(f"{path}: cannot be read (no numbers)", allowed)
+    decimal = find_decimal(rows, separator, str(path))
+    width = len(rows[0][1])
+    table = np.empty((len(rows), width))
+    for row, (number, cells, _) in zip(table, rows, strict=True):
+        values = [to_number(cell, decimal.mark) for cell in cells]
+        if None in values:
+            refuse(f"{path}: line {number}: {decimal.wrong(cells[values.index(None)])}", allowed)
+        if len(cells) != width:
+            refuse(f"{path}: line {number}: {len(cells)} columns, {width} above it", allowed)
+        row[:] = values
+    return titles, table
+
+
+def read_lines(text: TextIO, name: str, allowed: str) -> Iterator[str]:
+    """Yield the lines of a text without their ends.
+
+    Raises
+    ------
+    InputError
+        Names the line that is too long or holds zero bytes.
+    """
+    for number, ended in enumerate(iter(lambda: text.readline(LONGEST + 1), ""), start=1):
+        line = ended.removesuffix("\n")
+        if "\0" in line:
+            refuse(f"{name}: line {number} holds zero bytes", allowed)
+        if len(line) > LONGEST:
+            refuse(f"{name}: line {number} is longer than {LONGEST} characters", allowed)
+        yield line
+
+
+def strip_comment(line: str) -> str:
+    """Return a line without its comment and what ends it."""
+    return line.partition("#")[0].strip().rstrip(";").rstrip()
+
+
+def find_separator(line: str) -> str | None:
+    """Return what separates the columns of a line, None for blanks.
+
+    >>> find_separator("0,1 1,5")
+    >>> find_separator("0, 1.5")
+    ','
+    >>> find_separator('"0,1","1,5"')
+    ','
+    """
+    bare = QUOTED.sub("0", line)
+    separator = next((mark for mark in SEPARATORS if mark in bare), None)
+    words = re.split(" +", bare)
+    # A comma beside a blank is no decimal comma.
+    are_numbers = all(is_number(word) and not word.startswith(",") for word in words)
+    return None if separator == "," and len(words) > 1 and are_numbers else separator
+
+
+def split_line(line: str, separator: str | None) -> list[str]:
+    """Return the cells of a line without the blanks and quotes around them.
+
+    >>> split_line('"0,1" ;1,5', ";")
+    ['0,1', '1,5']
+    """
+    if '"' in line:
+        words = csv.reader([line], delimiter=separator or " ", skipinitialspace=True)
+        return [cell.strip() for cell in next(words)]
+    if separator is None:  # other blanks group digits
+        return re.split("[ \t]+", line)
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def to_number(cell: str, decimal: str) -> float | None:
+    """Return the number in a cell; None where it is not one with this decimal mark.
+
+    >>> to_number("1.234,5", ","), to_number("1.234,5", ".")
+    (1234.5, None)
+    """
+    match = NUMBERS[decimal].fullmatch(cell)
+    if match is None:
+        return None
+    if match["group"]:
+        cell = cell.replace(match["group"], "")
+    return float(cell.replace(decimal, "."))
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell is a number with either decimal mark."""
+    return any(pattern.fullmatch(cell) for pattern in NUMBERS.values())
+
+
+def find_decimal(
+    rows: Iterable[tuple[int, list[str], bool]], separator: str | None, name: str
+) -> DecimalMark:
+    """Return the decimal mark of a table from number and cells of its lines, and whether in quotes.
+
+    The first number that can be read with one of the decimal marks only decides for all: ``0,5``,
+    ``1.234,5`` and ``1,2345`` show a decimal comma, ``1,575`` shows nothing.
+
+    Raises
+    ------
+    InputError
+        Names the line of a number that may be two, where no number of the table decides.
+    """
+    doubtful: tuple[int, str] | None = None
+    for line, cells, are_quoted in rows:
+        # Where commas separate columns, numbers without quotes have decimal points.
+        has_points = separator == "," and not are_quoted
+        for cell in cells:
+            if "." not in cell and "," not in cell:
+                continue
+            marks = [mark for mark, pattern in NUMBERS.items() if pattern.fullmatch(cell)]
+            if len(marks) == 1:
+                return DecimalMark(marks[0], line)
+            if len(marks) > 1 and doubtful is None and not (has_points and "." in cell):
+                doubtful = line, cell
+    if doubtful is not None:
+        line, cell = doubtful
+        own = to_number(cell, "," if "," in cell else ".")
+        both = " or ".join(f"{to_number(cell, mark):.15g}" for mark in MARKS)
+        refuse(
+            f"{name}: line {line}: {cell!r} may be {both}, and no number of the table decides",
+            f"tables with a number that shows the decimal mark, such as {cell}0 for {own:.15g}",
+        )
+    return DecimalMark()

@@ -1,0 +1,73 @@
+"""Text, HTML and figures of results."""
+
+from __future__ import annotations
+
+import warnings
+from abc import ABC, abstractmethod
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from thud.base.errors import ReportWarning
+from thud.base.immutable import Immutable
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+
+    from matplotlib.figure import Figure
+
+# Maximum number of characters of a message of matplotlib that is shown.
+_SHOWN = 100
+
+# What makes the figure, the dataset or the table of a result. The makers import the results, which
+# therefore cannot import them: the package enters them.
+MAKERS: dict[str, Callable[..., Any]] = {}
+
+
+class Displayed(Immutable, ABC):
+    """Base of results: their HTML is their text above a table."""
+
+    @abstractmethod
+    def rows(self) -> Sequence[Sequence[str]]:
+        """Return header and rows of the table."""
+
+    def _repr_html_(self) -> str:
+        return f"<p>{_escaped(repr(self)[1:-1])}</p>\n{html_table(self.rows())}"
+
+
+@contextmanager
+def left_out(figure: str) -> Iterator[None]:
+    """Warn where a figure cannot be drawn, for whatever reason: the results stand without it."""
+    try:
+        yield
+    except Exception as error:
+        # Compiled modules turn an interrupt into an error of their own.
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise
+        cause = (str(error) or type(error).__name__).partition("\n")[0][:_SHOWN]
+        message = f"{figure} is not drawn ({cause}); the results are complete without it"
+        warnings.warn(message, ReportWarning, stacklevel=4)
+
+
+def draw_all(draws: Mapping[str, Callable[[], Figure | None]]) -> dict[str, Figure]:
+    """Return figures by name: those that have something to show and can be drawn."""
+    drawn = {}
+    for name, draw in draws.items():
+        with left_out(name):
+            figure = draw()
+            if figure is not None:
+                drawn[name] = figure
+    return drawn
+
+
+def html_table(rows: Iterable[Sequence[str]]) -> str:
+    """Return rows of text, the header first, as HTML."""
+    header, *body = (tuple(map(_escaped, row)) for row in rows)
+    lines = [("th", header), *(("td", row) for row in body)]
+    cells = ["".join(f"<{tag}>{cell}</{tag}>" for cell in row) for tag, row in lines]
+    return "<table>\n" + "".join(f"<tr>{line}</tr>\n" for line in cells) + "</table>"
+
+
+def _escaped(text: str) -> str:
+    from html import escape  # noqa: PLC0415 - for notebooks only
+
+    return escape(text)

@@ -1,0 +1,423 @@
+"""Files of results: written atomically, under locks, and never over those of the user."""
+
+from __future__ import annotations
+
+import errno
+import fcntl
+import os
+import platform
+import re
+import secrets
+import shutil
+import signal
+import stat
+import threading
+import time
+import warnings
+import zlib
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, NoReturn
+
+from thud.base.checks import refuse
+from thud.base.errors import InputError, LockWarning
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+# Lists the files that thud has written to a directory; its first line.
+MANIFEST = ".thud"
+HEAD = "# files that thud has written, with checksums (CRC-32)"
+# Temporary name of a file in a result directory.
+PART = f"{MANIFEST}.new"
+# Age at which a temporary file of another host is no longer being written, s.
+_MAX_AGE = 86400.0
+# Errors of a file system that has no locks.
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EINVAL)
+# Errors of a path with nothing there, or no regular file.
+_NO_FILE = (
+    errno.EINVAL, errno.EISDIR, errno.ELOOP, errno.ENAMETOOLONG, errno.ENOENT, errno.ENOTDIR
+)  # fmt: skip
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Defer signals until a short operation is done; file libraries print errors otherwise.
+
+    Only the main thread handles signals; others have none to defer.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    held: list[int] = []
+    usual = {
+        number: signal.signal(number, lambda number, _: held.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in usual.items():
+            signal.signal(number, handler)
+        if held:
+            signal.raise_signal(held[0])
+
+
+def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
+    """Write a file atomically, also over an existing one; an OSError names the path."""
+    try:
+        target = Path(path)
+        if target.exists():
+            _require_regular(target.stat(), target)
+        _replace(target, content, target.with_name(f".{target.name}.part"))
+    except ValueError as error:  # a path that no file system can hold
+        message = f"{path!r} is not allowed; allowed: the path of a file"
+        raise InputError(message) from error
+
+
+@dataclass(frozen=True)
+class Results:
+    """A directory for results, in which thud replaces only files that it has written itself.
+
+    The manifest of the directory lists these with their checksums: a file that is not listed, or
+    that has changed since, is the user's, and so is whatever is no regular file.
+
+    Attributes
+    ----------
+    folder : Path
+        The directory, made where it is needed.
+    command : str
+        The command that writes; empty for the results of a case and their figures, which the next
+        input replaces as a whole.
+    inputs : tuple of path-like
+        Files that the results depend on, which are never replaced.
+    replace : bool
+        Replace also files that thud has not written.
+    is_locked : bool
+        The caller holds the lock of the directory.
+    """
+
+    folder: Path
+    command: str = ""
+    inputs: tuple[str | os.PathLike[str], ...] = ()
+    replace: bool = False
+    is_locked: bool = False
+
+    def require(self, names: Iterable[str], listed: Mapping[str, Entry] | None = None) -> None:
+        """Raise InputError where a file is in the way that must not be replaced.
+
+        Files that are `listed`, by default in the manifest, may be.
+        """
+        listed = self._listed() if listed is None else listed
+        for name in names:
+            path = self.folder / name
+            if not os.path.lexists(path):
+                continue
+            self.require_no_input(path)
+            if is_directory(path) or not (self.replace or _is_listed(path, listed)):
+                refuse_foreign(path)
+
+    def write(
+        self, contents: Mapping[str, bytes], stale: Iterable[str] = (), marker: bytes | None = None
+    ) -> list[Path]:
+        """Write files by name; return their paths.
+
+        Parameters
+        ----------
+        contents
+            Contents of the files.
+        stale
+            Names of files that are removed where an earlier call has written them and this one
+            does not.
+        marker
+            Content of the file that identifies the results of a case, ``effective.nml`` or
+            ``sets.nml``, where the files belong to these results.
+
+        Raises
+        ------
+        InputError
+            Where a file is in the way, or another run has replaced the results of the case.
+        OSError
+            Where a file cannot be written.
+        """
+        self.folder.mkdir(parents=True, exist_ok=True)
+        with nullcontext() if self.is_locked else locked(self.folder):
+            held = {content_of(self.folder / name) for name in ("effective.nml", "sets.nml")}
+            if marker not in {None, *held}:
+                refuse(f"{self.folder} now holds results of another input", "run the case again")
+            listed = self._listed()
+            new = {n: Entry((checksum(c),), self.command) for n, c in contents.items()}
+            # Whatever of both contents a killed writer leaves is listed.
+            both = listed | {
+                n: Entry((*listed.get(n, Entry(())).checksums, *e.checksums), e.command)
+                for n, e in new.items()
+            }
+            self.require(contents, both)
+            gone = [
+                n
+                for n in {*stale} - {*contents}
+                if _is_listed(self.folder / n, listed) and listed[n].command == self.command
+            ]
+            if not contents and not gone:
+                return []
+            self._put({MANIFEST: _manifest(both), **contents})
+            for name in gone:
+                (self.folder / name).unlink(missing_ok=True)
+            after = {name: e for name, e in (listed | new).items() if name not in gone}
+            if after:
+                self._put({MANIFEST: _manifest(after)})
+            else:
+                (self.folder / MANIFEST).unlink(missing_ok=True)
+        return [self.folder / name for name in contents]
+
+    def _put(self, contents: Mapping[str, bytes]) -> None:
+        for name, content in contents.items():
+            _replace(self.folder / name, content, self.folder / PART)
+
+    def _listed(self) -> dict[str, Entry]:
+        self.require_no_input(self.folder / MANIFEST)
+        try:
+            return read_manifest(self.folder)
+        except InputError:
+            if not self.replace or is_directory(self.folder / MANIFEST):
+                raise
+            return {}
+
+    def require_no_input(self, path: Path) -> None:
+        """Raise InputError where a path is that of an input."""
+        if is_one_of(path, self.inputs):
+            refuse(f"{path} is an input, which is never replaced", "another directory")
+
+
+class Entry(NamedTuple):
+    """What a manifest says of a file: the checksums that it may have, and what has written it."""
+
+    checksums: tuple[str, ...]
+    command: str = ""
+
+
+def refuse_foreign(path: Path) -> NoReturn:
+    """Raise InputError of what thud has not written."""
+    if is_directory(path):
+        refuse(f"{path} is a directory of something else", "another directory")
+    refuse(
+        f"{path} is in the way: thud has not written it, or it has changed since",
+        "another directory, or --replace (replace=True) to replace it",
+    )
+
+
+def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:
+    """Whether a path leads to one of some files, whatever their names are."""
+    for other in others:
+        with suppress(OSError, ValueError):
+            if path.samefile(other):
+                return True
+    return False
+
+
+def is_directory(path: Path) -> bool:
+    """Whether a path is that of a directory and no link."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def is_regular(path: Path) -> bool:
+    """Whether a path is that of a regular file and no link; to open anything else could block."""
+    try:
+        return stat.S_ISREG(path.lstat().st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def is_temporary(name: str) -> bool:
+    """Whether a name is that of a file that is not whole, also one of `own_path`."""
+    return re.fullmatch(r"\.(thud\.new|.+\.part)(\..*)?", name) is not None
+
+
+def is_failure(error: BaseException) -> bool:
+    """Whether an error of reading is one of the system, and says nothing of what is there."""
+    return isinstance(error, OSError) and error.errno not in (None, *_NO_FILE)
+
+
+def read_input(path: Path) -> bytes:
+    """Return the content of an input; raise OSError where it is no regular file."""
+    _require_regular(path.stat(), path)
+    return path.read_bytes()
+
+
+def _require_own(found: os.stat_result, part: Path) -> None:
+    _require_regular(found, part)
+    # It would be written to under its other name, too.
+    if found.st_nlink > 1:
+        raise OSError(errno.EEXIST, f"{part.name} is a link", str(part))
+
+
+def _require_regular(found: os.stat_result, path: Path) -> None:
+    if not stat.S_ISREG(found.st_mode):
+        raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
+
+
+def content_of(path: Path) -> bytes | None:
+    """Return the content of a regular file, None of anything else."""
+    with suppress(OSError):
+        return path.read_bytes() if is_regular(path) else None
+    return None
+
+
+def checksum(content: bytes) -> str:
+    """Return the checksum of a content as manifests hold it: CRC-32 in hexadecimal digits."""
+    return f"{zlib.crc32(content):08X}"
+
+
+def read_manifest(folder: Path) -> dict[str, Entry]:
+    """Return what the manifest of a directory lists by name, nothing where there is none.
+
+    The last checksum of a file is that of its latest content.
+
+    Raises
+    ------
+    InputError
+        Where there is something else of its name.
+    """
+    path = folder / MANIFEST
+    if not os.path.lexists(path):
+        return {}
+    content = content_of(path)
+    head, *lines = (content or b"").decode("utf-8", "surrogateescape").split("\n")
+    if head != HEAD:
+        refuse_foreign(path)
+    listed: dict[str, Entry] = {}
+    for line in lines:
+        name, sums, command = [*line.split("\t"), "", ""][:3]
+        known = listed[name].checksums if name in listed else ()
+        if sums:
+            listed[name] = Entry((*known, sums), command)
+    return listed
+
+
+def _manifest(listed: Mapping[str, Entry]) -> bytes:
+    lines = [
+        f"{name}\t{one}\t{entry.command}".rstrip("\t")
+        for name, entry in sorted(listed.items())
+        for one in entry.checksums
+    ]
+    return "\n".join([HEAD, *lines, ""]).encode("utf-8", "surrogateescape")
+
+
+def _is_listed(path: Path, listed: Mapping[str, Entry]) -> bool:
+    """Whether thud has written a file."""
+    content = content_of(path) if path.name in listed else None
+    return content is not None and checksum(content) in listed[path.name].checksums
+
+
+@contextmanager
+def locked(folder: Path, kind: int = fcntl.LOCK_EX) -> Iterator[None]:
+    """Hold the lock of a result directory, so that no other run switches or adds to it.
+
+    Raises BlockingIOError where another run holds it and `kind` has LOCK_NB.
+    """
+    with _held(folder, os.O_RDONLY | os.O_DIRECTORY, kind) as (_, _, is_locked):
+        if kind & fcntl.LOCK_EX and not is_locked:
+            sentence = "the file system has no locks; let only one run at a time write there"
+            warnings.warn(f"{folder}: {sentence}", LockWarning, stacklevel=3)
+        yield
+
+
+@contextmanager
+def _held(path: Path, flags: int, kind: int) -> Iterator[tuple[Path, int, bool]]:
+    """Open what has a path; yield the path, the descriptor, and whether that holds the lock.
+
+    Where there are no locks a new file gets a name of its own: several may write one of this name.
+    """
+    while True:
+        descriptor = os.open(path, flags, 0o666)
+        try:
+            is_locked = _flock(descriptor, kind)
+            if flags & os.O_CREAT and not flags & os.O_EXCL and not is_locked:
+                path.unlink(missing_ok=True)
+                path, flags = own_path(path), flags | os.O_EXCL
+            # The previous holder of the lock may have renamed it, or switched the directory.
+            elif _leads_to(path, descriptor):
+                yield path, descriptor, is_locked
+                return
+        finally:
+            os.close(descriptor)
+
+
+def _flock(descriptor: int, kind: int) -> bool:
+    """Lock an open file; return False where the file system has no locks."""
+    try:
+        fcntl.flock(descriptor, kind)
+    except OSError as error:
+        if error.errno not in _NO_LOCKS:
+            raise
+        return False
+    return True
+
+
+def _leads_to(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except FileNotFoundError:
+        return False
+
+
+def own_path(part: Path) -> Path:
+    """Return a temporary path that no other writer has; remove those that killed ones have left.
+
+    Its name begins with that of `part`, and ends with the writer's host and process.
+    """
+    host = platform.node()
+    for path in part.parent.iterdir():
+        if path.name.startswith(f"{part.name}."):
+            with suppress(OSError, ValueError):
+                name, _, process = path.name.rpartition(".")
+                ended = name.endswith(f".{host}") and not _is_running(int(process))
+                if ended or time.time() - path.lstat().st_mtime > _MAX_AGE:
+                    remove(path)
+    return part.with_name(f"{part.name}.{secrets.token_hex(8)}.{host}.{os.getpid()}")
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:  # of another user
+        pass
+    return True
+
+
+def remove(path: Path) -> None:
+    """Remove a file or a directory, if it exists; an interrupt leaves its name all or nothing."""
+    if is_directory(path):
+        gone = path.with_name(f".{path.name}.part")
+        shutil.rmtree(gone, ignore_errors=True)
+        path.rename(gone)
+        shutil.rmtree(gone)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _replace(target: Path, content: bytes, part: Path) -> None:
+    """Write a file under a temporary name in the same directory, then rename it.
+
+    Where there are locks the name is always the same, and one writer at a time has it: what a
+    killed one leaves is taken up by the next.
+    """
+    try:
+        # A link of this name may be another user's, to a file of ours; to open a pipe could block.
+        flags = os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+        with _held(part, flags, fcntl.LOCK_EX) as (own, descriptor, _):
+            _require_own(os.fstat(descriptor), own)
+            try:
+                # Closed before it is renamed: some disks are found to be full only then.
+                with os.fdopen(os.dup(descriptor), "wb") as file:
+                    file.truncate(0)
+                    file.write(content)
+                own.replace(target)
+            except BaseException:
+                own.unlink(missing_ok=True)
+                raise
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(target)) from error

@@ -1,0 +1,99 @@
+"""Declaration of a key of the input, and the base of the classes that take keys."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from dataclasses import dataclass, fields
+from functools import wraps
+from typing import TYPE_CHECKING, Literal, ParamSpec, Self, TypeVar
+
+from thud.base.checks import refuse, require_words
+from thud.base.immutable import Plain
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+Kind = Literal["real", "whole", "choice", "flag", "list", "text"]
+
+
+@dataclass(frozen=True)
+class Key:
+    """Key as the library declares it.
+
+    Attributes
+    ----------
+    owner : str
+        What uses it: a source model, a floor, ``"modes"``, ``"compression"``, ``"floor"`` or
+        ``"room"``; empty for keys of every impact.
+    group, name : str
+        Namelist group and name.
+    kind : str
+        ``"real"``, ``"whole"``, ``"choice"``, ``"flag"``, ``"list"`` (of numbers) or ``"text"``.
+    unit : str
+        SI unit; empty for pure numbers.
+    meaning : str
+        Description.
+    choices : tuple of str
+        Allowed values of a choice.
+    lower, upper : float or str
+        Limits of the allowed range; one that depends on other keys of the group is a product or
+        quotient of numbers and names of keys.
+    whole : bool
+        Whether it takes whole numbers only.
+    """
+
+    owner: str
+    group: str
+    name: str
+    kind: Kind = "real"
+    unit: str = ""
+    meaning: str = ""
+    choices: tuple[str, ...] = ()
+    lower: float | str = -math.inf
+    upper: float | str = math.inf
+    whole: bool = False
+
+
+class Group(Plain):
+    """Base of the dataclasses whose fields are keys, or groups of them."""
+
+    def __new__(cls, *_: object, **words: object) -> Self:
+        """Raise InputError where a word is not a field."""
+        require_keywords(f"{cls.__name__}()", words, _names(cls))
+        return super().__new__(cls)
+
+
+def _names(group: type[Group]) -> list[str]:
+    return [option.name for option in fields(group)]  # type: ignore[arg-type]
+
+
+def require_keywords(place: str, given: Collection[str], known: Collection[str]) -> None:
+    """Raise InputError where a word is not known; name the classes of which it is a key."""
+    unknown = [word for word in given if word not in known]
+    if not unknown:
+        return
+    for word in unknown:
+        if owners := [one.__name__ for one in Group.__subclasses__() if word in _names(one)]:
+            refuse(
+                f"{place}: {word!r} is a key of {' and '.join(owners)}",
+                " or ".join(f"{one}({word}=...)" for one in owners),
+            )
+    groups = Group.__subclasses__()
+    also = [word for one in groups for word in (one.__name__.lower(), *_names(one))]
+    require_words(place, given, known, also)
+
+
+def check_keywords(function: Callable[P, R]) -> Callable[P, R]:
+    """Let a function raise InputError where it does not know a keyword."""
+    known = list(inspect.signature(function).parameters)
+
+    @wraps(function)
+    def checked(*arguments: P.args, **keywords: P.kwargs) -> R:
+        require_keywords(f"{function.__name__}()", keywords, known)
+        return function(*arguments, **keywords)
+
+    return checked

@@ -1,0 +1,105 @@
+"""Units of the namelist and their common multiples; all of them are powers of ten."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+
+from thud.base.checks import refuse, require_kind, shown, suggestion
+
+# By the unit of a key: the allowed units and their power of ten.
+MULTIPLES: dict[str, dict[str, int]] = {
+    "m": {"m": 0, "cm": -2, "mm": -3, "um": -6},
+    "s": {"s": 0, "ms": -3, "us": -6},
+    "Hz": {"Hz": 0, "kHz": 3},
+    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9, "N/mm2": 6, "N/m2": 0, "hPa": 2, "bar": 5},
+    "N": {"N": 0, "kN": 3},
+    "kg": {"kg": 0, "g": -3},
+    "kg/m3": {"kg/m3": 0, "g/cm3": 3},
+    "N/m": {"N/m": 0, "kN/m": 3, "N/mm": 3},
+    "N/m3": {"N/m3": 0, "kN/m3": 3, "MN/m3": 6},
+    "m3": {"m3": 0},
+    "m/s2": {"m/s2": 0},
+    "s/m": {"s/m": 0, "ms/m": -3},
+    "degC": {"degC": 0},
+    "K": {"K": 0},
+    "": {"1": 0, "%": -2},
+}
+# The beginning of a quantity.
+NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
+# Units of tables and figures, ascending.
+HANDY = {
+    "Pa": ("Pa", "kPa", "MPa", "GPa"),
+    "m": ("mm", "m"),
+    "s": ("ms", "s"),
+    "Hz": ("Hz", "kHz"),
+    "N/m": ("N/m", "kN/m"),
+    "N/m3": ("N/m3", "kN/m3", "MN/m3"),
+}
+
+
+def power_of(unit: object, key_unit: str, place: str) -> int:
+    """Return the power of ten that converts a unit to that of a key.
+
+    Raise InputError with the place of the unit and the allowed ones where it does not fit.
+    """
+    # Other units have no multiples.
+    multiples = MULTIPLES.get(key_unit, {key_unit: 0})
+    if not isinstance(unit, str) or unit not in multiples:
+        hint = suggestion(unit, multiples)
+        refuse(f"{place}: unit {shown(unit)} does not fit{hint}", ", ".join(multiples))
+    return multiples[unit]
+
+
+def quantity(text: str) -> float:
+    """Return a number with a unit in SI units; temperatures in degC.
+
+    Parameters
+    ----------
+    text
+        The number and one of the units that studies take, such as ``"32 mm"``.
+
+    Raises
+    ------
+    InputError
+        Where it is no finite number, or the unit is not known; lists the units.
+
+    Examples
+    --------
+    >>> quantity("32 mm")
+    0.032
+    """
+    require_kind("quantity", text, str)
+    units = {unit: power for multiples in MULTIPLES.values() for unit, power in multiples.items()}
+    match = NUMBER.match(text)
+    if match is None or not math.isfinite(float(match[1])):
+        refuse(f"quantity = {shown(text)} is not a number and its unit", "such as '32 mm'")
+    unit = text[match.end() :].strip()
+    if unit not in units:
+        what = (
+            f"unit {shown(unit)} is not known{suggestion(unit, units)}"
+            if unit
+            else "unit is missing"
+        )
+        refuse(f"quantity = {shown(text)}: {what}", ", ".join(units))
+    value = scaled(float(match[1]), units[unit])
+    if not math.isfinite(value):
+        refuse(f"quantity = {shown(text)} is too large", "finite numbers")
+    return value + 0.0
+
+
+def scaled(value: float, power: int) -> float:
+    """Return a number times a power of ten, correctly rounded.
+
+    >>> scaled(35, -3)
+    0.035
+    """
+    return float(Decimal(repr(float(value))).scaleb(power))
+
+
+def handy_unit(unit: str, value: float) -> tuple[str, float]:
+    """Return a unit in which a value is at least 1, and its size in SI units."""
+    known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
+    small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]
+    return small[-1] if small and value else (unit, 1.0)

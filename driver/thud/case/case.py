@@ -1,0 +1,285 @@
+"""Input of a run: the groups of a namelist file, read and written with f90nml."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, TypeAlias
+
+import f90nml
+import numpy as np
+
+from thud.base.bridge import api, call, text
+from thud.base.schema import (
+    FLOORS,
+    GROUPS,
+    KEYS,
+    MODELS,
+    Ball,
+    Compression,
+    Drop,
+    FloorOptions,
+    HollowSphere,
+    Levels,
+    Limits,
+    ModelOptions,
+    Modes,
+    Room,
+    Sampling,
+)
+from thud.base.checks import LARGEST, refuse, require_choice, require_kind, require_words, shown
+from thud.base.display import Displayed
+from thud.base.errors import InputError
+from thud.base.files import replace_file
+from thud.base.key import Group, require_keywords
+
+if TYPE_CHECKING:
+    from dataclasses import Field
+    from typing import Any, Self
+
+# Values by group and key, as f90nml has them.
+Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
+# The keys that take lists of numbers.
+LISTS = {key.name for key in KEYS if key.kind == "list"}
+# Groups that an impact may have, and all that a case may ask for.
+FURTHER: dict[str, type[Group]] = {"compression": Compression, "room": Room}
+OPTIONAL: dict[str, type[Group]] = {"modes": Modes, **FURTHER}
+# Keys of the mesh, which free modes and finite elements share.
+_MESH = tuple(option.name for option in fields(Modes) if "group" in option.metadata)
+
+
+def group_of(model: str, option: Field[Any]) -> str:
+    """Return the namelist group of an option of a model."""
+    group: str = option.metadata.get("group", model)
+    return group
+
+
+def new_model(model: str | ModelOptions, options: Mapping[str, object]) -> ModelOptions:
+    """Return the options of a model by its name; raise InputError where one is not known."""
+    if isinstance(model, ModelOptions):
+        if options:
+            what = f"model is an object of {type(model).__name__} beside {', '.join(options)}"
+            refuse(what, "options in the object, or beside the name of a model")
+        return model
+    require_choice("&model: name", model, MODELS)
+    require_keywords(f"&{model}", options, [option.name for option in fields(MODELS[model])])
+    return MODELS[model](**options)  # type: ignore[arg-type]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Case(Group, Displayed):
+    """Everything that one run needs.
+
+    Attributes
+    ----------
+    name : str
+        Name of the case, also of its output directory.
+    model : HollowSphere, ModalBall, FiniteElement, MeasuredModes, HuntCrossley, TwoMass or None
+        Options of the source model; None: no impact.
+    modes : Modes or None
+        Options of the free modes; None: no free modes.
+    floor : FloorOptions or None
+        Floor on which the ball is dropped too, beside the rigid one; None: no other.
+    room : Room or None
+        Room below the floor; None: no level in a room.
+    compression : Compression or None
+        Options of the slow compression by the source model; None: no compression.
+    ball, drop, sampling, levels, limits
+        The other namelist groups.
+    """
+
+    name: str = "python"
+    ball: Ball = field(default_factory=Ball)
+    drop: Drop = field(default_factory=Drop)
+    model: ModelOptions | None = field(default_factory=HollowSphere)
+    sampling: Sampling = field(default_factory=Sampling)
+    levels: Levels = field(default_factory=Levels)
+    limits: Limits = field(default_factory=Limits)
+    modes: Modes | None = None
+    floor: FloorOptions | None = None
+    room: Room | None = None
+    compression: Compression | None = None
+
+    def __repr__(self) -> str:
+        """Return what is computed."""
+        model = self.model.name if isinstance(self.model, ModelOptions) else ""
+        modes = "free modes" if self.modes else ""
+        floor = f"on {self.floor.name}" if self.floor else ""
+        room = "room below" if self.room else ""
+        press = "slow compression" if self.compression else ""
+        return f"<Case {self.name}: {', '.join(filter(None, (model, floor, modes, room, press)))}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        units = {(key.owner or key.group, key.name): key.unit for key in KEYS}
+        rows: list[tuple[str, ...]] = [("group", "key", "value", "unit")]
+        for group, entries in vars(self).items():
+            if isinstance(entries, Group):
+                owner = str(getattr(entries, "name", group))
+                for key, value in vars(entries).items():
+                    rows.append((owner, key, str(value), units[owner, key]))
+        return rows
+
+    def to_namelist(self) -> Namelist:
+        """Return the case as a namelist with every key; its text is that of a file.
+
+        Raises
+        ------
+        InputError
+            Where a value is not a number, text or, for keys that take one, a list of numbers.
+        """
+        for group, kind in GROUPS.items():
+            require_kind(group, getattr(self, group), kind)
+        require_kind("model", self.model, ModelOptions | None)
+        require_kind("floor", self.floor, FloorOptions | None)
+        for group, optional in OPTIONAL.items():
+            require_kind(group, getattr(self, group), optional | None)
+        groups: dict[str, dict[str, object]] = {
+            "case": {"name": self.name},
+            "ball": vars(self.ball),
+        }
+        if self.modes:
+            groups["modes"] = {"count": self.modes.count}
+            groups["mesh"] = {key: getattr(self.modes, key) for key in _MESH}
+        if self.model:
+            groups["model"] = {"name": self.model.name}
+            groups |= {group: vars(getattr(self, group)) for group in GROUPS}
+            for option in fields(self.model):
+                values = groups.setdefault(group_of(self.model.name, option), {})
+                value = getattr(self.model, option.name)
+                if self.modes and option.name in _MESH and values[option.name] != value:
+                    message = (
+                        f"&mesh: {option.name} = {value} of the model is not that of the modes, "
+                        f"{values[option.name]}; allowed: one mesh for both"
+                    )
+                    raise InputError(message)
+                values[option.name] = value
+        if self.floor:
+            groups["floor"] = {"name": self.floor.name}
+            groups |= {self.floor.name: options} if (options := vars(self.floor)) else {}
+        groups |= {group: vars(given) for group in FURTHER if (given := getattr(self, group))}
+        namelist = f90nml.Namelist()
+        for group, options in groups.items():
+            plain = {key: _plain(group, key, value) for key, value in options.items()}
+            namelist[group] = {key: value for key, value in plain.items() if value != []}
+        result: Namelist = namelist
+        return result
+
+    @classmethod
+    def from_text(cls, content: str) -> Self:
+        """Return the case of the text of a namelist file; missing keys have their default."""
+        return cls.from_namelist(f90nml.reads(content))
+
+    @classmethod
+    def from_namelist(cls, namelist: Namelist) -> Self:
+        """Return the case of a namelist; missing keys have their default."""
+        content: dict[str, Any] = dict(namelist)
+        groups = {
+            group: kind(**content[group]) for group, kind in GROUPS.items() if group in content
+        }
+        model = modes = None
+        if "modes" in content:
+            modes = Modes(**content["modes"], **content.get("mesh", {}))
+        if "model" in content or not modes:
+            name = content.get("model", {}).get("name", next(iter(MODELS)))
+            options = {}
+            for option in fields(MODELS[name]):
+                given = content.get(group_of(name, option), {})
+                if option.name in given:
+                    options[option.name] = given[option.name]
+            model = MODELS[name](**_with_lists(options))
+        floor = None
+        if "floor" in content:
+            name = content["floor"].get("name", next(iter(FLOORS)))
+            floor = FLOORS[name](**_with_lists(content.get(name, {})))
+        further: dict[str, Any] = {
+            group: kind(**_with_lists(content[group]))
+            for group, kind in FURTHER.items()
+            if group in content
+        }
+        title = content.get("case", {}).get("name", cls.name)
+        return cls(name=title, model=model, floor=floor, modes=modes, **groups, **further)
+
+
+def tables_case(tables: Mapping[str, Any]) -> Case:
+    """Return the case of tables of keys by group, such as those of JSON or TOML; see `check_case`.
+
+    Raises
+    ------
+    InputError
+        Where a group, or the name of model or floor, is not known, or a group is no table.
+    """
+    require_words("the case", tables, {key.group for key in KEYS} | {"model", "floor"})
+    for group, keys in tables.items():
+        if not isinstance(keys, Mapping):
+            refuse(f"&{group} = {shown(keys)} is no table", "keys and their values")
+    for part, known in (("model", MODELS), ("floor", FLOORS)):
+        if part in tables:
+            require_choice(f"&{part}: name", tables[part].get("name"), list(known))
+    return Case.from_namelist(tables)
+
+
+def _with_lists(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values of keys as `f90nml` reads them, lists of one entry as lists."""
+    return {
+        key: (tuple(value) if isinstance(value, list) else (value,)) if key in LISTS else value
+        for key, value in values.items()
+    }
+
+
+def _plain(group: str, key: str, value: object) -> float | str | list[float | str]:
+    """Return a value as a type that f90nml writes."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple) and key in LISTS:
+        return [_plain(group, key, entry) for entry in value]  # type: ignore[misc]
+    known = isinstance(value, int | float) or (isinstance(value, str) and value.isprintable())
+    if not known or (isinstance(value, int) and abs(value) > LARGEST):
+        message = (
+            f"&{group}: {key} = {shown(value)} is not allowed; allowed: a number or plain text"
+        )
+        raise InputError(message)
+    return value  # type: ignore[return-value]
+
+
+def case_text(case: Case) -> bytes:
+    """Return the text of the namelist file of a case, for the library."""
+    return f"{case.to_namelist()}\n".encode(errors="surrogateescape")
+
+
+def read_case(path: str | os.PathLike[str]) -> Case:
+    """Read a case, with every key, from a namelist file.
+
+    Raises
+    ------
+    InputError
+        Names file, group, key, value and allowed range.
+    """
+    return Case.from_text(text(call(api.effective_case, os.fsencode(path))["case"]))
+
+
+def check_case(case: Case) -> None:
+    """Raise InputError with the message of the library where a case is invalid."""
+    call(api.check_text, case_text(case))
+
+
+def write_case(case: Case, path: str | os.PathLike[str]) -> None:
+    """Write a case as a namelist file, completely or not at all.
+
+    Parameters
+    ----------
+    case
+        The case.
+    path
+        Path of the file; an older one is replaced.
+
+    Raises
+    ------
+    InputError
+        Where the case holds a value that is not allowed; nothing is written.
+    OSError
+        Where the file cannot be written.
+    """
+    check_case(case)
+    replace_file(path, case_text(case))

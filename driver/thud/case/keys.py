@@ -1,0 +1,146 @@
+"""Keys that studies vary and fits search for."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from functools import lru_cache
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+from thud.base.schema import GROUPS, KEYS
+from thud.base.checks import refuse, shown, suggestion
+from thud.base.errors import InputError
+from thud.base.key import Key
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from thud.case.case import Case
+
+Value = float | int | str | bool
+
+# Group of the files that a run writes; it has no effect on sets.
+OF_FILES = "output"
+
+# Names of persons and abbreviations, in lower case and as they are written.
+_PROPER = {
+    "youngs": "Young's",
+    "poisson": "Poisson's",
+    "hunt_crossley": "Hunt–Crossley",
+    "kelvin_voigt": "Kelvin–Voigt",
+    "mooney_rivlin": "Mooney–Rivlin",
+    "mooney": "Mooney",
+    "neo_hookean": "neo-Hookean",
+    "prony": "Prony",
+    "fft": "FFT",
+}
+
+# Keys of studies only: they change the mass and the modulus of elasticity of the ball.
+DENSITY = Key("", "ball", "density", "real", "kg/m3", "density of the wall")
+TEMPERATURE = Key("", "ball", "temperature", "real", "degC", "temperature of the ball")
+
+
+def users(case: Case) -> tuple[str, ...]:
+    """Return what of a case has keys of its own: its model, its floor, its room."""
+    floor = case.floor.name if case.floor else ""
+    found = (case.model.name if case.model else "", floor, "room" if case.room else "")
+    return tuple(filter(None, found))
+
+
+@lru_cache
+def known_keys(owners: tuple[str, ...]) -> Mapping[str, Key]:
+    """Return the keys in which sets may differ, by name; see `users`.
+
+    Those of floor and room have names that begin with their group, such as ``"plate.thickness"``,
+    and their own where no other key has it.
+    """
+    model, *others = owners
+    known = {
+        key.name: key
+        for key in KEYS
+        if (key.owner == model or (not key.owner and key.group in GROUPS)) and key.group != OF_FILES
+    }
+    known |= {key.name: key for key in (DENSITY, TEMPERATURE)}
+    for key in KEYS:
+        if key.owner in others:
+            known.setdefault(key.name, key)
+            known[f"{key.group}.{key.name}"] = key
+    return MappingProxyType(known)
+
+
+def find_key(name: str, owners: tuple[str, ...]) -> tuple[Key, int | None]:
+    """Return a key by its name, and the entry of a list: of ``"frequency(2)"`` 2; see `users`.
+
+    Raises
+    ------
+    InputError
+        Where there is no such key; names the groups that have keys.
+    """
+    known = known_keys(owners)
+    match = re.fullmatch(r"(\w+(?:\.\w+)?)(?:\(([1-9]\d{0,3})\))?", str(name))
+    key = known.get(match[1]) if match else None
+    if match is None or key is None or (match[2] and key.kind != "list"):
+        hint = suggestion(str(name).partition("(")[0], known)
+        groups = ", ".join(dict.fromkeys(f"&{one.group}" for one in known.values()))
+        refuse(
+            f"{shown(name)} is not a key of {' and '.join(owners)}{hint}",
+            f"keys of {groups}, density and temperature (`thud --keys` lists them)",
+        )
+    return key, int(match[2]) if match[2] else None
+
+
+def put(case: Case, values: Mapping[str, object]) -> Case:
+    """Return a case with other values of some keys; entries of lists are named as in `find_key`."""
+    assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
+    groups: dict[str, dict[str, object]] = {}
+    for name, value in values.items():
+        key, entry = find_key(name, users(case))
+        group = key.group if key.group in {*GROUPS, "room"} else "model"
+        if case.floor and key.owner == case.floor.name:
+            group = "floor"
+        place = groups.setdefault(group, {})
+        if entry is None:
+            place[key.name] = value
+        else:
+            entries = list(place.get(key.name, getattr(getattr(case, group), key.name)))  # type: ignore[call-overload]
+            if entry > len(entries):
+                message = f"{name} does not exist; allowed: entries 1 to {len(entries)} of the case"
+                raise InputError(message)
+            entries[entry - 1] = value
+            place[key.name] = tuple(entries)
+    changed = {
+        group: dataclasses.replace(getattr(case, group), **found) for group, found in groups.items()
+    }
+    return dataclasses.replace(case, **changed)
+
+
+def plain_words(name: str) -> str:
+    """Return the name of a key, a model or a choice in words.
+
+    >>> plain_words("youngs_modulus")
+    "Young's modulus"
+    """
+    for plain, proper in _PROPER.items():
+        name = re.sub(rf"(?<![^\W_]){plain}(?![^\W_])", proper, name)
+    return name.replace("_", " ")
+
+
+def limits(key: Key, case: Case) -> tuple[float, float]:
+    """Return the limits of a key, evaluated for the other keys of a case."""
+    group = getattr(case, key.group if key.group in GROUPS else "model")
+    return _end(key.lower, group), _end(key.upper, group)
+
+
+def _end(end: float | str, group: object) -> float:
+    """Return a limit; a text is a product or quotient of numbers and keys."""
+    if not isinstance(end, str):
+        return end
+    value, operator = 1.0, "*"
+    for word in re.split(r"([*/])", end):
+        if word in "*/":
+            operator = word
+            continue
+        factor = float(getattr(group, word) if hasattr(group, word) else word)
+        value = value * factor if operator == "*" else value / factor
+    return value

@@ -1,0 +1,301 @@
+"""Models and recordings of the same drop on one page."""
+
+from __future__ import annotations
+
+import os
+import time
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import chain, count
+from pathlib import Path
+from typing import TYPE_CHECKING, overload
+
+import numpy as np
+from tqdm import tqdm
+
+from thud.case.case import Case, read_case
+from thud.base.checks import refuse, refuse_value, require_choice, require_kind
+from thud.base.display import Displayed
+from thud.base.errors import InputError, PlausibilityWarning, ThudError
+from thud.base.files import Results
+from thud.impact.impact import FORCES, Impact, compute
+from thud.level.levels import SOURCES, get_bands
+from thud.plot.comparison import comparison_page
+from thud.plot.comparison_html import comparison_html
+from thud.plot.levels import common_source
+from thud.plot.look import page_files
+from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import Recording
+from thud.recordings.restitution import Fall
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from thud.base.schema import LevelsForce, LimitsSource
+    from thud.level.criteria import Criterion
+    from thud.recordings.verdict import Decision
+
+# Endings of namelist files; all others are recordings.
+NAMELISTS = (".nml", ".namelist", "")
+
+# Maximum ratio of the speeds of one drop with recordings: the limits of its height, 1 cm on both
+# sides of 0.85 m or more, make 1.2 %.
+MAX_SPREAD = 1.015
+
+# Criteria after the octaves: name and unit, size of the unit, decimals.
+_ROWS = (
+    ("contact time, ms", 1e-3, 2),
+    ("restitution", 1.0, 3),
+    ("peaks of the force", 1.0, 0),
+    ("mass, kg", 1.0, 3),
+    ("drop height, m", 1.0, 3),
+)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Displayed):
+    """Impacts of the same drop, side by side.
+
+    Attributes
+    ----------
+    impacts : dict of str to Impact or Recording
+        What is compared, by its name.
+    run_times : dict of str to float
+        Computing time of each model, s.
+    force : str or None
+        ``"floor"`` or ``"elastic"``: the force that is compared; None: that of each case.
+    source : str
+        Source of the limits.
+    """
+
+    impacts: dict[str, Impact | Recording]
+    run_times: dict[str, float]
+    force: LevelsForce | None = None
+    source: LimitsSource = "rubber_ball"
+
+    @property
+    def remarks(self) -> list[str]:
+        """What is possible but not plausible, or doubtful, with the names of the impacts."""
+        return [f"{name}: {remark}" for name, i in self.impacts.items() for remark in i.remarks]
+
+    def __repr__(self) -> str:
+        """Return the names of what is compared."""
+        return f"<Comparison: {', '.join(self.impacts)}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        return self.table()
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Return rows of text: names, force, method, criteria, peaks, times, verdicts.
+
+        Columns are the impacts and, in the last, the limits.
+        """
+        impacts = self.impacts.values()
+        verdicts = [impact.conformity(self.source, self.force) for impact in impacts]
+        octaves = [(f"{nominal:g} Hz, dB", 1.0, 2) for nominal in get_bands().nominal]
+        rows = [
+            ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}"),
+            ("force", *(impact.judged(self.force) for impact in impacts), ""),
+            ("levels", *(impact.level_method for impact in impacts), ""),
+        ]
+        together = zip(*(verdict.criteria for verdict in verdicts), strict=True)
+        for (title, unit, decimals), criteria in zip([*octaves, *_ROWS], together, strict=True):
+            ends = [f"{end / unit:g}" for end in (criteria[0].lower, criteria[0].upper)]
+            rows.append(
+                (
+                    title,
+                    *(_cell(criterion, unit, decimals) for criterion in criteria),
+                    " to ".join(dict.fromkeys(ends)),
+                )
+            )
+        rows.append(("peak force, N", *(_digits(i.peak(self.force)) for i in impacts), ""))
+        if self.run_times:
+            times = (self.run_times.get(name) for name in self.impacts)
+            rows.append(("computed in, ms", *(f"{1e3 * t:.1f}" if t else "" for t in times), ""))
+        return [*rows, ("verdict", *(verdict.verdict for verdict in verdicts), "")]
+
+    def figure(self) -> Figure:
+        """Return the page as a matplotlib figure."""
+        return comparison_page(self.impacts, self.force, self.source, self.table())
+
+    def html(self) -> str:
+        """Return the page as self-contained HTML with interactive plots."""
+        return comparison_html(self.impacts, self.force, self.source, self.table())
+
+    def files(self) -> dict[str, bytes]:
+        """Return ``comparison.png``, ``.svg`` and ``.html`` by name."""
+        return page_files("comparison", self.figure, self.html())
+
+    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
+        """Write the files of `files` and return their paths.
+
+        Files that thud has not written are replaced with `replace` only.
+
+        Raises
+        ------
+        InputError
+            Where a file is in the way.
+        OSError
+            Where they cannot be written.
+        """
+        return Results(Path(directory), "compare", replace=replace).write(self.files())
+
+
+def _digits(force: float) -> str:
+    """Return a force with a decimal, small ones with three digits."""
+    return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
+
+
+def _cell(criterion: Criterion | Decision, unit: float, decimals: int) -> str:
+    """Return the value of a criterion, and how it misses its limits."""
+    if np.isnan(criterion.value):
+        return "not known"
+    word = "" if criterion.conforms else "low" if criterion.value < criterion.lower else "high"
+    if not criterion.conforms and criterion.lower <= criterion.value <= criterion.upper:
+        word = "open"
+    return f"{criterion.value / unit:z.{decimals}f} {word}".rstrip()
+
+
+# mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
+@overload
+def compare(
+    impacts: Mapping[str, Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
+@overload
+def compare(
+    impacts: Iterable[Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison: ...
+def compare(
+    impacts: Mapping[str, Case | Impact | Recording] | Iterable[Case | Impact | Recording],
+    force: LevelsForce | None = None,
+    source: LimitsSource | None = None,
+    *,
+    progress: bool = False,
+) -> Comparison:
+    """Compare models and recordings of the same drop.
+
+    Parameters
+    ----------
+    impacts
+        Cases (which are solved), impacts and recordings, one or more: by name, or in a row, where
+        impacts have the names of their cases.
+    force
+        ``"floor"`` or ``"elastic"``; by default that of each case.
+    source
+        ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases and
+        recordings.
+    progress
+        Show a progress bar.
+
+    Returns
+    -------
+    Comparison
+        Its `save` writes the page.
+
+    Raises
+    ------
+    InputError
+        Where there is nothing to compare, or the drops or the limits differ; the height of a
+        recording counts where it is known.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `Comparison.remarks`.
+    """
+    if force is not None:
+        require_choice("force", force, FORCES)
+    if source is not None:
+        require_choice("source", source, SOURCES)
+    named = _named(impacts)
+    solved: dict[str, Impact | Recording] = {}
+    run_times = {}
+    for name, given in tqdm(named.items(), unit="case", disable=not progress, leave=False):
+        if isinstance(given, Case):
+            start = time.perf_counter()
+            try:
+                solved[name] = compute(given)
+            except ThudError as error:
+                message = f"{name}: {error}"
+                raise type(error)(message) from error
+            run_times[name] = time.perf_counter() - start
+        else:
+            solved[name] = given
+    _require_same_drop(solved)
+    found = Comparison(solved, run_times, force, common_source(solved, source))
+    for remark in found.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    return found
+
+
+def _require_same_drop(impacts: Mapping[str, Impact | Recording]) -> None:
+    """Raise InputError where drops differ; measured heights differ within their tolerance."""
+    computed = {n: i.impact_velocity for n, i in impacts.items() if isinstance(i, Impact)}
+    falls = {n: Fall(i.config.height) for n, i in impacts.items() if isinstance(i, Recording)}
+    speeds = computed | {n: fall.speed for n, fall in falls.items() if fall.height}
+    if not speeds:
+        return
+    spread = max(speeds.values()) / min(speeds.values())
+    if len(set(computed.values())) > 1 or spread > MAX_SPREAD:
+        listed = ", ".join(f"{name} falls with {speed:.4g} m/s" for name, speed in speeds.items())
+        refuse(
+            f"&drop: height or gravity differs ({listed})",
+            f"the same drop, of recordings within {MAX_SPREAD - 1:.1%} of the speed",
+        )
+
+
+def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
+    """Return what is compared by name, checked."""
+    allowed = "one or more cases, impacts or recordings, by name or in a list (files: read_all)"
+    if isinstance(impacts, Mapping):
+        pairs = list(impacts.items())
+    else:
+        row = [impacts] if isinstance(impacts, Case | Impact | Recording) else impacts
+        if not isinstance(row, Iterable) or isinstance(row, str | bytes | os.PathLike):
+            refuse_value("impacts", row, allowed)
+        pairs = [(_name(given), given) for given in row]
+    if not pairs:
+        refuse("impacts is empty", allowed)
+    named: dict[str, Case | Impact | Recording] = {}
+    for name, given in pairs:
+        require_kind("name", name, str)
+        require_kind(name, given, Case | Impact | Recording)
+        # Cases from Python often share their name.
+        names = chain([name], (f"{name} ({n})" for n in count(2)))
+        named[next(free for free in names if free not in named)] = given
+    return named
+
+
+def _name(given: object) -> str:
+    named = given.case if isinstance(given, Impact) else given
+    return named.name if isinstance(named, Case | Recording) else type(named).__name__.lower()
+
+
+def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Recording]:
+    """Read namelist files (``.nml``) and recordings; their names are those of cases and files.
+
+    Raises
+    ------
+    InputError
+        Names the file; also raised where two have the same name.
+    """
+    found: dict[str, Case | Recording] = {}
+    for path in map(Path, paths):
+        given: Case | Recording
+        given = read_case(path) if path.suffix.lower() in NAMELISTS else read_recording(path)
+        name = given.name
+        if name in found:
+            message = f"{path}: {name!r} also names another input; allowed: different names"
+            raise InputError(message)
+        found[name] = given
+    return found

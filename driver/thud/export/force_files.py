@@ -1,0 +1,399 @@
+"""The blocked force of an impact or a recording, in files for other programs."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import math
+import os
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.bridge import version
+from thud.case.case import case_text
+from thud.base.checks import refuse, refuse_value, require_kind, require_number, require_whole
+from thud.base.files import content_of, refuse_foreign, replace_file
+from thud.base.immutable import Immutable
+from thud.impact.impact import Impact
+from thud.level.levels import RECORDED_BAND
+from thud.recordings.channel import library
+from thud.recordings.recording import Recording
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+KINDS = {
+    "floor": "force on the floor",
+    "elastic": "elastic force",
+}
+CONVENTION = (
+    "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; frequencies from 0, "
+    "not doubled: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
+)
+# Resampling: allowed rates, Hz, the largest whole number of the ratio, and the samples of the lower
+# rate that the filter of scipy.signal.resample_poly reaches.
+RATES = (2500.0, 1e6)
+LARGEST_RATIO = 1000
+REACH = 10
+# Begin of the last line of what another reader has to know.
+NOTE_END = "Written by thud "
+# Length of the lines of a universal file and of its names.
+UFF_LINE = 80
+UFF_NAME = 10
+
+
+@dataclass(frozen=True, eq=False)
+class BlockedForce(Immutable):
+    """The force of a source on a rigid floor.
+
+    Attributes
+    ----------
+    name : str
+        Name of the case or the recording.
+    force : ndarray, shape (n_sample,)
+        Force, N, positive into the floor.
+    sample_rate : float
+        Samples per second, Hz.
+    start : float
+        Time of the first sample since first touch, s.
+    kind : str
+        ``"floor"`` or ``"elastic"``.
+    origin : str
+        What the force is from, in words.
+    checksum : str
+        SHA-256 of the case as `thud.write_case` writes it, or of the recording's file.
+    date : str
+        Date of the measurement where it is known, or empty.
+    remarks : tuple of str
+        What was done to the force, a sentence each.
+    """
+
+    name: str
+    force: NDArray[np.float64]
+    sample_rate: float
+    start: float
+    kind: str
+    origin: str
+    checksum: str
+    date: str = ""
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Time since first touch, s, shape (n_sample,)."""
+        return self.start + np.arange(len(self.force)) / self.sample_rate
+
+    def spectrum(self) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+        """Return frequencies, Hz, and the transform ∫ F exp(-i 2π f t) dt, N s, of the force.
+
+        Time is 0 at first touch. The frequencies, shape (n_frequency,), run from 0 to half the
+        sample rate in steps of at most 1 Hz. The samples count as those of a force without parts
+        above: the integral is their sum.
+        """
+        count = max(math.ceil(self.sample_rate), len(self.force))
+        frequency = np.fft.rfftfreq(count, 1 / self.sample_rate)
+        turn = np.exp(-2j * np.pi * frequency * self.start)
+        spectrum: NDArray[np.complex128] = np.fft.rfft(self.force, count) / self.sample_rate * turn
+        return frequency.astype(np.float64), spectrum
+
+    def words(self) -> tuple[str, ...]:
+        """Return what another reader has to know, a line each."""
+        lines = (
+            f"Blocked force of {self.name}: {KINDS[self.kind]}, N, positive into the floor",
+            f"{len(self.force)} samples, first sample at {self.start!r} s since first touch",
+            f"Sample rate: {self.sample_rate:.10g} Hz",
+            f"Origin: {self.origin}",
+            f"SHA-256: {self.checksum}",
+            *self.remarks,
+            f"{NOTE_END}{version()}",
+        )
+        # Names of files may not be UTF-8, and words of a laboratory have several lines.
+        texts = (line.encode("utf-8", "replace").decode() for line in lines)
+        return tuple(" ".join(text.split()) for text in texts)
+
+
+def blocked_force(
+    source: Impact | Recording, *, drop: int = 1, rate: float | None = None
+) -> BlockedForce:
+    """Return the force of an impact that its case judges, or that of a drop of a recording.
+
+    Parameters
+    ----------
+    source
+        Result of a model, or recording.
+    drop
+        Number of the drop of a recording, from 1.
+    rate
+        Samples per second of the result, Hz; by default those of the source.
+
+    Raises
+    ------
+    InputError
+        Where the drop or the rate are not possible.
+    """
+    require_kind("source", source, Impact | Recording)
+    if isinstance(source, Impact):
+        require_whole("drop", drop, 1, 1)
+        found = _of_impact(source)
+    else:
+        found = _of_recording(source, drop)
+    return found if rate is None else _resampled(found, rate)
+
+
+def _of_impact(impact: Impact) -> BlockedForce:
+    case = impact.case
+    model = case.model.name if case.model else ""
+    return BlockedForce(
+        name=case.name,
+        force=impact.force(),
+        sample_rate=impact.sample_rate,
+        start=float(impact.time[0] - impact.touch_time),
+        kind=impact.judged(),
+        origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
+        checksum=hashlib.sha256(case_text(case)).hexdigest(),
+    )
+
+
+def _of_recording(recording: Recording, drop: int) -> BlockedForce:
+    time, force = recording.to_force_history(drop)
+    one = recording.drops[drop - 1]
+    number = drop
+    for origin in recording.origins:
+        if number <= origin.drops:
+            break
+        number -= origin.drops
+    return BlockedForce(
+        name=recording.name if len(recording.drops) == 1 else f"{recording.name}_drop_{drop}",
+        force=force,
+        sample_rate=one.sample_rate,
+        start=float(time[0]),
+        kind=recording.judged(),
+        origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
+        checksum=origin.checksum,
+        date=origin.date,
+        remarks=(*one.steps, f"noise of {one.noise.deviation:.3g} N remains"),
+    )
+
+
+def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
+    """Return a force at another rate, what is above half of the lower one removed."""
+    from scipy.signal import resample_poly  # noqa: PLC0415 - takes its time
+
+    require_number("rate", rate)
+    if not RATES[0] <= rate <= RATES[1]:
+        refuse_value("rate", rate, f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    ratio = Fraction(rate / given.sample_rate).limit_denominator(LARGEST_RATIO)
+    up, down = ratio.numerator, ratio.denominator
+    if up > LARGEST_RATIO or abs(given.sample_rate * up / down - rate) > 1e-9 * rate:
+        refuse(
+            f"rate = {rate:g} Hz is no ratio of small whole numbers to {given.sample_rate:g} Hz",
+            f"ratios of whole numbers up to {LARGEST_RATIO}",
+        )
+    # The filter spreads the force beyond its ends.
+    room = math.ceil(REACH * max(1.0, down / up)) + 1
+    force = resample_poly(np.pad(given.force, room), up, down)
+    start = given.start - room / given.sample_rate
+    found = replace(given, force=force, sample_rate=rate, start=start)
+    (frequency, old), (grid, new) = given.spectrum(), found.spectrum()
+    band = np.arange(1, min(RECORDED_BAND, frequency[-1], grid[-1]))
+    old, new = (np.interp(band, f, s) for f, s in ((frequency, old), (grid, new)))
+    error = float(np.abs(new - old).max() / np.abs(old).max())
+    told = (
+        f"Resampled from {given.sample_rate:g} Hz, band-limited; to {RECORDED_BAND:g} Hz the "
+        f"spectrum has changed by up to {error:.1e} of its maximum"
+    )
+    return replace(found, remarks=(*given.remarks, told))
+
+
+def wav_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a WAV file of 32-bit floats, and a text file beside it with what WAV cannot tell.
+
+    The samples are fractions of full scale. A full scale is a power of two in newtons, so that
+    scaling costs no digit; it stands in the comment of the file and in the text.
+
+    Raises
+    ------
+    InputError
+        Where the sample rate is not a whole number.
+    """
+    soundfile = library("soundfile", "WAV")
+    rate = round(force.sample_rate)
+    if rate != force.sample_rate:
+        refuse(
+            f"{path}: WAV cannot hold a sample rate of {force.sample_rate!r} Hz",
+            "whole numbers of Hz; rate resamples",
+        )
+    peak = float(np.abs(force.force).max())
+    scale = 2.0 ** math.ceil(math.log2(peak)) if peak > 0 else 1.0
+    words = (f"Scale: {scale:g} N per full scale (calibration = {scale:g})", *force.words())
+    content = io.BytesIO()
+    with soundfile.SoundFile(
+        content, "w", samplerate=rate, channels=1, subtype="FLOAT", format="WAV"
+    ) as file:
+        file.comment = "; ".join(words)
+        file.write((force.force / scale).astype(np.float32))
+    return {path: content.getvalue(), f"{path}.txt": _lines(words)}
+
+
+def csv_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a table of time, s, and force, N, each with all its digits."""
+    head = [*(f"# {line}" for line in force.words()), "time_s,force_N"]
+    rows = zip(force.time.tolist(), force.force.tolist(), strict=True)
+    return {path: _lines([*head, *(f"{time!r},{value!r}" for time, value in rows)])}
+
+
+def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a universal file, data set 58 in text: a time response, excitation force, N.
+
+    The format holds 12 digits of the force and 6 of the time step.
+    """
+    pyuff = library("pyuff", "universal")
+    words = force.words()
+    kind = f"{KINDS[force.kind]}, N, positive into the floor"
+    start = f"first sample at {force.start:.6g} s since first touch"
+    times = f"Sample rate: {force.sample_rate:.10g} Hz, {start}"
+    lines = [force.name, kind, force.date, times, words[4]]
+    name = _plain(force.name)[:UFF_NAME]
+    data_set = {
+        "type": 58,
+        "binary": 0,
+        **{f"id{i}": _plain(line)[:UFF_LINE] or "NONE" for i, line in enumerate(lines, start=1)},
+        "func_type": 1,  # time response
+        "rsp_ent_name": name,
+        "rsp_node": 1,
+        "rsp_dir": -3,  # downwards
+        "ref_ent_name": "NONE",
+        "ref_node": 0,
+        "ref_dir": 0,
+        "abscissa_spacing": 1,
+        "abscissa_spec_data_type": 17,  # time
+        "abscissa_axis_lab": "time",
+        "abscissa_axis_units_lab": "s",
+        "ordinate_spec_data_type": 13,  # excitation force
+        "ordinate_axis_lab": "force",
+        "ordinate_axis_units_lab": "N",
+        "orddenom_spec_data_type": 0,
+        "z_axis_spec_data_type": 0,
+        "x": force.time,
+        "data": force.force,
+    }
+    with TemporaryDirectory() as folder:
+        file = Path(folder, "force.uff")
+        pyuff.UFF(str(file)).write_sets([data_set], "overwrite")
+        return {path: file.read_bytes()}
+
+
+def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a MATLAB file, version 5: time, force, spectrum and what they are."""
+    import scipy.io  # noqa: PLC0415 - takes its time
+
+    frequency, spectrum = force.spectrum()
+    content = io.BytesIO()
+    scipy.io.savemat(
+        content,
+        {
+            "time_s": force.time,
+            "force_N": force.force,
+            "sample_rate_Hz": force.sample_rate,
+            "frequency_Hz": frequency,
+            "spectrum_Ns": spectrum,
+            "about": "\n".join([*force.words(), f"Spectrum: {CONVENTION}"]),
+        },
+        oned_as="column",
+    )
+    return {path: content.getvalue()}
+
+
+def spectrum_files(force: BlockedForce, path: str) -> dict[str, bytes]:
+    """Return a table of the complex spectrum; see `BlockedForce.spectrum`."""
+    frequency, spectrum = force.spectrum()
+    table = np.column_stack(
+        [frequency, spectrum.real, spectrum.imag, np.abs(spectrum), np.angle(spectrum)]
+    )
+    head = [
+        *(f"# {line}" for line in (*force.words(), f"Spectrum: {CONVENTION}")),
+        "frequency_Hz,real_Ns,imaginary_Ns,magnitude_Ns,phase_rad",
+    ]
+    return {path: _lines([*head, *(",".join(map(repr, row)) for row in table.tolist())])}
+
+
+# By option of the command: ending of the name of the file, and what makes its content.
+EXPORTS = {
+    "wav": (".wav", wav_files),
+    "csv": (".csv", csv_files),
+    "uff": (".uff", uff_files),
+    "mat": (".mat", mat_files),
+    "spectrum": ("_spectrum.csv", spectrum_files),
+}
+
+
+def export_wav(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a WAV file, and a text file beside it; see `wav_files` and `export`."""
+    return export("wav", force, path)
+
+
+def export_csv(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a table of time and force; see `csv_files` and `export`."""
+    return export("csv", force, path)
+
+
+def export_uff(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a universal file; see `uff_files` and `export`."""
+    return export("uff", force, path)
+
+
+def export_mat(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a MATLAB file; see `mat_files` and `export`."""
+    return export("mat", force, path)
+
+
+def export_spectrum(force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a table of the complex spectrum; see `spectrum_files` and `export`."""
+    return export("spectrum", force, path)
+
+
+def export(kind: str, force: BlockedForce, path: str | os.PathLike[str]) -> list[Path]:
+    """Write a force to the file of a path, which is replaced if it exists.
+
+    Parameters
+    ----------
+    kind
+        Format, one of ``EXPORTS``.
+    force
+        The force.
+    path
+        Path of the file.
+
+    Raises
+    ------
+    InputError
+        Where the format cannot hold the force, the file is the recording of the force, or the text
+        beside a WAV file would replace one that is not of thud.
+    OSError
+        Where a file cannot be written.
+    """
+    _, make = EXPORTS[kind]
+    contents = make(force, os.fspath(path))
+    for place in map(Path, contents):
+        known = content_of(place.resolve())
+        if known is not None and hashlib.sha256(known).hexdigest() == force.checksum:
+            refuse(f"{place} is the recording of the force", "another path")
+        if known is not None and place != Path(path) and NOTE_END.encode() not in known:
+            refuse_foreign(place)
+    for name, content in contents.items():
+        replace_file(name, content)
+    return [Path(name) for name in contents]
+
+
+def _lines(lines: list[str] | tuple[str, ...]) -> bytes:
+    return "".join(f"{line}\n" for line in lines).encode("utf-8", "replace")
+
+
+def _plain(text: str) -> str:
+    """Return a text in the characters that a universal file holds."""
+    return text.encode("ascii", "replace").decode("ascii")

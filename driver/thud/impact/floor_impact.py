@@ -1,0 +1,159 @@
+"""Impact of a source on a floor that moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.bridge import call, floor_api
+from thud.case.case import Case, case_text
+from thud.base.checks import require_pair
+from thud.base.display import MAKERS
+from thud.impact.mobility import mobility
+from thud.base.immutable import Immutable
+from thud.impact.impact import Impact, history
+from thud.level.levels import force_exposure_levels
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.bridge import Bundle
+    from thud.base.schema import BandSet, FloorOptions, LevelsMethod
+
+
+@dataclass(frozen=True, eq=False)
+class FloorEnergy(Immutable):
+    """Energy that a force gives to a floor, in bands.
+
+    Attributes
+    ----------
+    frequency : ndarray, shape (n_band,)
+        Rounded mid frequencies, Hz.
+    by_motion : ndarray, shape (n_band,)
+        Integral of the force times the velocity of the floor, both in the band, J.
+    by_mobility : ndarray, shape (n_band,)
+        The same by the mobility Y of the floor, ``2 integral |F|**2 Re Y df``, J.
+    conductance : ndarray, shape (n_band,)
+        Mean of Re Y, m/(N s).
+    """
+
+    frequency: NDArray[np.float64]
+    by_motion: NDArray[np.float64]
+    by_mobility: NDArray[np.float64]
+    conductance: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FloorImpact(Impact):
+    """Impact on a floor that moves: `floor_force` is the contact force.
+
+    The standards judge the force on a rigid floor, that of the `Impact` whose `on_floor` this is.
+
+    Attributes
+    ----------
+    blocked_force : ndarray, shape (n_sample,)
+        Force of the same drop on a rigid floor, N.
+    floor_displacement, floor_velocity : ndarray, shape (n_sample,)
+        Displacement, m, and velocity, m/s, of the floor under the source, downwards.
+    floor_work : float
+        Energy that the source gives to the floor, J.
+    point_velocity : ndarray, shape (n_point, n_sample)
+        Velocity of the points of the floor, ``point_x`` and ``point_y``, m/s.
+    """
+
+    blocked_force: NDArray[np.float64]
+    floor_displacement: NDArray[np.float64]
+    floor_velocity: NDArray[np.float64]
+    floor_work: float
+    point_velocity: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        """Return the main numbers of the impact, without its arrays."""
+        change = 20 * np.log10(self.floor_force.max() / self.blocked_force.max())
+        return (
+            f"<FloorImpact, {self.floor.name}: contact {1e3 * self.contact_time:.2f} ms, "
+            f"e {self.restitution:.3f}, peak {change:+.2f} dB, floor work {self.floor_work:.3g} J>"
+        )
+
+    @property
+    def floor(self) -> FloorOptions:
+        """Floor of the case."""
+        assert self.case.floor is not None  # noqa: S101 - there is no such impact without
+        return self.case.floor
+
+    def blocked_levels(
+        self, bands: BandSet = "octave", method: LevelsMethod | None = None
+    ) -> NDArray[np.float64]:
+        """Return the levels of the force on a rigid floor, dB, shape (n_band,); see `levels`."""
+        method = method or self.level_method
+        return force_exposure_levels(self.blocked_force, self.sample_rate, bands, method)
+
+    def difference(
+        self, bands: BandSet = "octave", method: LevelsMethod | None = None
+    ) -> NDArray[np.float64]:
+        """Return contact less blocked level, dB, shape (n_band,)."""
+        return self.levels(bands, method, "floor") - self.blocked_levels(bands, method)
+
+    def injected_energy(self, bands: BandSet = "octave") -> FloorEnergy:
+        """Return the energy that goes into the floor in bands, in two ways."""
+        found = call(
+            floor_api.floor_energies, case_text(Case(floor=self.floor)), bands,
+            self.floor_force, self.floor_velocity, self.sample_rate,
+        )  # fmt: skip
+        return FloorEnergy(**found)
+
+    def mobility(
+        self, frequency: ArrayLike, point: tuple[float, float] | None = None
+    ) -> NDArray[np.complex128]:
+        """Return the mobility of the floor under the source, or to a point; see `mobility`."""
+        return mobility(self.floor, frequency, point)
+
+    def velocity_at(self, x: float, y: float) -> NDArray[np.float64]:
+        """Return the velocity of a point of a floor with sides, m/s, shape (n_sample,).
+
+        Raise InputError where the floor has no such point.
+        """
+        found = call(
+            floor_api.point_velocity, case_text(Case(floor=self.floor)), self.floor_force,
+            self.sample_rate, *require_pair("point", (x, y)),
+        )  # fmt: skip
+        velocity: NDArray[np.float64] = found["velocity"]
+        return velocity
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text, an octave each."""
+        energy = self.injected_energy()
+        columns = (self.blocked_levels(), self.levels(force="floor"), self.difference())
+        head = ("octave, Hz", "blocked, dB", "contact, dB", "difference, dB", "energy, J")
+        cells = [[f"{value:.2f}" for value in column] for column in columns]
+        energies = [f"{value:.3g}" for value in energy.by_motion]
+        return [head, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
+
+    def plot(self) -> Figure:
+        """Draw contact against blocked force, their levels, and the mobility of the floor."""
+        figure: Figure = MAKERS["floor"](self)
+        return figure
+
+
+def new_floor_impact(
+    case: Case, found: Bundle, blocked_force: NDArray[np.float64]
+) -> FloorImpact | None:
+    """Return the impact on a floor that moves in a bundle of the library; None without one."""
+    prefix = "on_floor."
+    moving = {key[len(prefix) :]: found[key] for key in found if key.startswith(prefix)}
+    if not moving:
+        return None
+    common = history(case, moving, ())
+    points = zip(
+        getattr(case.floor, "point_x", ()), getattr(case.floor, "point_y", ()), strict=True
+    )
+    impact = FloorImpact(
+        **common, **moving["floor"], blocked_force=blocked_force,
+        point_velocity=np.empty((0, len(blocked_force))),
+    )  # fmt: skip
+    if velocities := [impact.velocity_at(x, y) for x, y in points]:
+        impact = replace(impact, point_velocity=np.array(velocities))
+    return impact

@@ -1,0 +1,161 @@
+"""Free modes of the ball by finite elements (paper, figure 4)."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.bridge import api, call, text
+from thud.base.schema import Ball, FiniteElement, Modes
+from thud.case.case import Case, case_text
+from thud.base.checks import require_kind
+from thud.base.display import Displayed
+from thud.base.errors import InputError, PlausibilityWarning
+from thud.base.key import check_keywords
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.bridge import Bundle
+
+
+@dataclass(frozen=True, eq=False)
+class FreeModes(Displayed):
+    """Axisymmetric elastic modes without twist, in ascending order, without the rigid motion.
+
+    Nodes run from the lowest point to the highest and from the inner surface to the outer one;
+    components are the distance from the axis and the height.
+
+    Attributes
+    ----------
+    ball : Ball
+        The ball.
+    frequency : ndarray, shape (n_mode,)
+        Natural frequencies of the elastic modes, Hz.
+    harmonic : ndarray, shape (n_mode,)
+        Order of the Legendre polynomial that dominates at the outer surface.
+    participation : ndarray, shape (n_mode,)
+        Mass of the ball times the squared amplitude of the lowest point at unit modal mass: how
+        strongly a contact there drives the mode; 1 for the rigid motion.
+    rigid_frequency : float
+        Computed frequency of the rigid motion, Hz; the exact one is 0.
+    start : ndarray, shape (n_line, n_ring, 2)
+        Nodes relative to the centre of the ball, m; nine per element.
+    shape : ndarray, shape (n_mode, n_line, n_ring, 2)
+        Displacements of maximum length 1, the lowest point moving upwards.
+    remarks : tuple of str
+        As `Impact.remarks`.
+    """
+
+    ball: Ball
+    frequency: NDArray[np.float64]
+    harmonic: NDArray[np.int32]
+    participation: NDArray[np.float64]
+    rigid_frequency: float
+    start: NDArray[np.float64]
+    shape: NDArray[np.float64]
+    remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        """Return the frequencies, without the shapes."""
+        return f"<FreeModes: {', '.join(f'{f:.2f}' for f in self.frequency)} Hz>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        columns = zip(self.frequency, self.harmonic, self.participation, strict=True)
+        rows = [(f"{f:.2f}", f"{harmonic}", f"{part:.3f}") for f, harmonic, part in columns]
+        return [("frequency, Hz", "harmonic", "participation"), *rows]
+
+
+@check_keywords
+def free_modes(
+    ball: Ball | None = None,
+    count: int = Modes.count,
+    *,
+    radial_elements: int = Modes.radial_elements,
+    polar_elements: int = Modes.polar_elements,
+) -> FreeModes:
+    """Compute the lowest free modes of a ball.
+
+    Parameters
+    ----------
+    ball
+        By default the rubber ball of the paper. Poisson's ratio may be 1/2.
+    count
+        Number of elastic modes.
+    radial_elements, polar_elements
+        Elements through the wall and from pole to pole.
+
+    Returns
+    -------
+    FreeModes
+        Frequencies, harmonics, participations and shapes.
+
+    Raises
+    ------
+    InputError
+        Names group, key, value and allowed range.
+    NumericalError
+        Where the modes cannot be computed.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `FreeModes.remarks`.
+    """
+    case = Case(
+        ball=Ball() if ball is None else ball,
+        model=None,
+        modes=Modes(count, radial_elements, polar_elements),
+    )
+    modes = new_modes(case.ball, call(api.free_modes, case_text(case)))
+    for remark in modes.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
+    return modes
+
+
+def new_modes(ball: Ball, found: Bundle) -> FreeModes:
+    """Return the free modes in a bundle of the library."""
+    modes = found["modes"]
+    return FreeModes(
+        ball,
+        modes["frequency"],
+        modes["harmonic"].astype(np.int32),
+        modes["participation"],
+        modes["rigid_frequency"],
+        np.stack((modes["r"], modes["z"]), axis=-1),
+        np.moveaxis(modes["shape"], (-1, 0), (0, -1)),
+        tuple(map(text, found.get("remarks", {}).values())),
+    )
+
+
+def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float64]:
+    """Return the loss factor of the material of a finite-element model in shear.
+
+    Parameters
+    ----------
+    model
+        The model, of which the options of ``&material`` are used.
+    frequency : array_like, shape (n,)
+        Frequencies, Hz.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Loss modulus over storage modulus.
+    """
+    require_kind("model", model, FiniteElement)
+    try:
+        wanted = np.ascontiguousarray(frequency, dtype=np.float64)
+    except (TypeError, ValueError):
+        wanted = np.array([])
+    if wanted.ndim != 1 or not wanted.size or not np.all(wanted > 0):
+        message = "frequency is not allowed; allowed: a list of frequencies above 0, Hz"
+        raise InputError(message)
+    result: NDArray[np.float64] = call(api.loss_factors, case_text(Case(model=model)), wanted)[
+        "loss_factors"
+    ]
+    return result

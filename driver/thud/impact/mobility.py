@@ -1,0 +1,57 @@
+"""Mobility of floors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.bridge import call, floor_api
+from thud.base.schema import FloorOptions
+from thud.case.case import Case, case_text
+from thud.base.checks import refuse, require_array, require_kind, require_pair, require_real
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+
+def mobility(
+    floor: FloorOptions, frequency: ArrayLike, point: tuple[float, float] | None = None
+) -> NDArray[np.complex128]:
+    """Return the mobility of a floor, velocity over force, under the source or to a point.
+
+    Parameters
+    ----------
+    floor
+        An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate` or another floor.
+    frequency : array_like, shape (n,)
+        Frequencies, Hz.
+    point
+        Place along length and width, m, of floors with sides; None: under the source.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        Complex mobilities, m/(N s).
+
+    Raises
+    ------
+    InputError
+        Where a key of the floor is out of range, or the floor has no such point.
+
+    Examples
+    --------
+    >>> import thud
+    >>> thud.mobility(thud.InfinitePlate(resistance=1600.0), [31.5]).real
+    array([0.000625])
+    """
+    require_kind("floor", floor, FloorOptions)
+    values = require_real("frequency", require_array("frequency", frequency, dimensions=(0, 1)))
+    if not np.isfinite(values).all():
+        refuse("frequency has a value that is not finite", "finite numbers, Hz")
+    place = (0.0, 0.0) if point is None else point
+    x, y = require_pair("point", place)
+    text = case_text(Case(floor=floor))
+    asked = np.ascontiguousarray(np.atleast_1d(values))
+    found = call(floor_api.floor_mobility, text, asked, int(point is not None), x, y)
+    return np.asarray(found["real"] + 1j * found["imaginary"])

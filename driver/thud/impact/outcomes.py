@@ -1,0 +1,152 @@
+"""Outcomes of many drops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.schema import OUTCOMES, SCALARS
+from thud.base.display import MAKERS, Displayed
+from thud.level.levels import BANDWIDTHS
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+    from thud.base.schema import BandSet, LevelsForce
+    from thud.case.case import Case
+
+
+ROOM_LEVEL = "room_level"
+RATING = "standardised_rating"
+# Unit and meaning of what drops on a floor have in addition, levels of the contact force apart.
+FURTHER = {
+    "floor_work": ("J", "energy that the source gives to the floor"),
+    ROOM_LEVEL: ("dB", "maximum Fast level in the room, re 20 uPa"),
+    "room_rating": ("dB", "A-weighted maximum Fast level in the room, re 20 uPa"),
+    RATING: ("dB", "A-weighted maximum Fast level, standardised, re 20 uPa"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Ensemble(Displayed):
+    """Outcomes of many drops; NaN where a drop could not be computed.
+
+    Attributes
+    ----------
+    case : Case
+        All other keys.
+    parameters : dict of str to ndarray, shape (n_set,)
+        Parameters in which the drops differ.
+    status : ndarray of int, shape (n_set,)
+        0, or the exit code of the error: 1 bad input, 2 numerical failure.
+    reason : ndarray of str, shape (n_set,)
+        The sentence of the error.
+    contact_time : ndarray, shape (n_set,)
+        Time from first touch to release, s.
+    peak_force, peak_elastic_force : ndarray, shape (n_set,)
+        Maximum of the force on the floor and of the elastic force, N.
+    max_deflection : ndarray, shape (n_set,)
+        Maximum deflection, m.
+    restitution : ndarray, shape (n_set,)
+        Velocity at release over velocity at first touch.
+    impulse : ndarray, shape (n_set,)
+        Impulse given to the floor, N s.
+    levels : dict of (force, bands) to ndarray, shape (n_set, n_band)
+        Force exposure levels, dB: of ``"elastic"`` and ``"floor"``, in octaves, on which the
+        verdict is based, and in the other bands of the case.
+    margin : ndarray, shape (n_set,)
+        Minimum distance of an octave level of the judged force to its limits, dB, positive inside.
+    conforms : ndarray of bool, shape (n_set,)
+        Verdict of the standards on the force that the case judges.
+    elastic_conforms, floor_conforms : ndarray of bool, shape (n_set,)
+        The same on the elastic force and on the force on the floor.
+    elastic_force, floor_force : ndarray, shape (n_set, n_sample), or None
+        Forces, N; None unless requested.
+    sample_rate : float
+        Samples per second, Hz.
+    contact_levels : dict of bands to ndarray, shape (n_set, n_band)
+        Of cases with a floor: levels of the force on it, dB; on a rigid floor, and of models that
+        know no other, those of the force there.
+    floor_work : ndarray, shape (n_set,), or None
+        Likewise the energy that the source gives to the floor, J.
+    room_level : ndarray, shape (n_set, 12), or None
+        Of cases with a room: maximum Fast levels in the thirds from 50 to 630 Hz, dB re 20 uPa.
+    room_rating, standardised_rating : ndarray, shape (n_set,), or None
+        Their A-weighted sum L_iA,Fmax, dB, and that of the standardised levels; see `rating`.
+    """
+
+    case: Case
+    parameters: dict[str, NDArray[np.generic]]
+    status: NDArray[np.int32]
+    reason: NDArray[np.object_]
+    contact_time: NDArray[np.float64]
+    peak_force: NDArray[np.float64]
+    peak_elastic_force: NDArray[np.float64]
+    max_deflection: NDArray[np.float64]
+    restitution: NDArray[np.float64]
+    impulse: NDArray[np.float64]
+    levels: dict[tuple[LevelsForce, BandSet], NDArray[np.float64]]
+    margin: NDArray[np.float64]
+    conforms: NDArray[np.bool_]
+    elastic_conforms: NDArray[np.bool_]
+    floor_conforms: NDArray[np.bool_]
+    elastic_force: NDArray[np.float64] | None
+    floor_force: NDArray[np.float64] | None
+    sample_rate: float
+    contact_levels: dict[BandSet, NDArray[np.float64]] = field(default_factory=dict)
+    floor_work: NDArray[np.float64] | None = None
+    room_level: NDArray[np.float64] | None = None
+    room_rating: NDArray[np.float64] | None = None
+    standardised_rating: NDArray[np.float64] | None = None
+
+    def __len__(self) -> int:
+        """Return the number of sets."""
+        return len(self.status)
+
+    def __repr__(self) -> str:
+        """Return what differs, and how many drops conform."""
+        names = ", ".join(self.parameters)
+        failed = f", {np.sum(self.status != 0)} failed" if self.status.any() else ""
+        # Without levels the margins of drops that were computed are not known.
+        judged = np.isfinite(self.margin).any() or (self.status != 0).all()
+        verdict = f"{self.conforms.sum()} conform" if judged else "not judged"
+        return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
+        units = {name: SCALARS[name][0] for name in OUTCOMES} | {"margin": "dB"}
+        units |= {name: unit for name, (unit, _) in FURTHER.items() if name != ROOM_LEVEL}
+        for name, unit in units.items():
+            values = getattr(self, name)
+            if values is None:
+                continue
+            known = values[self.status == 0]
+            known = known[np.isfinite(known)]
+            if not known.size:
+                continue
+            shares = np.quantile(known, [0, 0.5, 1])
+            label = f"{name.replace('_', ' ')}, {unit}".removesuffix(", ")
+            rows.append((label, *(f"{value:.4g}" for value in shares)))
+        return rows
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the outcomes along the dimension ``set``, with units and provenance.
+
+        Raise InputError where xarray is not installed.
+        """
+        dataset: xr.Dataset = MAKERS["dataset"](self)
+        return dataset
+
+    @property
+    def elastic_octaves(self) -> NDArray[np.float64]:
+        """Octave levels of the elastic force, dB, shape (n_set, 5)."""
+        return self.levels["elastic", BANDWIDTHS[0]]
+
+    @property
+    def floor_octaves(self) -> NDArray[np.float64]:
+        """Octave levels of the force on the floor, dB, shape (n_set, 5)."""
+        return self.levels["floor", BANDWIDTHS[0]]

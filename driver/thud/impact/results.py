@@ -1,0 +1,211 @@
+"""Reads the results of a run back from its directory."""
+
+from __future__ import annotations
+
+import base64
+import fcntl
+import re
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import f90nml.scanner
+import numpy as np
+
+from thud.base.schema import SCALARS
+from thud.case.case import Case
+from thud.base.checks import refuse, shown
+from thud.base.errors import PlausibilityWarning, ThudError
+from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
+from thud.impact.floor_impact import FloorImpact
+from thud.impact.impact import Impact
+from thud.impact.motion import Motion
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+# Columns of every history, by the names of an impact; parts of the force follow the first three.
+_OWN = {
+    "time": "time_s",
+    "deflection": "deflection_m",
+    "velocity": "velocity_m_per_s",
+    "elastic_force": "elastic_force_N",
+    "floor_force": "floor_force_N",
+}
+_MOTION = ("time", "deflection", "velocity")
+
+# Where a text ends too early it prints its tables and then raises. To redirect the output meanwhile
+# would take that of other threads.
+f90nml.scanner.print = lambda *_: None
+
+
+def read_results(directory: str | os.PathLike[str]) -> Impact:
+    """Read the impact that ``thud`` or ``thud-driver run`` has written, without loss of digits.
+
+    Parameters
+    ----------
+    directory
+        Directory of the results of one case.
+
+    Returns
+    -------
+    Impact
+        The same as `solve_case` gives.
+
+    Raises
+    ------
+    InputError
+        Where the directory does not hold the results of an impact, or one of the files is not as
+        the run has written it.
+
+    Warns
+    -----
+    PlausibilityWarning
+        Where the file that says so, ``.thud``, is missing; also in `Impact.remarks`.
+    """
+    try:
+        folder = Path(directory)
+        with locked(folder, fcntl.LOCK_SH):
+            return _new_impact(_Files(folder))
+    except ThudError:
+        raise
+    except FileNotFoundError as error:
+        refuse(f"{error.filename}: there is no such file", "the results of an impact", error)
+    except Exception as error:  # noqa: BLE001 - parsers of damaged files raise anything
+        said = f"{type(error).__name__}: {error}".partition("\n")[0]
+        refuse(f"{directory}: cannot be read ({said})", "the results of an impact", error)
+
+
+class _Files:
+    """Files of a result directory, each compared with its checksum as it is read."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.listed = read_manifest(folder)
+
+    def __contains__(self, name: str) -> bool:
+        """Return whether a file is part of the results."""
+        return name in self.listed if self.listed else (self.folder / name).exists()
+
+    def read(self, name: str) -> str:
+        """Return the text of a file; raise InputError where the run has not written it."""
+        if Path(name).name != name:
+            refuse(
+                f"{self.folder}: {shown(name)} is named as a file of it",
+                "names without directories",
+            )
+        content = read_input(self.folder / name)
+        known = self.listed[name].checksums if name in self.listed else ("",)
+        if self.listed and checksum(content) != known[-1]:
+            refuse(
+                f"{self.folder / name} is not as the run has written it",
+                "results of one run; run the case again",
+            )
+        return content.decode()
+
+
+def _new_impact(files: _Files) -> Impact:
+    """Return the impact of a result directory."""
+    case = Case.from_text(files.read("effective.nml"))
+    numbers = f90nml.reads(files.read("summary.nml"))
+    history, _ = _read_history(files, "", numbers["summary"], numbers.get("facts", {}))
+    remarks = _texts(numbers.get("remarks", {}).get("remark", []))
+    if not files.listed:
+        remark = f"{MANIFEST} is missing: nothing shows that the files belong together"
+        warnings.warn(f"{files.folder}: {remark}", PlausibilityWarning, stacklevel=3)
+        remarks += (remark,)
+    on_floor = None
+    if "floor_summary" in numbers:
+        scalars, facts = numbers["floor_summary"], numbers.get("floor_facts", {})
+        moving, columns = _read_history(files, "floor_", scalars, facts)
+        on_floor = FloorImpact(
+            case=case,
+            remarks=(),
+            blocked_force=columns.pop("blocked_force_N"),
+            floor_displacement=columns.pop("floor_displacement_m"),
+            floor_velocity=columns.pop("floor_velocity_m_per_s"),
+            floor_work=scalars["floor_work"],
+            point_velocity=np.array([*columns.values()]).reshape(-1, len(moving["time"])),
+            **moving,
+        )
+    return Impact(case=case, remarks=remarks, on_floor=on_floor, **history)
+
+
+def _read_history(
+    files: _Files, prefix: str, scalars: Mapping[str, float], facts: Mapping[str, float]
+) -> tuple[dict[str, Any], dict[str, NDArray[np.float64]]]:
+    """Return what the files of a history hold, and further columns of its forces."""
+    force = _table(files.read(f"{prefix}force.csv"))
+    channels = f"{prefix}channels.csv"
+    found = _table(files.read(channels)) if channels in files else {}
+    # Parts of the force stand before the whole one, further columns behind.
+    columns = list(force)
+    last = columns.index("floor_force_N")
+    history = {
+        **{name: force[column] for name, column in _OWN.items()},
+        "parts": {name[: -len("_N")]: force[name] for name in columns[len(_MOTION) : last - 1]},
+        "channels": {name: values for name, values in found.items() if name != "time_s"},
+        "facts": dict(facts),
+        "motion": _read_motion(files, prefix) if f"{prefix}motion.pvd" in files else None,
+        **{name: scalars[name] for name in SCALARS},
+    }
+    return history, {name: force[name] for name in columns[last + 1 :]}
+
+
+def _texts(value: str | list[str]) -> tuple[str, ...]:
+    """Return the texts of a key; f90nml gives one text without its list."""
+    return (value,) if isinstance(value, str) else tuple(value)
+
+
+def _table(text: str) -> dict[str, NDArray[np.float64]]:
+    """Return the columns of a CSV file by name."""
+    names, *lines = text.splitlines()
+    columns = np.loadtxt(lines, delimiter=",", ndmin=2).T
+    if not np.isfinite(columns).all():
+        message = "a value is not finite"
+        raise ValueError(message)
+    return dict(zip(names.split(","), columns, strict=True))
+
+
+def _read_motion(files: _Files, prefix: str) -> Motion:
+    """Return the snapshots of the VTU files that ``motion.pvd`` lists."""
+    listed = files.read(f"{prefix}motion.pvd")
+    entries = re.findall(r'timestep="(.*?)" file="(.*?)"', listed)
+    shots = [_read_vtu(files.read(name)) for _, name in entries]
+    # The first element has its first two nodes on neighbouring rings.
+    line = int(shots[0]["connectivity"][1])
+    size = (len(shots[0]["cavity_pressure"]) // line, line)
+    plane = {
+        name: np.stack([shot[name].reshape(*size, 3)[..., :2].swapaxes(0, 1) for shot in shots])
+        for name in ("Points", "displacement", "velocity")
+    }
+    outer = {
+        name: np.stack([shot[name].reshape(size)[-1] for shot in shots])
+        for name in ("contact_pressure", "contact_shear")
+    }
+    return Motion(
+        np.array([float(time) for time, _ in entries]),
+        plane["Points"][0] - plane["displacement"][0],
+        plane["Points"],
+        plane["velocity"],
+        outer["contact_pressure"],
+        outer["contact_shear"],
+        np.array([float(shot["cavity_pressure"][0]) for shot in shots]),
+        # Left out where the floor is rigid.
+        np.array([float(shot.get("floor_displacement", [0.0])[0]) for shot in shots]),
+    )
+
+
+def _read_vtu(text: str) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a VTU file as thud writes it."""
+    arrays = re.findall(
+        r'<DataArray type="(Float64|Int64)" Name="(.*?)".*?>(.*?)</DataArray>', text
+    )
+    # The first eight bytes are the length of the data.
+    return {
+        name: np.frombuffer(base64.b64decode(data), f"<{kind[0].lower()}8", offset=8)
+        for kind, name, data in arrays
+    }

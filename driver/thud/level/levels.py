@@ -1,0 +1,248 @@
+"""Force exposure levels of any force record, and the verdict of the standards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, cast, get_args
+
+import numpy as np
+
+from thud.base.bridge import call_direct, level_api, trimmed
+from thud.base.schema import LevelsMethod
+from thud.base.checks import refuse_value, require_array, require_choice, require_real
+from thud.level.criteria import Conformity, Criterion
+from thud.base.display import Displayed
+from thud.base.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.schema import BandSet, LimitsSource
+
+
+def _names(values: Iterable[bytes]) -> tuple[str, ...]:
+    """Return names from the library."""
+    return tuple(map(trimmed, values))
+
+
+_N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()
+_sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
+BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
+SOURCES = cast("tuple[LimitsSource, ...]", _sources)
+_MAX_PEAKS = 2**31
+# Upper limit of the band of a force plate, Hz (paper, section 3).
+RECORDED_BAND = 1250.0
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Bands(Displayed):
+    """Frequency bands of base 10 (IEC 61260-1), ascending; the arrays are read-only.
+
+    Attributes
+    ----------
+    nominal : ndarray, shape (n_band,)
+        Rounded mid frequencies, Hz.
+    centre : ndarray, shape (n_band,)
+        Exact mid frequencies, Hz.
+    lower, upper : ndarray, shape (n_band,)
+        Band edges, Hz.
+    """
+
+    nominal: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    lower: NDArray[np.float64]
+    upper: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        """Return the nominal frequencies."""
+        return f"<Bands: {', '.join(f'{f:g}' for f in self.nominal)} Hz>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        columns = vars(self)
+        rows = zip(*columns.values(), strict=True)
+        header = tuple(f"{name}, Hz" for name in columns)
+        return [header, *(tuple(f"{f:.4g}" for f in row) for row in rows)]
+
+
+def get_bands(bands: BandSet = "octave") -> Bands:
+    """Return the octaves 31.5 to 500 Hz or the thirds 25 to 630 Hz.
+
+    Parameters
+    ----------
+    bands
+        ``"octave"`` or ``"third"``.
+
+    Raises
+    ------
+    InputError
+        Where `bands` is not one of these.
+    """
+    require_choice("bands", bands, BANDWIDTHS)
+    return _bands(bands)
+
+
+@lru_cache
+def _bands(name: str) -> Bands:
+    """Return the bands of a name."""
+    (n_band,) = call_direct(level_api.count_bands, name)
+    return Bands(*level_api.get_bands(name, n_band))
+
+
+def force_exposure_levels(
+    force: ArrayLike,
+    sample_rate: float,
+    bands: BandSet = "octave",
+    method: LevelsMethod = "exact",
+) -> NDArray[np.float64]:
+    """Return the force exposure levels of a force record.
+
+    The level of a band is 10 lg of its energy, 2 * integral of abs(F(f))**2 df, over 1 N2 s
+    (JIS A 1418-2). The record is taken as zero before its first and after its last sample.
+
+    Parameters
+    ----------
+    force : array_like, shape (n_sample,)
+        Force, N.
+    sample_rate
+        Samples per second, Hz; at least twice the highest band edge.
+    bands
+        ``"octave"`` (31.5 to 500 Hz) or ``"third"`` (25 to 630 Hz).
+    method
+        ``"exact"``: the band energy of the finite record; ``"fft"``: the sum over the 1 Hz bins
+        of a record of 1 s, as in the paper.
+
+    Returns
+    -------
+    ndarray, shape (n_band,)
+        Levels in ascending bands, dB re 1 N and 1 s. The rounding error, 156 dB below the total
+        energy, is the minimum level of a band.
+
+    Raises
+    ------
+    InputError
+        Where the record is empty, zero throughout, not finite or not one-dimensional, or the
+        rate, the bands or the method are invalid.
+    """
+    count = len(get_bands(bands).nominal)
+    require_choice("method", method, get_args(LevelsMethod))
+    record = _record(force)
+    rate = _number("sample_rate", sample_rate)
+    (levels,) = call_direct(level_api.force_exposure, record, rate, bands, method, count)
+    result: NDArray[np.float64] = levels
+    return result
+
+
+def record_force(force: NDArray[np.float64], sample_rate: float) -> NDArray[np.float64]:
+    """Return the part of a force that a force plate records, below 1.25 kHz (paper, section 3).
+
+    Forces, N, have the shape (n_sample,) and start and end at zero; the rate is in Hz.
+    """
+    recorded: NDArray[np.float64] = level_api.record_force(force, sample_rate)
+    return recorded
+
+
+def peak_count(force: ArrayLike, sample_rate: float) -> int:
+    """Return the number of peaks of a force: maxima with a drop of 10 % on both sides.
+
+    The force, N, shape (n_sample,), starts and ends at zero; only its part below 1.25 kHz is used.
+    Raise InputError where it is empty, not finite or not one-dimensional, or the rate, Hz, is not
+    positive.
+    """
+    record = _record(force)
+    if not record.size or not np.isfinite(record).all():
+        what = "holds a value that is not finite" if record.size else "has no samples"
+        message = f"force {what}; allowed: real numbers, N"
+        raise InputError(message)
+    rate = _number("sample_rate", sample_rate)
+    if not 0 < rate < np.inf:
+        message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
+        raise InputError(message)
+    return int(level_api.count_peaks(record, rate))
+
+
+def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
+    levels: ArrayLike,
+    contact_time: float,
+    restitution: float,
+    peaks: int,
+    mass: float,
+    drop_height: float,
+    source: LimitsSource = "rubber_ball",
+) -> Conformity:
+    """Return the verdict of the standards on a source.
+
+    Parameters
+    ----------
+    levels : array_like, shape (5,)
+        Force exposure levels of the octaves 31.5 to 500 Hz, dB.
+    contact_time
+        Contact time, s.
+    restitution
+        Coefficient of restitution.
+    peaks
+        Number of peaks of the force.
+    mass
+        Mass of the source, kg.
+    drop_height
+        Drop height, m.
+    source
+        ``"rubber_ball"`` or ``"tyre"``.
+
+    Raises
+    ------
+    InputError
+        Where the source is not known or `levels` are not five numbers.
+    """
+    require_choice("source", source, SOURCES)
+    octaves = _record(levels, "levels")
+    nominal = get_bands(BANDWIDTHS[0]).nominal
+    if octaves.shape != nominal.shape:
+        message = (
+            f"levels have the shape {octaves.shape}; allowed: {nominal.shape}, "
+            f"the octaves {nominal[0]:g} to {nominal[-1]:g}"
+        )
+        raise InputError(message)
+    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
+        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
+    numbers = {
+        "contact_time": contact_time,
+        "restitution": restitution,
+        "mass": mass,
+        "drop_height": drop_height,
+    }
+    time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
+    names, units, value, lower, upper, met = call_direct(
+        level_api.judge, source, octaves, time, bounce, int(peaks), kilograms, height,
+        _N_CRITERION,
+    )  # fmt: skip
+    rows = zip(_names(names), _names(units), value, lower, upper, met, strict=True)
+    return Conformity(
+        source,
+        tuple(Criterion(n, u, float(v), float(a), float(b), bool(m)) for n, u, v, a, b, m in rows),
+    )
+
+
+def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
+    count = len(get_bands(BANDWIDTHS[0]).nominal)
+    octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
+    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
+
+
+def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
+    """Return a record as a contiguous array."""
+    return require_real(name, require_array(name, values, dimensions=(1,)))
+
+
+def _number(name: str, value: object) -> float:
+    """Return a number as float; raise InputError where it is not one."""
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (OverflowError, TypeError, ValueError) as error:
+        shown = "a very large number" if isinstance(error, OverflowError) else repr(value)
+        message = f"{name} = {shown} is not a number; allowed: real numbers"
+        raise InputError(message) from error

@@ -1,0 +1,216 @@
+"""Tables and files of a measured recording."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import warnings
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from thud.base.bridge import version
+from thud.base.display import draw_all, left_out
+from thud.base.errors import InputError, ReportWarning
+from thud.base.extras import require_extra
+from thud.level.levels import get_bands
+from thud.recordings.contact import Estimate
+from thud.recordings.verdict import VERDICTS
+from thud.report.data import criteria_data, report_data
+from thud.report.notes import group_places
+from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
+from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
+
+    from thud.base.files import Results
+    from thud.recordings.recording import Recording
+
+# Columns of the page that the screen leaves out.
+_HIDDEN = ("Spread", "Background")
+_PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
+DATASET = "recording.nc"
+_PAGE = (HTML, PDF, "force.png", "force.svg", "levels.png", "levels.svg")
+
+
+def drop_table(recording: Recording) -> list[tuple[str, ...]]:
+    """Return rows of text, a drop each: touch, contact, restitution by each way, peak and levels.
+
+    Behind ± is one standard uncertainty of that drop, of its noise.
+    """
+    nominal = get_bands().nominal
+    levels = recording.average().drops
+    ways = dict.fromkeys(way for drop in recording.drops for way in drop.restitutions)
+    by = [f"restitution by {way} (± u)" for way in ways] or ["restitution"]
+    head = ("drop", "at, s", "contact, ms (± u)", *by, "peak, N")
+    rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
+    unknown = Estimate.unknown()
+    rows += [
+        (
+            drop.name,
+            f"{drop.onset:.3f}",
+            _with_doubt(drop.contact_time, 1e-3, 2),
+            *(_with_doubt(drop.restitutions.get(way, unknown), 1.0, 3) for way in ways or [""]),
+            f"{drop.peak_force.value:.0f}",
+            *(f"{level:z.2f}" for level in levels[i]),
+        )
+        for i, drop in enumerate(recording.drops)
+    ]
+    return rows
+
+
+def sentences(recording: Recording, kind: str) -> list[str]:
+    """Return the ``"steps"`` or ``"remarks"`` of files and drops, those that are alike as one."""
+    return group_places(
+        {
+            "files": [(one.name, getattr(one, kind)) for one in recording.origins],
+            "drops": [(one.name, getattr(one, kind)) for one in recording.drops],
+        }
+    )
+
+
+def table(recording: Recording) -> list[tuple[str, ...]]:
+    """Return the table of the page as rows of text, without what differs from drop to drop."""
+    shown = [i for i, title in enumerate(HEAD) if title not in _HIDDEN]
+    rows = criterion_rows(criteria_data(recording))
+    return [tuple(row[i] for i in shown) for row in rows]
+
+
+def _with_doubt(estimate: Estimate, unit: float, decimals: int) -> str:
+    if math.isnan(estimate.value):
+        return NOT_KNOWN
+    return f"{estimate.value / unit:.{decimals}f} ± {estimate.uncertainty / unit:.{decimals + 1}f}"
+
+
+def verdict_sentence(recording: Recording) -> str:
+    """Return the verdict in a sentence, and another one where limits are the laboratory's."""
+    found = recording.conformity()
+    name = found.source.replace("_", " ")
+    sentence = {
+        "conforms": f"The source conforms to the limits of the {name}",
+        "does not conform": f"The source does not conform to the limits of the {name}",
+        "cannot be decided": f"Whether the source conforms to the limits of the {name} "
+        "cannot be decided",
+    }[found.verdict]
+    own = any(not one["limits_of_standard"] for one in criteria_data(recording))
+    more = " Limits marked * are those of the laboratory." if own else ""
+    return f"{sentence} at 95 %: {count_verdicts(d.verdict for d in found.decisions)}.{more}"
+
+
+def count_verdicts(verdicts: Iterable[str]) -> str:
+    """Return how many criteria have each verdict.
+
+    >>> count_verdicts(["conforms", "conforms", "does not conform"])
+    '2 criteria conform, 1 does not conform'
+    """
+    given = list(verdicts)
+    counts = {verdict: given.count(verdict) for verdict in VERDICTS if verdict in given}
+    parts = [
+        f"{count} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}"
+        for verdict, count in counts.items()
+    ]
+    count, words = parts[0].split(" ", 1)
+    parts[0] = f"{count} {'criterion' if count == '1' else 'criteria'} {words}"
+    return ", ".join(parts)
+
+
+def levels_csv(data: dict[str, Any]) -> str:
+    """Return octave and third levels of a report, with uncertainties and background, as text."""
+    head = (
+        "bandwidth nominal_Hz level_dB standard_uncertainty_dB expanded_dB background_dB spread_dB "
+        "flag"
+    )
+    keys = ("level", "uncertainty", "expanded_uncertainty", "background", "spread", "flag")
+    rows = [
+        [bands, f"{nominal:g}", *(found[key][i] for key in keys)]
+        for bands, found in data["levels"].items()
+        for i, nominal in enumerate(found["band"])
+    ]
+    return _csv([head.split(), *rows])
+
+
+def criteria_csv(data: dict[str, Any]) -> str:
+    """Return value, uncertainty, limits and verdict of each criterion of a report, SI units."""
+    rows = [
+        [
+            one["name"],
+            one["unit"],
+            one["value"],
+            str(one["upper_bound"]).lower(),
+            *(one[key] for key in ("expanded_uncertainty", "lower", "upper", "margin", "verdict")),
+        ]
+        for one in data["criteria"]
+    ]
+    head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
+    about = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
+    return about + _csv([head.split(), *rows])
+
+
+def _csv(rows: Iterable[Iterable[object]]) -> str:
+    """Return rows as text; what is None is empty."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def file_names(*, figures: bool = True) -> list[str]:
+    """Return the names of the files that `save` writes."""
+    return ["levels.csv", "criteria.csv", JSON, DATASET, *(_PAGE if figures else ())]
+
+
+def save(recording: Recording, results: Results, *, figures: bool = True) -> None:
+    """Write levels, criteria and data, and, with figures, pictures and the page to a directory.
+
+    All contents are there before the first file is written. Files of an earlier recording that
+    this one does not have are removed.
+
+    Raises
+    ------
+    InputError
+        Where a file is in the way.
+    OSError
+        Where they cannot be written.
+
+    Warns
+    -----
+    ReportWarning
+        Where a file is left out, or the results of another recording are replaced.
+    """
+    data = report_data(recording)
+    contents = {
+        "levels.csv": levels_csv(data).encode(),
+        "criteria.csv": criteria_csv(data).encode(),
+        JSON: json_bytes(data),
+        **_dataset(data, results.folder),
+    }
+    if figures and _has_matplotlib():
+        # It takes its time.
+        from thud.plot.look import picture_files  # noqa: PLC0415
+
+        drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
+        contents |= page_contents(data, list(drawn.values()), results.folder)
+        contents |= picture_files(drawn)
+    write_files(results, data, contents, file_names())
+
+
+def _has_matplotlib() -> bool:
+    """Return whether figures can be drawn at all; warn where they cannot."""
+    with left_out("the page"):
+        import matplotlib as mpl  # noqa: PLC0415 - takes its time
+
+        return bool(mpl.__version__)
+    return False
+
+
+def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
+    """Return the content of the NetCDF file by its name; warn where xarray is missing."""
+    try:
+        with require_extra("studies"):
+            from thud.report.dataset import netcdf  # noqa: PLC0415 - optional
+    except InputError as error:
+        message = f"{folder}: {DATASET} is not written: {error}"
+        warnings.warn(message, ReportWarning, stacklevel=3)
+        return {}
+    return {DATASET: netcdf(data)}

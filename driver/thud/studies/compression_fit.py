@@ -1,0 +1,235 @@
+"""The modulus of a ball from its curve in a press."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.optimize import least_squares
+
+from thud.base.schema import Ball, Compression
+from thud.base.checks import require_array, require_real
+from thud.impact.compression import CompressionCurve, compress
+from thud.base.display import Displayed
+from thud.base.errors import FitWarning, InputError, NumericalError
+from thud.base.key import check_keywords
+from thud.studies.fitting.inference import coverage_factor
+from thud.studies.fitting.residual_tests import runs_doubt
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.schema import CompressionGas, ModelName, ModelOptions
+
+# Points of the curves of the model, between which it is interpolated.
+_POINTS = 81
+# Data that two parameters leave something of.
+_MIN_DATA = 5
+_PARAMETERS = 2
+
+
+@dataclass(frozen=True, eq=False)
+class CompressionFit(Displayed):
+    """Modulus of elasticity and first touch that fit a measured compression best.
+
+    Attributes
+    ----------
+    youngs_modulus : float
+        Modulus of elasticity, Pa: the storage modulus of materials with Maxwell branches, whose
+        long-term modulus the press finds; of a fractional law that is its modulus at about 1 Hz.
+    touch : float
+        Deflection at which the plates touch the ball, m.
+    covariance : ndarray, shape (2, 2)
+        Covariance of both.
+    interval : ndarray, shape (2, 2)
+        Low and high limit of each.
+    confidence : float
+        Confidence of the intervals.
+    noise : float
+        Standard deviation of a residual, N.
+    residuals : ndarray, shape (n,)
+        Model minus measured force, N.
+    curve : CompressionCurve
+        The curve of the model, its deflection counted from first touch.
+    warnings : tuple of str
+        Reasons to doubt the intervals, as sentences.
+    """
+
+    youngs_modulus: float
+    touch: float
+    covariance: NDArray[np.float64]
+    interval: NDArray[np.float64]
+    confidence: float
+    noise: float
+    residuals: NDArray[np.float64]
+    curve: CompressionCurve
+    warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        """Return the modulus and its standard error."""
+        error = np.sqrt(self.covariance[0, 0])
+        return f"<CompressionFit: E {self.youngs_modulus / 1e6:.4g} MPa +- {error / 1e6:.2g} MPa>"
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return header and rows of text."""
+        (low, high), (first, last) = self.interval
+        return [
+            ("parameter", "unit", "estimate", "low", "high"),
+            *[
+                (name, unit, *(f"{value * scale:.5g}" for value in values))
+                for name, unit, scale, values in (
+                    ("youngs_modulus", "MPa", 1e-6, (self.youngs_modulus, low, high)),
+                    ("touch", "mm", 1e3, (self.touch, first, last)),
+                )
+            ],
+            *[("warning", one, "", "", "") for one in self.warnings],
+        ]
+
+
+@check_keywords
+def fit_compression(  # noqa: PLR0913 - as of `compress`
+    deflection: ArrayLike,
+    force: ArrayLike,
+    ball: Ball | None = None,
+    model: ModelName | ModelOptions = "finite_element",
+    *,
+    gas: CompressionGas = Compression.gas,
+    confidence: float = 0.95,
+) -> CompressionFit:
+    """Estimate the modulus of elasticity of a ball from a compression between two plates.
+
+    Least squares of the force; the deflection at which the plates touch the ball is estimated too.
+    Residuals count as independent and of one variance; where their signs are not those of noise,
+    the model does not explain the curve, and a warning says so.
+
+    Parameters
+    ----------
+    deflection : array_like, shape (n,)
+        Measured approach of the plates, m, ascending: the branch of loading.
+    force : array_like, shape (n,)
+        Measured force, N.
+    ball
+        The ball, whose modulus is the start of the search; by default that of the paper.
+    model, gas
+        As of `compress`.
+    confidence
+        Confidence of the intervals.
+
+    Returns
+    -------
+    CompressionFit
+        Estimates, covariance, intervals and warnings, also issued as `FitWarning`.
+
+    Raises
+    ------
+    InputError
+        Where the data or the model cannot be used.
+    NumericalError
+        Where the ball of the search cannot be pressed so far, or the curve does not depend on the
+        modulus.
+    """
+    start = Ball() if ball is None else ball
+    measured, wanted = _data(deflection, force)
+    factor = coverage_factor(confidence, len(wanted) - _PARAMETERS)
+    span = float(measured[-1] - measured[0])
+    curves: dict[float, CompressionCurve] = {}
+
+    def curve(modulus: float) -> CompressionCurve:
+        """Return the curve of a modulus; each is computed once."""
+        if modulus not in curves:
+            curves[modulus] = compress(
+                replace(start, youngs_modulus=modulus), model, max_deflection=1.05 * span,
+                points=_POINTS, gas=gas,
+            )  # fmt: skip
+        return curves[modulus]
+
+    def residuals(place: NDArray[np.float64]) -> NDArray[np.float64]:
+        found = curve(float(np.exp(place[0])) * start.youngs_modulus)
+        depth = measured - measured[0] - place[1] * span
+        model_force = PchipInterpolator(found.deflection, found.force)(np.maximum(depth, 0))
+        return np.asarray(model_force - wanted)
+
+    # The plates may touch a little before the first point.
+    bounds = ([-np.inf, -0.04], [np.inf, 0.9])
+    first = np.array([np.log(_ratio(curve(start.youngs_modulus), measured, wanted)), 0.0])
+    best = least_squares(residuals, first, bounds=bounds, x_scale=(1.0, 0.1), xtol=1e-10)
+    if np.linalg.matrix_rank(best.jac) < _PARAMETERS:
+        message = "the force of this model does not tell youngs_modulus; allowed: one that has it"
+        raise NumericalError(message)
+    modulus = float(np.exp(best.x[0])) * start.youngs_modulus
+    touch = float(measured[0] + best.x[1] * span)
+    deviation = float(np.sqrt(best.fun @ best.fun / (len(wanted) - _PARAMETERS)))
+    scale = np.array([modulus, span])
+    covariance = deviation**2 * np.linalg.inv(best.jac.T @ best.jac) * np.outer(scale, scale)
+    width = factor * np.sqrt(np.diag(covariance))
+    estimate = np.array([modulus, touch])
+    doubts = tuple(_doubts(best.fun, best.x[1], bounds))
+    for doubt in doubts:
+        warnings.warn(doubt, FitWarning, stacklevel=3)
+    return CompressionFit(
+        modulus, touch, covariance, np.column_stack([estimate - width, estimate + width]),
+        confidence, deviation, best.fun, curve(modulus), doubts,
+    )  # fmt: skip
+
+
+def _data(
+    deflection: ArrayLike, force: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return both columns; raise InputError where they are no curve."""
+    measured, wanted = (
+        require_real(name, require_array(name, values, {1}))
+        for name, values in (("deflection", deflection), ("force", force))
+    )
+    if measured.shape != wanted.shape or len(measured) < _MIN_DATA:
+        message = (
+            f"deflection has {len(measured)} entries and force {len(wanted)}; "
+            f"allowed: the same number, at least {_MIN_DATA}"
+        )
+        raise InputError(message)
+    if not (np.isfinite(measured).all() and np.isfinite(wanted).all()):
+        message = "deflection or force holds what is no finite number; allowed: finite numbers"
+        raise InputError(message)
+    if not (np.diff(measured) > 0).all():
+        at = int(np.argmin(np.diff(measured) > 0)) + 1
+        message = f"deflection does not rise at point {at + 1}; allowed: the branch of loading"
+        raise InputError(message)
+    if not wanted[-1] > max(0.0, wanted[0]):
+        message = "force does not rise with the deflection; allowed: pressure is positive"
+        raise InputError(message)
+    return measured, wanted
+
+
+def _ratio(
+    curve: CompressionCurve, measured: NDArray[np.float64], wanted: NDArray[np.float64]
+) -> float:
+    """Return the factor that brings the work of a curve to the measured one.
+
+    Raise InputError where the model has no force at such deflections.
+    """
+    work = float(np.trapezoid(wanted, measured))
+    shown = np.interp(measured - measured[0], curve.deflection, curve.force)
+    model_work = float(np.trapezoid(shown, measured))
+    if not model_work > 0:
+        message = (
+            f"deflection spans {np.ptp(measured):g} m, where the model shows no force; "
+            "allowed: a ball that is pressed by millimetres"
+        )
+        raise InputError(message)
+    return max(work, 0.01 * float(wanted[-1] * np.ptp(measured))) / model_work
+
+
+def _doubts(
+    residuals: NDArray[np.float64], place: float, bounds: tuple[list[float], list[float]]
+) -> list[str]:
+    """Return reasons to doubt the intervals."""
+    found = []
+    if min(place - bounds[0][1], bounds[1][1] - place) < 1e-6:  # noqa: PLR2004 - of the span
+        found.append(
+            "the first touch lies at the limit of the search: give data from first touch on"
+        )
+    if runs := runs_doubt(residuals):
+        found.append(f"{runs}: the model does not explain the curve")
+    return found
