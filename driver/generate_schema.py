@@ -1,4 +1,4 @@
-"""Make _schema.py and _solve.pyi in driver/thud, and docs/keys.md, from the library's schema.
+"""Make schema and typed calls in driver/thud, and docs/keys.md, from the library's schema.
 
 Run by ``./bootstrap schema``: thud --schema | python driver/generate_schema.py [DIRECTORY]
 """
@@ -159,21 +159,43 @@ def python_class(title: str, keys: list[Entry], group: str, kind: str = "") -> s
     return "\n".join([head, *attributes, *members, EXTRAS.get(group, "")])
 
 
+def shared_groups(schema: Entry) -> list[str]:
+    """Return the groups that every model uses."""
+    shared = [key["group"] for key in schema["keys"] if not key["owner"]]
+    return [group for group in dict.fromkeys(shared) if group not in {"case", "model"}]
+
+
+def optional_groups(schema: Entry) -> list[str]:
+    """Return the groups that a case may have beside those of models and floors."""
+    owners = dict.fromkeys(key["owner"] for key in schema["keys"] if key["owner"])
+    known = {*schema["models"], *schema["floors"], "floor"}
+    return [owner for owner in owners if owner not in known]
+
+
+def public_names(schema: Entry) -> list[str]:
+    """Return the names that the package offers of its schema."""
+    groups = [*shared_groups(schema), *optional_groups(schema)]
+    names = map(class_name, [*groups, *schema["models"], *schema["floors"]])
+    return sorted([*names, "FloorName", "FloorOptions", "ModelName", "ModelOptions"])
+
+
+def with_public_names(stub: str, schema: Entry) -> str:
+    """Return the stub of the package with the names of the schema, the last that it imports."""
+    begin = "from .base.schema import (\n"
+    head = stub[: stub.index(begin)] + begin
+    return head + "".join(f"    {name} as {name},\n" for name in public_names(schema)) + ")\n"
+
+
 def python_module(schema: Entry) -> str:
-    """Return the text of ``_schema.py``."""
+    """Return the text of ``base/schema.py``."""
     keys, models, floors = schema["keys"], schema["models"], schema["floors"]
-    shared = [key for key in keys if not key["owner"] and key["group"] not in {"case", "model"}]
-    groups = list(dict.fromkeys(key["group"] for key in shared))
-    optional = list(dict.fromkeys(key["owner"] for key in keys if key["owner"]))
-    optional = [owner for owner in optional if owner not in {*models, *floors, "floor"}]
-    names = map(class_name, [*groups, *optional, *models, *floors])
-    public = sorted([*names, "FloorName", "FloorOptions", "ModelName", "ModelOptions"])
+    groups, optional = shared_groups(schema), optional_groups(schema)
     choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
     choices.append(literal("BandSet", schema["band_sets"]))
-    quoted_names = "".join(f"    {quoted(name)},\n" for name in public)
+    quoted_names = "".join(f"    {quoted(name)},\n" for name in public_names(schema))
     parts = [HEAD.format(names=quoted_names, choices="".join(choices))]
     for group in groups:
-        members = [key for key in shared if key["group"] == group]
+        members = [key for key in keys if (key["owner"], key["group"]) == ("", group)]
         parts.append(python_class(f"Group ``&{group}``.", members, group))
     for owner in optional:
         members = [key for key in keys if key["owner"] == owner]
@@ -216,7 +238,7 @@ def union(name: str, members: list[str]) -> str:
 
 
 def python_calls(schema: Entry) -> str:
-    """Return the text of ``_solve.pyi``."""
+    """Return the text of ``impact/solve.pyi``."""
     keys, models = schema["keys"], schema["models"]
     owned = {model: [key for key in keys if key["owner"] == model] for model in models}
     choices = {choice_name(key) for key in keys if key["owner"] in models and key["choices"]}
@@ -289,8 +311,11 @@ def main() -> None:
     """Write the files below a directory, by default that of the project."""
     schema = json.load(sys.stdin)
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
-    (root / "driver/thud/_schema.py").write_text(python_module(schema), encoding="utf-8")
-    (root / "driver/thud/_solve.pyi").write_text(python_calls(schema), encoding="utf-8")
+    package = root / "driver/thud"
+    (package / "base/schema.py").write_text(python_module(schema), encoding="utf-8")
+    (package / "impact/solve.pyi").write_text(python_calls(schema), encoding="utf-8")
+    stub = package / "__init__.pyi"
+    stub.write_text(with_public_names(stub.read_text(encoding="utf-8"), schema), encoding="utf-8")
     (root / "docs/keys.md").write_text(page(schema), encoding="utf-8")
 
 

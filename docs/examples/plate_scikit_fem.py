@@ -113,7 +113,7 @@ def modal_velocity(force: np.ndarray, step: float, count: int = 60) -> np.ndarra
 def read_force(path: str | None) -> tuple[np.ndarray, float]:
     """Return force, N, and time step, s, of a file, or of the ball by finite elements."""
     if path is None:
-        import thud  # noqa: PLC0415 - the file needs no thud
+        import thud
 
         impact = thud.solve(thud.Ball(youngs_modulus=2.08e6), model="finite_element")
         return impact.floor_force, 1 / impact.sample_rate
@@ -130,7 +130,7 @@ def low_passed(force: np.ndarray, step: float) -> np.ndarray:
 
 def main() -> None:
     """Compute and draw."""
-    from thud import plot  # noqa: PLC0415 - the file needs no thud
+    from thud import plot
 
     force, step = read_force(sys.argv[1] if len(sys.argv) > 1 else None)
     force = low_passed(force, step)

@@ -37,7 +37,7 @@ def main() -> int:
     # Figures are written to files, whatever else is set.
     os.environ["MPLBACKEND"] = "agg"
     try:
-        from thud.cli import main as run  # noqa: PLC0415 - takes its time
+        from thud.cli import main as run
     except (ImportError, MemoryError) as error:  # such as under a limit of memory
         reason = " ".join(str(error).split())[:200] or "out of memory"
         sys.stderr.write(f"thud-driver: a library cannot be loaded ({reason})\n")

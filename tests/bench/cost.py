@@ -13,11 +13,11 @@ import sys
 import time
 from typing import Any
 
-from thud.base.schema import FLOORS
-from thud.impact.ensemble import get_cost
 from thud.base.errors import ThudError
+from thud.base.schema import FLOORS
 from thud.explorer.answer import MAX_SAMPLES, answer_case, new_case
 from thud.explorer.form import form
+from thud.impact.ensemble import get_cost
 
 # Models that need no measured values, and how often each is drawn.
 MODELS = {"hollow_sphere": 3, "modal_ball": 6, "two_mass": 2, "finite_element": 2}

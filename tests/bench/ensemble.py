@@ -58,7 +58,7 @@ def best(
 def heyoka_rate(count: int = 2048) -> float | None:
     """Return trajectories per second of heyoka's batch mode, all lanes run to their release."""
     try:
-        import heyoka as hy  # noqa: PLC0415 - may be missing
+        import heyoka as hy
     except ImportError:
         return None
     lanes = hy.recommended_simd_size()
@@ -105,7 +105,7 @@ def heyoka_rate(count: int = 2048) -> float | None:
 def numba_rate(count: int = 200) -> float | None:  # noqa: C901 - one competitor, one function
     """Return complete cases per second of a scalar RK4 by numba with SciPy's ZoomFFT levels."""
     try:
-        import numba  # noqa: PLC0415 - may be missing
+        import numba
     except ImportError:
         return None
 
@@ -174,8 +174,8 @@ def zoom_rate(count: int = 200) -> float:
 def jax_rate(count: int = 4096) -> float | None:
     """Return trajectories per second of a vectorised RK4 by JAX, a fixed number of steps."""
     try:
-        import jax  # noqa: PLC0415 - may be missing
-        import jax.numpy as jnp  # noqa: PLC0415
+        import jax
+        import jax.numpy as jnp
     except ImportError:
         return None
     jax.config.update("jax_enable_x64", True)  # noqa: FBT003 - JAX's own way

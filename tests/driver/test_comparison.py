@@ -13,9 +13,9 @@ from conftest import MINIMAL, REPOSITORY, naming, recorded
 
 import thud
 from thud import cli
+from thud.base.errors import PlausibilityWarning
 from thud.comparison.comparison import _cell, _digits
 from thud.level.criteria import Criterion
-from thud.base.errors import PlausibilityWarning
 from thud.recordings.config import Config
 
 if TYPE_CHECKING:

@@ -17,8 +17,8 @@ from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
 import thud
-from thud.export import force_files as export_force
 from thud.cli.export import EXPORT, KINDS
+from thud.export import force_files as export_force
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.recordings.read_recording import read_recording
 from thud.recordings.reading import open_signals
@@ -75,7 +75,7 @@ def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
         paths = export_force.export(kind, FORCE, tmp_path / f"force{ending}")
         text = b"".join(path.read_bytes() for path in paths)
         if kind == "mat":
-            from scipy.io import loadmat  # noqa: PLC0415 - for this format only
+            from scipy.io import loadmat
 
             about = loadmat(tmp_path / "force.mat")["about"]
             text = "\n".join(np.ravel(about)).encode()

@@ -141,8 +141,8 @@ def test_too_little_quiet_leaves_the_noise_to_the_residuals() -> None:
 
 def _measured(force: np.ndarray, rate: float) -> Recording:
     """Return the recording of a force in memory."""
-    from thud.recordings.drops import find_windows  # noqa: PLC0415 - one test in two
-    from thud.recordings.estimates import measure_drop  # noqa: PLC0415 - likewise
+    from thud.recordings.drops import find_windows
+    from thud.recordings.estimates import measure_drop
 
     windows = find_windows(Signal.from_array(force, rate))
     return Recording("memory", tuple(measure_drop(window) for window in windows), ())

@@ -16,8 +16,8 @@ import thud
 from thud.base.bridge import call, floor_api
 from thud.case.case import case_text
 from thud.cli import main
-from thud.floors.rating import CLASS_LIMITS
 from thud.floors.tapping import THIRDS
+from thud.level.rating import CLASS_LIMITS
 
 if TYPE_CHECKING:
     from pathlib import Path

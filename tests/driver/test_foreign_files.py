@@ -117,7 +117,9 @@ def command(executable: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(look, "_picture", lambda *_: b"picture")
     monkeypatch.setattr("thud.plot.documentation_figures", lambda: {"figure1": object})
     monkeypatch.setattr("thud.report.write.page_contents", lambda *_: {"report.html": b"page"})
-    monkeypatch.setattr("thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"})
+    monkeypatch.setattr(
+        "thud.report.recording_files.page_contents", lambda *_: {"report.html": b"p"}
+    )
 
     def run(name: str, *more: str) -> int:
         words = [*WRITERS[name].words, "-q", "-o", "out", *more]
@@ -140,7 +142,7 @@ def name(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 def _report() -> str:
-    from thud.report.data import report_data  # noqa: PLC0415 - takes its time
+    from thud.report.data import report_data
 
     data = report_data(thud.read_recording(RECORDINGS / "drop_1.csv", height=1.0, mass=2.5))
     return json.dumps({**data, "date": "2024-05-03"})

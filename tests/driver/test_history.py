@@ -17,10 +17,10 @@ from scipy.stats import binom
 import thud
 from thud.cli.history import run_history
 from thud.level.levels import get_bands
-from thud.report.history_figure import draw_history
 from thud.recordings.verdict import VERDICTS, Contribution, Quantity, decide
 from thud.report.data import FORMAT
 from thud.report.history import YEAR, History, _trend, read_history
+from thud.report.history_figure import draw_history
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -20,7 +20,7 @@ import thud
 from thud import cli
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
-from thud.recordings import results
+from thud.report import recording_files as results
 from thud.report.rows import HEAD
 from thud.report.write import PDF
 
@@ -212,7 +212,7 @@ def test_without_xarray_a_remark_tells_what_is_left_out(
 
 def test_tables_need_no_figures() -> None:
     code = (
-        "import sys, thud.recordings.results; "
+        "import sys, thud.report.recording_files; "
         "print({'matplotlib', 'weasyprint', 'xarray'} & set(sys.modules))"
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -14,8 +14,8 @@ from conftest import REPOSITORY, naming, recorded
 import thud
 from thud import _api, plot
 from thud.base.bridge import floor_api
-from thud.cli import main
 from thud.base.errors import ReportWarning
+from thud.cli import main
 from thud.floors.prediction import _force_change
 
 if TYPE_CHECKING:

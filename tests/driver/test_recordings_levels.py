@@ -13,8 +13,7 @@ from conftest import naming
 from scipy import stats
 from scipy.optimize import brentq
 from scipy.signal import lsim, lti
-from scipy.stats import binom
-from scipy.stats import t as student
+from scipy.stats import binom, t as student
 from synthetic import make_drop
 
 import thud

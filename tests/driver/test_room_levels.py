@@ -11,8 +11,8 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud.cli import main
-from thud.floors.rating import CLASS_LIMITS
 from thud.floors.survey import levels_csv, rating_table
+from thud.level.rating import CLASS_LIMITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -16,8 +16,7 @@ from scipy.stats import norm
 import thud
 from thud.base.schema import KEYS
 from thud.studies import designs
-from thud.studies.design_map import KIND as DESIGN
-from thud.studies.design_map import DesignMap, _mark
+from thud.studies.design_map import KIND as DESIGN, DesignMap, _mark
 from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region
 from thud.studies.emulation.plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
 from thud.studies.emulation.surrogate import Surrogate
@@ -426,7 +425,7 @@ def test_errors_of_a_surrogate_add_to_the_variances() -> None:
 def test_search_stays_within_the_region(
     low: float, high: float, start: float, expected: tuple[float, float] | None
 ) -> None:
-    from thud.studies.fitting.ranges import Range  # noqa: PLC0415 - for this test only
+    from thud.studies.fitting.ranges import Range
 
     blank = dict.fromkeys(Range.__dataclass_fields__)
     entry = Range(**{**blank, "name": "b", "unit": "m", "low": low, "high": high, "start": start,

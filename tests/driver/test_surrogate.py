@@ -160,7 +160,7 @@ def test_leave_one_out_is_what_it_says() -> None:
     values = np.sin(5 * points[:, :1]) + points[:, 1:] ** 2
     values += 0.05 * np.random.default_rng(4).normal(size=(40, 1))
     whole = regress(points, values, np.array([True]))
-    from sklearn.gaussian_process.kernels import Matern, WhiteKernel  # noqa: PLC0415
+    from sklearn.gaussian_process.kernels import Matern, WhiteKernel
 
     # The noise follows from the weights: K w = z.
     normal = (values - whole["mean"]) / whole["scale"]
@@ -179,7 +179,7 @@ def test_leave_one_out_is_what_it_says() -> None:
 
 
 def test_a_response_with_a_jump_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from thud.studies import evaluation  # noqa: PLC0415 - to be changed
+    from thud.studies import evaluation
 
     smooth = evaluation.solve_many
 
@@ -212,7 +212,7 @@ def test_drops_are_added_until_the_bound_holds() -> None:
 
 
 def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from thud.studies import evaluation  # noqa: PLC0415 - to be changed
+    from thud.studies import evaluation
 
     monkeypatch.setattr(evaluation, "peak_count", lambda force, _: 1 + (force.max() > 1500))
     with pytest.raises(thud.InputError, match=naming("peaks", 1, 2)):

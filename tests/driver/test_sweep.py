@@ -16,17 +16,16 @@ import pytest
 import scipy
 import xarray as xr
 from conftest import REPOSITORY, naming
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.stats import qmc
 
 import thud
 from thud import cli, tables, units
 from thud.base.schema import MODELS
-from thud.impact.ensemble import get_cost
-from thud.case.keys import known_keys, put
-from thud.studies import designs, directory, evaluation, fit, sweep
 from thud.base.units import MULTIPLES, scaled
+from thud.case.keys import known_keys, put
+from thud.impact.ensemble import get_cost
+from thud.studies import designs, directory, evaluation, fit, sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable

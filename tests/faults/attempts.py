@@ -202,7 +202,7 @@ def _work(name: str, part: Part, folder: Path) -> None:
 
 def main() -> None:
     """Work, or make one attempt again."""
-    from run import parts  # noqa: PLC0415 - that imports this module
+    from run import parts
 
     name, *rest = sys.argv[1:]
     part = parts()[name]

@@ -187,7 +187,7 @@ def _become(order: Order, errors: IO[bytes]) -> NoReturn:
 
 
 def _main() -> int:
-    import thud_driver  # noqa: PLC0415 - of this process only
+    import thud_driver
 
     code = thud_driver.main()
     # As an interpreter ends.
@@ -211,8 +211,8 @@ def _be_humble() -> None:
 
 def _log_work() -> None:
     """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
-    from thud.recordings import kept  # noqa: PLC0415 - of this process only
-    from thud.studies import backends, blocks, dataset, sets  # noqa: PLC0415
+    from thud.recordings import kept
+    from thud.studies import backends, blocks, dataset, sets
 
     sets._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
     backends.SILENCE, backends.LOOK = 4.0, 0.5
@@ -245,9 +245,9 @@ def _log_work() -> None:
 
 def _serve() -> None:
     """Answer commands, a line each, until the end of the input."""
-    import tqdm  # noqa: PLC0415 - of this process only
+    import tqdm
 
-    import thud  # noqa: PLC0415 - of this process only
+    import thud
 
     # Processes whose parent was killed become children of this one, which waits for them.
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)

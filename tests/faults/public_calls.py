@@ -203,7 +203,7 @@ def _plane() -> dict[str, Any]:
 
 
 def _run(folder: Path, results: Path) -> None:
-    from thud.cli import main  # noqa: PLC0415 - takes its time
+    from thud.cli import main
 
     (folder / "run.nml").write_text("&ball / &drop / &model /")
     main(["run", "-q", "--no-figures", str(folder / "run.nml"), "-o", str(results)])

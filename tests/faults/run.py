@@ -22,15 +22,13 @@ from campaign import Part, Report, each
 from checkouts import NAMES, check_checkouts
 from clusters import check_clusters
 from crowds import check_crowds, check_starts, check_threads
-from directories import check_calls, check_damage, check_races
-from directories import plan as plan_calls
+from directories import check_calls, check_damage, check_races, plan as plan_calls
 from edge_cases import LUMPED, WEIGHTS
 from edges import check_many, check_models
 from foreign_files import check_foreign
 from kills import check_kills, check_slow_kills
 from memory import check_memory
-from places import check_places, check_steps
-from places import plan as plan_steps
+from places import check_places, check_steps, plan as plan_steps
 from servers import check_explorer
 from soak import check_soak
 

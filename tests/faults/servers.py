@@ -134,7 +134,7 @@ def _case(height: float, model: str) -> bytes:
 
 @cache
 def _expected(height: float, model: str) -> dict[str, Any]:
-    from thud.explorer.answer import answer_case, new_case  # noqa: PLC0415 - an extra
+    from thud.explorer.answer import answer_case, new_case
 
     found = answer_case(new_case(json.loads(_case(height, model))))
     return json.loads(json.dumps(found)) | {"seconds": 0}  # type: ignore[no-any-return]

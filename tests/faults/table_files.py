@@ -19,13 +19,13 @@ from sentences import INNER, fault_of
 import thud
 from thud.base.bridge import api, call
 from thud.base.columns import read_table
-from thud.studies.compression_fit import fit_compression
+from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
 from thud.floors.survey import levels_csv, rating_table, read_room_levels
-from thud.recordings.record import read_record
 from thud.recordings.config import read_config
 from thud.recordings.formats.text import read_channels
-from thud.base.tables import format_rows
+from thud.recordings.record import read_record
+from thud.studies.compression_fit import fit_compression
 
 if TYPE_CHECKING:
     import random

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import thud
-from thud.impact.contact_time import THRESHOLD, contact_span
 from thud.base.errors import InputError
+from thud.impact.contact_time import THRESHOLD, contact_span
 from thud.recordings import contact as contact_module
 from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate

@@ -34,7 +34,7 @@ class Elements(NamedTuple):
 @pytest.fixture(scope="module")
 def elements() -> Elements:
     """Return the finite elements of the simply supported plate."""
-    from skfem.helpers import dd  # noqa: PLC0415 - skipped without it
+    from skfem.helpers import dd
 
     mesh = skfem.MeshTri.init_tensor(np.linspace(0, LENGTH, 11), np.linspace(0, WIDTH, 9))
     basis = skfem.Basis(mesh, skfem.ElementTriArgyris(), intorder=10)

@@ -58,7 +58,7 @@ def suggestion(word: object, known: Collection[str]) -> str:
     >>> suggestion("heigth", ["gravity", "height"])
     " (did you mean 'height'?)"
     """
-    import difflib  # noqa: PLC0415 - for errors only
+    import difflib
 
     by_small = {name.lower(): name for name in known}
     if not isinstance(word, str) or len(word) > LONGEST_SHOWN:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from abc import ABC, abstractmethod
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from thud.base.errors import ReportWarning
 from thud.base.immutable import Immutable
@@ -17,10 +17,6 @@ if TYPE_CHECKING:
 
 # Maximum number of characters of a message of matplotlib that is shown.
 _SHOWN = 100
-
-# What makes the figure, the dataset or the table of a result. The makers import the results, which
-# therefore cannot import them: the package enters them.
-MAKERS: dict[str, Callable[..., Any]] = {}
 
 
 class Displayed(Immutable, ABC):
@@ -68,6 +64,6 @@ def html_table(rows: Iterable[Sequence[str]]) -> str:
 
 
 def _escaped(text: str) -> str:
-    from html import escape  # noqa: PLC0415 - for notebooks only
+    from html import escape
 
     return escape(text)

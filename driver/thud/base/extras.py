@@ -30,7 +30,7 @@ def require_extra(extra: str) -> Iterator[None]:
 
 def packages(extra: str) -> list[str]:
     """Return the names of the packages of an extra; none where thud itself is not installed."""
-    from importlib.metadata import PackageNotFoundError, requires  # noqa: PLC0415 - for errors only
+    from importlib.metadata import PackageNotFoundError, requires
 
     try:
         lines = requires("thud") or []

@@ -1,0 +1,1 @@
+"""Cases: the input of one drop, and its keys by name."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from thud.base.bridge import version
 from thud.base.checks import suggestion
+from thud.base.errors import InputError, NumericalError, ThudError
 from thud.cli.calibrate import CALIBRATE
 from thud.cli.command import (
     NO_FIGURES,
@@ -33,9 +34,7 @@ from thud.cli.mobility import MOBILITY
 from thud.cli.rate import RATE
 from thud.cli.run import run_cases
 from thud.cli.studies import study_commands
-from thud.base.errors import InputError, NumericalError, ThudError
-from thud.impact.impact import FORCES
-from thud.level.levels import SOURCES
+from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
-from thud.cli.command import QUIET, Command, argument, channel_of
+from thud.cli.command import QUIET, Command, argument
+from thud.recordings.channel import channel_of
 
 if TYPE_CHECKING:
     import argparse
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 def run_calibrate(options: argparse.Namespace) -> int:
     """Print the lines of a configuration that a calibration record gives; return the exit code."""
-    from thud.recordings.calibration import calibrate  # noqa: PLC0415 - SciPy takes its time
+    from thud.recordings.calibration import calibrate
 
     found = calibrate(
         options.record,

@@ -89,11 +89,6 @@ QUIET = argument("-q", "--quiet", action="store_true", help="show only errors an
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 
 
-def channel_of(text: str | None) -> int | str | None:
-    """Return the number or the name of a channel."""
-    return int(text) if text is not None and text.isdecimal() else text
-
-
 def tell(remarks: Iterable[object]) -> None:
     """Print remarks; a progress bar stays below them."""
     for remark in remarks:
@@ -135,7 +130,7 @@ def conclude(  # noqa: PLR0913, PLR0917 - each of them differs
     contents = dict([file])
     if not options.no_figures:
         with left_out(figure):
-            from thud.plot.look import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+            from thud.plot.look import picture_files
 
             contents |= picture_files(draw_all({figure: found.plot}))
     results.write(contents)

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
-from thud.cli.command import QUIET, Command, argument
 from thud.base.files import own_path
+from thud.cli.command import QUIET, Command, argument
 
 if TYPE_CHECKING:
     import argparse

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
-from thud.cli.command import QUIET, Command, argument
 from thud.base.extras import require_extra
+from thud.cli.command import QUIET, Command, argument
 
 if TYPE_CHECKING:
     import argparse
@@ -26,8 +26,8 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until an interrupt; return the exit code."""
     with require_extra("explorer"):
-        from thud.explorer.connections import run_server  # noqa: PLC0415 - an extra
-        from thud.explorer.server import new_application, start_with  # noqa: PLC0415 - likewise
+        from thud.explorer.connections import run_server
+        from thud.explorer.server import new_application, start_with
     start = start_with(options.case)
     token = secrets.token_urlsafe(16)
     version_6 = ":" in options.host

@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from thud.case.case import read_case
 from thud.base.checks import refuse
+from thud.case.case import read_case
 from thud.cli.command import QUIET, Command, argument, output, results_of, tell
-from thud.impact.impact import compute
+from thud.impact.compute import compute
 
 if TYPE_CHECKING:
     import argparse
@@ -28,7 +28,7 @@ KINDS = {
 
 def run_export(options: argparse.Namespace) -> int:
     """Write the blocked force in the formats that are asked for; return the exit code."""
-    from thud.export import force_files as export_force  # noqa: PLC0415 - SciPy takes its time
+    from thud.export import force_files as export_force
 
     chosen = [kind for kind in KINDS if getattr(options, kind)]
     if not chosen:
@@ -48,8 +48,8 @@ def run_export(options: argparse.Namespace) -> int:
 
 def _read(path: str, config: str | None) -> Impact | Recording:
     """Return the impact of a case, or the recording, of a file."""
-    from thud.recordings.formats import FORMATS  # noqa: PLC0415 - SciPy takes its time
-    from thud.recordings.read_recording import read_recording  # noqa: PLC0415 - likewise
+    from thud.recordings.formats import FORMATS
+    from thud.recordings.read_recording import read_recording
 
     endings = {ending for one in FORMATS for ending in one.suffixes}
     if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.cli.command import PAGE, results_of, tell
 from thud.base.display import draw_all
 from thud.base.errors import PlausibilityWarning
 from thud.base.tables import format_rows
+from thud.cli.command import PAGE, results_of, tell
 
 if TYPE_CHECKING:
     import argparse
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def compare_cases(options: argparse.Namespace) -> int:
     """Compare cases and recordings; return the exit code."""
-    from thud.comparison import comparison  # noqa: PLC0415 - matplotlib takes its time
+    from thud.comparison import comparison
 
     results = results_of(options, "comparison", options.cases)
     results.require(f"comparison{ending}" for ending in PAGE)
@@ -42,7 +42,7 @@ def compare_cases(options: argparse.Namespace) -> int:
 
 def draw_figures(options: argparse.Namespace) -> int:
     """Draw the figures of the paper and of the documentation; return the exit code."""
-    from thud import plot  # noqa: PLC0415 - matplotlib takes its time
+    from thud import plot
 
     results = results_of(options, "figures")
     figures = plot.documentation_figures()

@@ -6,10 +6,10 @@ import sys
 import warnings
 from typing import TYPE_CHECKING
 
-from thud.case.case import read_case
-from thud.cli.command import PAGE, QUIET, Command, argument, output, results_of, tell
 from thud.base.errors import InputError, PlausibilityWarning
 from thud.base.tables import format_rows
+from thud.case.case import read_case
+from thud.cli.command import PAGE, QUIET, Command, argument, output, results_of, tell
 
 if TYPE_CHECKING:
     import argparse
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def compare(options: argparse.Namespace) -> int:
     """Compare the floors of cases, print the table and save the page; return the exit code."""
-    from thud.floors.floor_comparison import compare_floors  # noqa: PLC0415 - SciPy takes its time
+    from thud.floors.floor_comparison import compare_floors
 
     results = results_of(options, "floors", options.cases)
     results.require(f"floors{ending}" for ending in PAGE)

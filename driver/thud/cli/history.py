@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
-from thud.cli.command import results_of
 from thud.base.display import draw_all
 from thud.base.tables import format_rows
+from thud.cli.command import results_of
 
 if TYPE_CHECKING:
     import argparse
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy take their time.
-    from thud.report.history_figure import draw_history  # noqa: PLC0415
-    from thud.plot.look import picture_files  # noqa: PLC0415
-    from thud.report.history import read_history  # noqa: PLC0415
+    from thud.plot.look import picture_files
+    from thud.report.history import read_history
+    from thud.report.history_figure import draw_history
 
     history = read_history(options.reports, different_balls=options.different_balls)
     results = results_of(options, "history", options.reports)

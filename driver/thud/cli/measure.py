@@ -7,18 +7,18 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
     QUIET,
     Command,
     argument,
-    channel_of,
     output,
     results_of,
     tell,
 )
 from thud.level.levels import SOURCES
-from thud.base.tables import format_rows
+from thud.recordings.channel import channel_of
 
 if TYPE_CHECKING:
     import argparse
@@ -30,9 +30,9 @@ SHOWN = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings import results  # noqa: PLC0415 - SciPy takes its time
-    from thud.recordings.kept import KeptDrops  # noqa: PLC0415
-    from thud.recordings.read_recording import read_recording  # noqa: PLC0415
+    from thud.report import recording_files as results
+    from thud.recordings.kept import KeptDrops
+    from thud.recordings.read_recording import read_recording
 
     figures = not options.no_figures
     files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])

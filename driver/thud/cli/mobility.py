@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
 from thud.base.tables import format_rows
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
 
 if TYPE_CHECKING:
     import argparse
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def fit(options: argparse.Namespace) -> int:
     """Fit a measured mobility, print the errors, save the floor; return the exit code."""
-    from thud.floors.mobility_fit import fit_mobility  # noqa: PLC0415
+    from thud.floors.mobility_fit import fit_mobility
 
     found = fit_mobility(options.table, quantity=options.quantity, order=options.order)
     shown = f"{repr(found)[1:-1]}\n{format_rows(found.rows())}"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
 from thud.base.tables import format_rows
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
 
 if TYPE_CHECKING:
     import argparse
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 def rate(options: argparse.Namespace) -> int:
     """Rate measured levels, print and save the result; return the exit code."""
-    from thud.floors.survey import levels_csv, rating_table, read_room_levels  # noqa: PLC0415
+    from thud.floors.survey import levels_csv, rating_table, read_room_levels
 
     found = read_room_levels(options.levels, volume=options.volume)
     shown = f"{format_rows(found.rows())}\n\n{format_rows(rating_table(found))}"

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 from tqdm import tqdm
 
 from thud.base.bridge import api, call, text
-from thud.case.case import Case, read_case
-from thud.cli.command import exit_code, sentence
-from thud.impact.compression import new_curve
 from thud.base.display import left_out
 from thud.base.errors import InputError, ThudError
 from thud.base.files import Results
+from thud.case.case import Case, read_case
+from thud.cli.command import exit_code, sentence
+from thud.impact.compression import new_curve
+from thud.impact.compute import new_impact
 from thud.impact.free_modes import new_modes
-from thud.impact.impact import new_impact
 
 if TYPE_CHECKING:
     import argparse
@@ -88,7 +88,7 @@ def _pictures(found: Bundle, *, figures: bool, animation: bool) -> dict[str, byt
     shown = {} if impact is None else {"motion": impact, "floor_motion": impact.on_floor}
     files: dict[str, bytes] = {}
     with TemporaryDirectory() as folder, left_out("a figure"):
-        from thud import plot  # noqa: PLC0415 - matplotlib takes its time
+        from thud import plot
 
         if figures:
             files = plot.picture_files(plot.case_figures(impact, modes, curve))

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, tell
 from thud.base.display import left_out
 from thud.base.errors import NumericalError, ThudError
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, tell
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def run_study(options: argparse.Namespace) -> int:
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):
-                from thud.plot import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+                from thud.plot import picture_files
 
                 contents |= picture_files(kind.figures(result, study))
         results.write(contents)

@@ -1,0 +1,1 @@
+"""Impacts, recordings and spectra compared on one page."""

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, overload
 import numpy as np
 from tqdm import tqdm
 
-from thud.case.case import Case, read_case
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning, ThudError
 from thud.base.files import Results
-from thud.impact.impact import FORCES, Impact, compute
-from thud.level.levels import SOURCES, get_bands
+from thud.case.case import Case, read_case
+from thud.impact.compute import compute
+from thud.impact.impact import Impact
+from thud.level.levels import FORCES, SOURCES, get_bands
 from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
 from thud.plot.levels import common_source

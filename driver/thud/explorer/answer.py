@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.case.case import tables_case
 from thud.base.checks import refuse, shown
-from thud.impact.ensemble import get_cost
 from thud.base.errors import ThudError
-from thud.impact.floor_impact import FloorImpact
-from thud.floors.prediction import predict_level
-from thud.impact.impact import compute
+from thud.case.case import tables_case
 from thud.case.keys import plain_words
+from thud.floors.prediction import predict_level
+from thud.impact.compute import compute
+from thud.impact.ensemble import get_cost
+from thud.impact.floor_impact import FloorImpact
 from thud.level.levels import get_bands
 from thud.plot.force_history import contact_force
 from thud.plot.look import FORCE_WORDS
@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.case.case import Case
-    from thud.level.criteria import Criterion
     from thud.impact.impact import Impact
+    from thud.level.criteria import Criterion
     from thud.recordings.recording import Recording
 
     Answer = dict[str, Any]

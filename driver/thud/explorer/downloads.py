@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.case.case import check_case
 from thud.base.checks import refuse, require_number, shown
+from thud.case.case import check_case
+from thud.case.keys import find_key, known_keys, users
 from thud.comparison.comparison import compare
 from thud.explorer.answer import new_case
-from thud.impact.impact import compute
-from thud.case.keys import find_key, known_keys, users
+from thud.impact.compute import compute
 from thud.plot.comparison_html import comparison_html
 
 if TYPE_CHECKING:

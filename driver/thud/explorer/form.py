@@ -8,9 +8,9 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from thud.base.schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.base.units import handy_unit, power_of, scaled
 from thud.case.case import OPTIONAL
 from thud.case.keys import plain_words
-from thud.base.units import handy_unit, power_of, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -20,12 +20,12 @@ from starlette.responses import JSONResponse, PlainTextResponse, Response, Strea
 from starlette.routing import Route
 
 from thud.base.bridge import version
-from thud.case.case import read_case
 from thud.base.checks import refuse, shown
-from thud.cli.command import channel_of
+from thud.case.case import read_case
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import form
 from thud.explorer.jobs import REFUSALS, Jobs
+from thud.recordings.channel import channel_of
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, AsyncIterator, Awaitable, Callable, Mapping

@@ -1,0 +1,1 @@
+"""Force histories as files of other programs."""

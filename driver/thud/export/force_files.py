@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.case.case import case_text
 from thud.base.checks import refuse, refuse_value, require_kind, require_number, require_whole
 from thud.base.files import content_of, refuse_foreign, replace_file
 from thud.base.immutable import Immutable
+from thud.case.case import case_text
 from thud.impact.impact import Impact
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.channel import library
@@ -182,7 +182,7 @@ def _of_recording(recording: Recording, drop: int) -> BlockedForce:
 
 def _resampled(given: BlockedForce, rate: float) -> BlockedForce:
     """Return a force at another rate, what is above half of the lower one removed."""
-    from scipy.signal import resample_poly  # noqa: PLC0415 - takes its time
+    from scipy.signal import resample_poly
 
     require_number("rate", rate)
     if not RATES[0] <= rate <= RATES[1]:
@@ -290,7 +290,7 @@ def uff_files(force: BlockedForce, path: str) -> dict[str, bytes]:
 
 def mat_files(force: BlockedForce, path: str) -> dict[str, bytes]:
     """Return a MATLAB file, version 5: time, force, spectrum and what they are."""
-    import scipy.io  # noqa: PLC0415 - takes its time
+    import scipy.io
 
     frequency, spectrum = force.spectrum()
     content = io.BytesIO()

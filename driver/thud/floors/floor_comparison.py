@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.case.case import Case
 from thud.base.checks import refuse, require_kind
-from thud.base.display import MAKERS, Displayed
+from thud.base.display import Displayed
 from thud.base.errors import ThudError
 from thud.base.files import Results
+from thud.case.case import Case
 from thud.floors.prediction import RoomPrediction, predict_level
-from thud.floors.rating import CLASSES
 from thud.floors.tapping import has_tapping_level, tapping_level
-from thud.impact.impact import compute
+from thud.impact.compute import compute
 from thud.level.levels import get_bands
+from thud.level.rating import CLASSES
 
 if TYPE_CHECKING:
     import os
@@ -68,18 +68,21 @@ class FloorComparison(Displayed):
 
     def figure(self) -> Figure:
         """Return the page as a matplotlib figure."""
-        figure: Figure = MAKERS["floors"](self)
-        return figure
+        from thud.plot.floors import draw_floors
+
+        return draw_floors(self)
 
     def html(self) -> str:
         """Return the page as self-contained HTML with interactive plots."""
-        page: str = MAKERS["floors_html"](self)
-        return page
+        from thud.plot.floors import floors_html
+
+        return floors_html(self)
 
     def files(self) -> dict[str, bytes]:
         """Return ``floors.png``, ``.svg`` and ``.html`` by name."""
-        found: dict[str, bytes] = MAKERS["page_files"]("floors", self.figure, self.html())
-        return found
+        from thud.plot.look import page_files
+
+        return page_files("floors", self.figure, self.html())
 
     def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
         """Write the files of `files` and return their paths.

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import call, floor_api
+from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
+from thud.base.display import Displayed
 from thud.base.schema import BandSet, InfinitePlate
 from thud.case.case import Case, case_text
-from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
-from thud.base.display import MAKERS, Displayed
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact
 from thud.level.levels import force_exposure_levels, get_bands
@@ -157,8 +157,9 @@ class BallImpedance(Displayed):
         floors
             Floors by their names in the legend.
         """
-        figure: Figure = MAKERS["impedance"]({"": self}, floors or {})
-        return figure
+        from thud.plot.impedance import ball_impedances
+
+        return ball_impedances({"": self}, floors or {})
 
 
 def ball_impedance(

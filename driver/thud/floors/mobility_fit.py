@@ -12,8 +12,6 @@ import f90nml
 import numpy as np
 
 from thud.base.bridge import call, mobility_api
-from thud.base.schema import MeasuredMobility
-from thud.case.case import Case
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -24,8 +22,10 @@ from thud.base.checks import (
     shown,
 )
 from thud.base.columns import read_titled
-from thud.base.display import MAKERS, Displayed
+from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
+from thud.base.schema import MeasuredMobility
+from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
 from thud.recordings.channel import guarded, library, require_small
@@ -157,8 +157,9 @@ class MobilityFit(Displayed):
 
     def plot(self) -> Figure:
         """Draw the measured mobility and the fit."""
-        figure: Figure = MAKERS["mobility_fit"](self)
-        return figure
+        from thud.plot.mobility_fit import mobility_fit
+
+        return mobility_fit(self)
 
     def _errors(self) -> NDArray[np.float64]:
         """Return the relative errors of the lines."""

@@ -16,8 +16,6 @@ import numpy as np
 from scipy.signal import lfilter, sosfilt
 
 from thud.base.bridge import call, floor_api
-from thud.base.schema import Plate, Room
-from thud.case.case import Case, case_text
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -26,8 +24,10 @@ from thud.base.checks import (
     require_real,
     require_whole,
 )
-from thud.base.display import MAKERS, Displayed
+from thud.base.display import Displayed
 from thud.base.errors import InputError
+from thud.base.schema import Plate, Room
+from thud.case.case import Case, case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.level.levels import get_bands
 from thud.recordings.bank import band_filters
@@ -134,8 +134,9 @@ class ModalRoom(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of all positions against the statistical answer."""
-        figure: Figure = MAKERS["modal_room"](self)
-        return figure
+        from thud.plot.modal_room import draw_modal_room
+
+        return draw_modal_room(self)
 
     def __repr__(self) -> str:
         """Return the size of the room and the numbers of positions and modes."""

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from thud.base.bridge import call, floor_api, text
-from thud.case.case import Case, case_text
 from thud.base.checks import refuse, require_kind
-from thud.base.display import MAKERS, Displayed
-from thud.impact.floor_impact import FloorImpact, new_floor_impact
-from thud.floors.rating import Rating, rated_bands, rating, standardised_level
+from thud.base.display import Displayed
+from thud.case.case import Case, case_text
 from thud.floors.survey import RoomLevels
+from thud.impact.floor_impact import FloorImpact, new_floor_impact
 from thud.impact.impact import Impact
 from thud.level.levels import BANDWIDTHS, get_bands
+from thud.level.rating import Rating, rated_bands, rating, standardised_level
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
@@ -186,8 +186,9 @@ class RoomPrediction(Displayed):
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
-        figure: Figure = MAKERS["prediction"](self, measured)
-        return figure
+        from thud.plot.prediction import draw_prediction
+
+        return draw_prediction(self, measured)
 
     def __repr__(self) -> str:
         """Return the single numbers."""

@@ -19,9 +19,9 @@ import numpy as np
 from thud.base.bridge import level_api
 from thud.base.checks import refuse
 from thud.base.columns import read_titled
-from thud.base.display import MAKERS, Displayed
-from thud.floors.rating import Rating, rated_bands, rating, require_volume, standardised_level
+from thud.base.display import Displayed
 from thud.level.levels import BANDWIDTHS
+from thud.level.rating import Rating, rated_bands, rating, require_volume, standardised_level
 
 if TYPE_CHECKING:
     import os
@@ -205,8 +205,9 @@ class RoomLevels(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardised ones and the background."""
-        figure: Figure = MAKERS["room"](self)
-        return figure
+        from thud.plot.room import room_levels
+
+        return room_levels(self)
 
     def __repr__(self) -> str:
         """Return the single numbers."""

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, TypeGuard
 import numpy as np
 
 from thud.base.bridge import call, floor_api
-from thud.base.schema import Plate, Room
-from thud.case.case import Case, case_text
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
+from thud.base.schema import Plate, Room
+from thud.case.case import Case, case_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base.bridge import api, call
+from thud.base.display import Displayed
+from thud.base.extras import require_extra
+from thud.base.key import check_keywords
 from thud.base.schema import Ball, Compression
 from thud.case.case import Case, case_text, new_model
-from thud.base.display import MAKERS, Displayed
-from thud.base.key import check_keywords
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,16 +54,19 @@ class CompressionCurve(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force against the deflection."""
-        figure: Figure = MAKERS["compression"]({"": self})
-        return figure
+        from thud.plot.compression import compression
+
+        return compression({"": self})
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the columns of ``compression.csv``.
 
         Raise InputError where pandas is not installed.
         """
-        table: pd.DataFrame = MAKERS["compression_table"](self)
-        return table
+        with require_extra("studies"):
+            import pandas as pd
+
+        return pd.DataFrame({"deflection_m": self.deflection, "force_N": self.force})
 
 
 @check_keywords

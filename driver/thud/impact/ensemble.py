@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.bridge import call, call_through, collect, ensemble_api, text
-from thud.base.schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
-from thud.case.case import Case, case_text, new_model
 from thud.base.checks import (
     refuse,
     refuse_value,
@@ -21,11 +19,12 @@ from thud.base.checks import (
     require_whole,
 )
 from thud.base.immutable import freeze
-from thud.impact.impact import FORCES
 from thud.base.key import check_keywords
+from thud.base.schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
+from thud.case.case import Case, case_text, new_model
 from thud.case.keys import find_key, users
-from thud.level.levels import BANDWIDTHS, get_bands
 from thud.impact.outcomes import RATING, ROOM_LEVEL, Ensemble
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 
 # Not empty in a forked process.
 _FORKED: list[bool] = []
@@ -38,8 +37,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.bridge import Bundle
-    from thud.base.schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
     from thud.base.key import Key
+    from thud.base.schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
 
 MAX_THREADS = 1024
 # Approximate time of one call of the library, s: interrupts are handled between calls.
@@ -112,7 +111,7 @@ def solve_many(  # noqa: PLR0913 - the keywords are those of `solve` and some mo
         Where a key is not known, arrays are not numeric or do not broadcast, the case, the bands
         or the number of threads are invalid, or the results do not fit in memory.
     """
-    from tqdm import tqdm  # noqa: PLC0415 - takes its time
+    from tqdm import tqdm
 
     base = Case() if case is None else case
     require_kind("case", base, Case)

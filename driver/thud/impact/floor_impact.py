@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import call, floor_api
-from thud.case.case import Case, case_text
 from thud.base.checks import require_pair
-from thud.base.display import MAKERS
-from thud.impact.mobility import mobility
 from thud.base.immutable import Immutable
+from thud.case.case import Case, case_text
 from thud.impact.impact import Impact, history
+from thud.impact.mobility import mobility
+from thud.impact.outcomes import FURTHER
 from thud.level.levels import force_exposure_levels
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -132,10 +133,26 @@ class FloorImpact(Impact):
         energies = [f"{value:.3g}" for value in energy.by_motion]
         return [head, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
+    def histories(self) -> dict[str, NDArray[np.float64]]:
+        """Return the histories by name and unit, shape (n_sample,), those of the floor too."""
+        points = enumerate(self.point_velocity, 1)
+        return super().histories() | {
+            "blocked_force_N": self.blocked_force,
+            "floor_displacement_m": self.floor_displacement,
+            "floor_velocity_m_per_s": self.floor_velocity,
+            **{f"point_{i}_velocity_m_per_s": velocity for i, velocity in points},
+        }
+
+    def to_xarray(self) -> xr.Dataset:
+        """Return the dataset of an impact, see `Impact.to_xarray`, with the work on the floor."""
+        words = {"units": "J", "long_name": FURTHER["floor_work"][1]}
+        return super().to_xarray().assign(floor_work=((), self.floor_work, words))
+
     def plot(self) -> Figure:
         """Draw contact against blocked force, their levels, and the mobility of the floor."""
-        figure: Figure = MAKERS["floor"](self)
-        return figure
+        from thud.plot.floor import draw_floor
+
+        return draw_floor(self)
 
 
 def new_floor_impact(

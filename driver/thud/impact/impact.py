@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-import warnings
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.bridge import api, call, text
-from thud.base.schema import Ball, Drop, Sampling
-from thud.case.case import Case, case_text, new_model
-from thud.base.checks import require_choice, require_kind
+from thud.base.checks import require_choice
+from thud.base.display import Displayed
+from thud.base.extras import require_extra
 from thud.impact.contact_time import contact_span
-from thud.base.display import MAKERS, Displayed
-from thud.base.errors import InputError, PlausibilityWarning
-from thud.level.levels import force_exposure_levels, judge, peak_count
 from thud.impact.motion import Motion, new_motion
+from thud.level.levels import FORCES, force_exposure_levels, judge, peak_count
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,17 +24,13 @@ if TYPE_CHECKING:
     from thud.base.bridge import Bundle
     from thud.base.schema import (
         BandSet,
-        FloorOptions,
         LevelsForce,
         LevelsMethod,
         LimitsSource,
-        ModelName,
-        ModelOptions,
     )
-    from thud.level.criteria import Conformity
+    from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
-
-FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
+    from thud.level.criteria import Conformity
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,115 +224,39 @@ class Impact(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force that the case judges, and of its octave levels."""
-        figure: Figure = MAKERS["figure"](self)
-        return figure
+        from thud.plot.overview import overview
+
+        return overview(self)
 
     def to_xarray(self) -> xr.Dataset:
         """Return histories, levels of both forces and numbers, with units and provenance.
 
         Snapshots are left out. Raise InputError where xarray is not installed.
         """
-        dataset: xr.Dataset = MAKERS["dataset"](self)
-        return dataset
+        with require_extra("studies"):
+            from thud.impact.datasets import impact_dataset
+
+        return impact_dataset(self, self.histories())
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the histories over time, with the columns of ``force.csv`` and `channels`.
 
         Raise InputError where pandas is not installed.
         """
-        table: pd.DataFrame = MAKERS["table"](self)
-        return table
+        with require_extra("studies"):
+            import pandas as pd
 
+        return pd.DataFrame(self.histories(), index=pd.Index(self.time, name="time_s"))
 
-def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
-    ball: Ball | None = None,
-    drop: Drop | None = None,
-    model: ModelName | ModelOptions = "hollow_sphere",
-    *,
-    sample_rate: float = Sampling.sample_rate,
-    duration: float = Sampling.duration,
-    substeps: int = Sampling.substeps,
-    floor: FloorOptions | None = None,
-    **options: object,
-) -> Impact:
-    """Drop a ball on a floor.
-
-    Parameters
-    ----------
-    ball, drop
-        By default the rubber ball of the paper, from 1 m.
-    model
-        ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
-        one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``;
-        or an object of the classes below, which holds the options.
-    sample_rate
-        Samples per second, Hz.
-    duration
-        Length of the record, s; longer than the contact.
-    substeps
-        Integration steps per sampling interval.
-    floor
-        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
-        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards judge the force
-        on a rigid one.
-    **options
-        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
-        `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
-
-    Returns
-    -------
-    Impact
-        Force, motion and scalar results.
-
-    Raises
-    ------
-    InputError
-        Names group, key, value and allowed range.
-    NumericalError
-        Where the drop leaves the range of the model or the steps are too coarse.
-
-    Warns
-    -----
-    PlausibilityWarning
-        As `Impact.remarks`.
-    """
-    case = Case(
-        ball=Ball() if ball is None else ball,
-        drop=Drop() if drop is None else drop,
-        model=new_model(model, options),
-        sampling=Sampling(sample_rate, duration, substeps),
-        floor=floor,
-    )
-    return _warned(compute(case))
-
-
-def solve_case(case: Case) -> Impact:
-    """Compute the impact of a case; see `solve`."""
-    return _warned(compute(case))
-
-
-def _warned(impact: Impact) -> Impact:
-    for remark in impact.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
-    return impact
-
-
-def compute(case: Case) -> Impact:
-    """Compute the impact of a case without warnings."""
-    require_kind("case", case, Case)
-    if case.model is None:
-        message = "&model is missing; allowed: a case with a source model"
-        raise InputError(message)
-    # Free modes and compression of the case have their own functions.
-    plain = replace(case, modes=None, compression=None)
-    return new_impact(case, call(api.solve, case_text(plain)))
-
-
-def new_impact(case: Case, found: Bundle) -> Impact:
-    """Return the impact in a bundle of the library."""
-    remarks = tuple(map(text, found.get("remarks", {}).values()))
-    common = history(case, found, remarks)
-    return Impact(**common, on_floor=MAKERS["floor_impact"](case, found, common["floor_force"]))
+    def histories(self) -> dict[str, NDArray[np.float64]]:
+        """Return the histories by name and unit, shape (n_sample,)."""
+        forces = {"elastic_force": self.elastic_force, "floor_force": self.floor_force}
+        return {
+            "deflection_m": self.deflection,
+            "velocity_m_per_s": self.velocity,
+            **{f"{name}_N": values for name, values in (forces | self.parts).items()},
+            **self.channels,
+        }
 
 
 def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, Any]:

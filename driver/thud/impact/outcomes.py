@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base.display import Displayed
+from thud.base.extras import require_extra
 from thud.base.schema import OUTCOMES, SCALARS
-from thud.base.display import MAKERS, Displayed
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -138,8 +139,10 @@ class Ensemble(Displayed):
 
         Raise InputError where xarray is not installed.
         """
-        dataset: xr.Dataset = MAKERS["dataset"](self)
-        return dataset
+        with require_extra("studies"):
+            from thud.impact.datasets import ensemble_dataset
+
+        return ensemble_dataset(self)
 
     @property
     def elastic_octaves(self) -> NDArray[np.float64]:

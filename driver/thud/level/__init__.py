@@ -1,0 +1,1 @@
+"""Levels of forces, the criteria of the standards, and ratings."""

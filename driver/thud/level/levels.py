@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, cast, get_args
 import numpy as np
 
 from thud.base.bridge import call_direct, level_api, trimmed
-from thud.base.schema import LevelsMethod
 from thud.base.checks import refuse_value, require_array, require_choice, require_real
-from thud.level.criteria import Conformity, Criterion
 from thud.base.display import Displayed
 from thud.base.errors import InputError
+from thud.base.schema import LevelsForce, LevelsMethod
+from thud.level.criteria import Conformity, Criterion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -32,6 +32,7 @@ _N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()
 _sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
 BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
 SOURCES = cast("tuple[LimitsSource, ...]", _sources)
+FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
 _MAX_PEAKS = 2**31
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0

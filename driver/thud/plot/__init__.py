@@ -23,9 +23,9 @@ except ValueError as error:
         error,
     )
 
-from thud.impact.compression import CompressionCurve
 from thud.base.display import draw_all, left_out
 from thud.floors.prediction import predict_level
+from thud.impact.compression import CompressionCurve
 from thud.impact.free_modes import FreeModes
 from thud.impact.impact import Impact
 from thud.plot.comparison import comparison_page as comparison_page
@@ -35,34 +35,35 @@ from thud.plot.fit import draw_fit as draw_fit
 from thud.plot.floor import draw_floor as draw_floor
 from thud.plot.floor_mobilities import floor_mobilities as floor_mobilities
 from thud.plot.force_history import force_history as force_history
-from thud.report.history_figure import draw_history as draw_history
 from thud.plot.impedance import ball_impedances as ball_impedances
 from thud.plot.level_changes import level_changes as level_changes
 from thud.plot.levels import levels as levels
-from thud.plot.look import COLOURS as COLOURS
-from thud.plot.look import FORMATS as FORMATS
-from thud.plot.look import LINES as LINES
-from thud.plot.look import MARKERS as MARKERS
-from thud.plot.look import SIZE as SIZE
-from thud.plot.look import WIDTH as WIDTH
-from thud.plot.look import add_curves as add_curves
-from thud.plot.look import dress as dress
-from thud.plot.look import empty_axes as empty_axes
-from thud.plot.look import legend_above as legend_above
-from thud.plot.look import octave_axis as octave_axis
-from thud.plot.look import picture_files as picture_files
-from thud.plot.look import save as save
-from thud.plot.look import save_all as save_all
+from thud.plot.look import (
+    COLOURS as COLOURS,
+    FORMATS as FORMATS,
+    LINES as LINES,
+    MARKERS as MARKERS,
+    SIZE as SIZE,
+    WIDTH as WIDTH,
+    add_curves as add_curves,
+    dress as dress,
+    empty_axes as empty_axes,
+    legend_above as legend_above,
+    octave_axis as octave_axis,
+    picture_files as picture_files,
+    save as save,
+    save_all as save_all,
+)
 from thud.plot.loss_factor import loss_factor as loss_factor
 from thud.plot.mobility_fit import mobility_fit as mobility_fit
 from thud.plot.modes import mode_shapes as mode_shapes
-from thud.plot.motion import animate as animate
-from thud.plot.motion import motion as motion
+from thud.plot.motion import animate as animate, motion as motion
 from thud.plot.plate_modes import plate_modes as plate_modes
-from thud.plot.prediction import draw_decay as draw_decay
-from thud.plot.prediction import draw_prediction as draw_prediction
-from thud.plot.recording import recording_forces as recording_forces
-from thud.plot.recording import recording_levels as recording_levels
+from thud.plot.prediction import draw_decay as draw_decay, draw_prediction as draw_prediction
+from thud.plot.recording import (
+    recording_forces as recording_forces,
+    recording_levels as recording_levels,
+)
 from thud.plot.room import room_levels as room_levels
 from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
 from thud.plot.surrogate import draw_surrogate as draw_surrogate

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 from matplotlib.figure import Figure
 
-from thud.base.schema import Ball, FiniteElement
 from thud.base.checks import require_kind
-from thud.impact.compression import CompressionCurve, compress
 from thud.base.errors import InputError
+from thud.base.schema import Ball, FiniteElement
+from thud.impact.compression import CompressionCurve, compress
 from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style
 
 

@@ -2,12 +2,13 @@
 
 from functools import cache, lru_cache
 
-from thud.base.schema import Ball, InfinitePlate
-from thud.impact.impact import Impact, solve
+from thud.base.schema import Ball, FiniteElementViscosity, InfinitePlate
+from thud.impact.impact import Impact
+from thud.impact.solve import solve
 
 
 @lru_cache(maxsize=4)
-def solve_published(viscosity: str = "fractional") -> Impact:
+def solve_published(viscosity: FiniteElementViscosity = "fractional") -> Impact:
     """Return the impact of the ball of the published modes by finite elements."""
     return solve(Ball.standard(), model="finite_element", viscosity=viscosity)
 

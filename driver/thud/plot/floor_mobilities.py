@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.schema import FloatingFloor, FloorOptions, JoistFloor, Plate
 from thud.base.checks import refuse_value, require_kind
+from thud.base.schema import FloatingFloor, FloorOptions, JoistFloor, Plate
 from thud.impact.mobility import mobility
 from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style
 

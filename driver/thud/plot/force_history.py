@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from thud.base.schema import Drop, LevelsForce
-from thud.impact.impact import Impact, solve
+from thud.impact.impact import Impact
+from thud.impact.solve import solve
 from thud.level.levels import record_force
 from thud.plot.examples import solve_published
 from thud.plot.look import (

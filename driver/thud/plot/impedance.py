@@ -10,7 +10,7 @@ from matplotlib.ticker import FixedLocator, NullLocator
 from thud.base.schema import FloatingFloor, JoistFloor, Plate
 from thud.floors.impedance import ball_impedance
 from thud.impact.mobility import mobility
-from thud.impact.impact import solve
+from thud.impact.solve import solve
 from thud.plot.examples import solve_published
 from thud.plot.look import (
     COLOURS,

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from thud.base.schema import LevelsForce, ModalBall
-from thud.impact.impact import Impact, solve
+from thud.impact.impact import Impact
+from thud.impact.solve import solve
 from thud.plot.look import (
     SIZE,
     empty_axes,

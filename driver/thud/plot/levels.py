@@ -8,9 +8,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud.base.schema import Ball, BandSet, Drop, Levels, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.checks import refuse
-from thud.impact.impact import Impact, solve
+from thud.base.schema import (
+    Ball,
+    BandSet,
+    Drop,
+    HollowSphereMomentumFlux,
+    Levels,
+    LevelsForce,
+    LevelsMethod,
+    LimitsSource,
+)
+from thud.impact.impact import Impact
+from thud.impact.solve import solve
 from thud.level.levels import octave_limits
 from thud.plot.look import (
     SIZE,
@@ -162,7 +172,12 @@ def _draw_tyres() -> Figure:
 
 def _draw_fluxes() -> Figure:
     """Draw the interpretations of the flux term of the paper."""
-    choices = ("momentum_balance", "retarding", "conservative", "none")
+    choices: tuple[HollowSphereMomentumFlux, ...] = (
+        "momentum_balance",
+        "retarding",
+        "conservative",
+        "none",
+    )
     impacts = {choice.replace("_", " "): solve(momentum_flux=choice) for choice in choices}
     return levels(impacts, "elastic")
 

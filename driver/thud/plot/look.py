@@ -16,11 +16,11 @@ from matplotlib.legend import Legend
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
-from thud.base.schema import BandSet, LevelsForce
 from thud.base.checks import require_kind, shown
 from thud.base.display import draw_all, left_out
 from thud.base.errors import InputError
 from thud.base.files import Results, replace_file
+from thud.base.schema import BandSet, LevelsForce
 from thud.impact.impact import Impact
 from thud.level.levels import get_bands
 from thud.recordings.recording import Recording

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from thud.base.schema import FiniteElement
 from thud.base.errors import InputError
+from thud.base.schema import FiniteElement
 from thud.impact.free_modes import loss_factors
 from thud.impact.impact import Impact
 from thud.plot.look import SIZE, add_curves, empty_axes, legend_above, own_style

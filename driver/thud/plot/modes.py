@@ -7,8 +7,8 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from thud.base.schema import Ball
 from thud.base.checks import require_kind
+from thud.base.schema import Ball
 from thud.impact.free_modes import FreeModes, free_modes
 from thud.plot.half_section import add_colour_bar, draw_section, require_panels
 from thud.plot.look import SIZE, WIDTH, new_figure, own_style

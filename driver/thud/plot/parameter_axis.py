@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
+from thud.base.units import handy_unit
 from thud.case.keys import plain_words
 from thud.plot.look import SIZE
-from thud.base.units import handy_unit
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.schema import Plate
 from thud.base.checks import require_kind, require_whole
+from thud.base.schema import Plate
 from thud.floors.modal_room import plate_frequencies
 from thud.plot.look import SIZE, WIDTH, new_figure, own_style
 

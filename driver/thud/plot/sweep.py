@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from thud.impact.impact import FORCES
 from thud.case.keys import plain_words
-from thud.level.levels import BANDWIDTHS, get_bands, octave_limits
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands, octave_limits
 from thud.plot.look import (
     COLOURS,
     FORCE_WORDS,

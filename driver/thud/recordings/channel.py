@@ -162,3 +162,8 @@ class BoundedFile:
     def close(self) -> None:
         """Close the file."""
         self.file.close()
+
+
+def channel_of(text: str | None) -> int | str | None:
+    """Return the number or the name of a channel."""
+    return int(text) if text is not None and text.isdecimal() else text

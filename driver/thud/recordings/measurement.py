@@ -14,12 +14,12 @@ from tqdm import tqdm
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
+from thud.base.threads import limit_threads, one_thread
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import measure_drop
 from thud.recordings.kept import KeptDrops
 from thud.recordings.plate_correction import correct_window
 from thud.recordings.ringing import tell_ringing
-from thud.base.threads import limit_threads, one_thread
 
 if TYPE_CHECKING:
     import os

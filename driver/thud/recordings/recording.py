@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.base.display import MAKERS, Displayed
+from thud.base.display import Displayed
 from thud.recordings.config import Config, checked_config
 from thud.recordings.excursion import doubt, scan
 from thud.recordings.levels import average_levels, compare_methods, measure_levels
@@ -328,28 +328,9 @@ class Recording(Displayed):
 
     def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
-        figure: Figure = MAKERS["recording"](self, what)
-        return figure
+        from thud.plot.recording import recording_figure
 
-    def report(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
-        """Write the calibration report to a directory and return the paths of its files.
-
-        Files that thud has not written are replaced with `replace` only.
-
-        Raises
-        ------
-        InputError
-            Where a file is in the way.
-        OSError
-            Where they cannot be written.
-
-        Warns
-        -----
-        ReportWarning
-            Where there is no PDF, or no font for some letters.
-        """
-        paths: list[Path] = MAKERS["report"](self, directory, replace=replace)
-        return paths
+        return recording_figure(self, what)
 
     def to_force_history(self, drop: int = 1) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return time since first touch, s, and force, N, of one contact, shape (n_sample,).

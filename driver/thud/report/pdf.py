@@ -31,8 +31,8 @@ def html_to_pdf(page: str) -> bytes:
         # WeasyPrint prints where one is missing.
         for library in LIBRARIES:
             ctypes.CDLL(library)
-        from weasyprint import HTML  # noqa: PLC0415 - optional
-        from weasyprint.urls import URLFetcher  # noqa: PLC0415
+        from weasyprint import HTML
+        from weasyprint.urls import URLFetcher
     except OSError as error:
         raise ImportError(str(error)) from error
     # Fonts have tables that it does not use, and says so.

@@ -187,7 +187,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     }
     if figures and _has_matplotlib():
         # It takes its time.
-        from thud.plot.look import picture_files  # noqa: PLC0415
+        from thud.plot.look import picture_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
         contents |= page_contents(data, list(drawn.values()), results.folder)
@@ -198,7 +198,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
 def _has_matplotlib() -> bool:
     """Return whether figures can be drawn at all; warn where they cannot."""
     with left_out("the page"):
-        import matplotlib as mpl  # noqa: PLC0415 - takes its time
+        import matplotlib as mpl
 
         return bool(mpl.__version__)
     return False
@@ -208,7 +208,7 @@ def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
     """Return the content of the NetCDF file by its name; warn where xarray is missing."""
     try:
         with require_extra("studies"):
-            from thud.report.dataset import netcdf  # noqa: PLC0415 - optional
+            from thud.report.dataset import netcdf
     except InputError as error:
         message = f"{folder}: {DATASET} is not written: {error}"
         warnings.warn(message, ReportWarning, stacklevel=3)

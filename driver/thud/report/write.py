@@ -54,7 +54,7 @@ def write_report(
         where the report of another recording is replaced.
     """
     # SciPy takes its time.
-    from thud.report.data import report_data  # noqa: PLC0415
+    from thud.report.data import report_data
 
     folder, data = Path(directory), report_data(recording)
     figures = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
@@ -74,9 +74,9 @@ def page_contents(
 
     Warn where there is no PDF, or no font for some letters; the folder is for the message.
     """
-    from thud.report.fonts import missing_characters  # noqa: PLC0415 - they take their time
-    from thud.report.page import page_text, report_page  # noqa: PLC0415
-    from thud.report.pdf import NEEDED, html_to_pdf  # noqa: PLC0415
+    from thud.report.fonts import missing_characters
+    from thud.report.page import page_text, report_page
+    from thud.report.pdf import NEEDED, html_to_pdf
 
     page = report_page(data, figures, hashlib.sha256(json_bytes(data)).hexdigest())
     contents = {HTML: page.encode()}
@@ -119,7 +119,7 @@ def _checksums(data: dict[str, Any]) -> list[str]:
 
 def _earlier(folder: Path) -> list[str] | None:
     """Return the checksums of the recording whose report is in a directory; None of none."""
-    from thud.report.data import FORMAT  # noqa: PLC0415 - SciPy takes its time
+    from thud.report.data import FORMAT
 
     try:
         data = json.loads(content_of(folder / JSON) or "")

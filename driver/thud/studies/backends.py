@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base.bridge import api
 from thud.base.checks import refuse, refuse_value, require_choice, require_whole, shown
-from thud.impact.ensemble import MAX_THREADS
 from thud.base.errors import NumericalError, ThudError, WorkerWarning
 from thud.base.extras import require_extra
 from thud.base.processes import no_interrupt_in_processes, process_pool
+from thud.impact.ensemble import MAX_THREADS
 from thud.studies.evaluation import Block, evaluate
 
 if TYPE_CHECKING:
@@ -153,9 +153,9 @@ def _no_look() -> None:
 @contextmanager
 def _dask(address: str) -> Iterator[tuple[Executor, int, Callable[[], None]]]:
     with require_extra("dask"):
-        from distributed import Client  # noqa: PLC0415 - an optional package
-        from distributed.comm.addressing import parse_address  # noqa: PLC0415
-        from distributed.comm.registry import get_backend  # noqa: PLC0415
+        from distributed import Client
+        from distributed.comm.addressing import parse_address
+        from distributed.comm.registry import get_backend
     with _silent("distributed", "tornado", "asyncio"):
         try:
             # A client of an unknown kind of address would fail again when deleted.

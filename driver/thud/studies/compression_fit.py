@@ -10,12 +10,12 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
-from thud.base.schema import Ball, Compression
 from thud.base.checks import require_array, require_real
-from thud.impact.compression import CompressionCurve, compress
 from thud.base.display import Displayed
 from thud.base.errors import FitWarning, InputError, NumericalError
 from thud.base.key import check_keywords
+from thud.base.schema import Ball, Compression
+from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.inference import coverage_factor
 from thud.studies.fitting.residual_tests import runs_doubt
 

@@ -6,12 +6,12 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.case.case import Case
 from thud.base.checks import refuse
 from thud.base.display import Displayed
+from thud.case.case import Case
 from thud.case.keys import DENSITY
+from thud.impact.datasets import coordinate
 from thud.impact.outcomes import RATING
-from thud.studies.dataset import coordinate
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume
 
@@ -100,12 +100,12 @@ class DesignMapKind(SetKind[DesignMap]):
 
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:
         """Return the map of all sets."""
-        first, second = map(coordinate, study.parameters)
+        first, second = (coordinate(p.name, p.key) for p in study.parameters)
         return DesignMap(dataset.load().sortby([first, second]), (first, second), *_mark(study))
 
     def draw(self, result: DesignMap) -> Figure:
         """Return the margin over both parameters."""
-        from thud.plot import draw_design_map  # noqa: PLC0415 - takes its time
+        from thud.plot import draw_design_map
 
         return draw_design_map(result)
 

@@ -78,7 +78,7 @@ def unit_sets(  # noqa: PLR0913, PLR0917 - the numbers of a design
         generator = np.random.PCG64(seed).advance(start * dimension)
         return np.random.Generator(generator).random((stop - start, dimension))
     if design == "sobol":
-        from scipy.stats import qmc  # noqa: PLC0415 - takes its time
+        from scipy.stats import qmc
 
         points = qmc.Sobol(dimension, rng=seed)
         if start:
@@ -101,10 +101,10 @@ def _whole(design: str, dimension: int, size: int, seed: int) -> NDArray[np.floa
 
 def _drawn(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
     if design == "latin_hypercube":
-        from scipy.stats import qmc  # noqa: PLC0415 - takes its time
+        from scipy.stats import qmc
 
         return _float(qmc.LatinHypercube(dimension, rng=seed).random(size))
-    from SALib.sample import sobol as saltelli  # noqa: PLC0415 - takes its time
+    from SALib.sample import sobol as saltelli
 
     cube = {
         "num_vars": dimension,

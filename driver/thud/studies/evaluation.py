@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base import schema
 from thud.base.bridge import version
 from thud.base.checks import refuse
+from thud.impact.datasets import LEVELS, OUTCOMES
 from thud.impact.ensemble import solve_many
-from thud.impact.impact import FORCES
-from thud.level.levels import BANDWIDTHS, peak_count
 from thud.impact.outcomes import FURTHER
+from thud.level.levels import BANDWIDTHS, peak_count
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,17 +22,6 @@ if TYPE_CHECKING:
     from thud.studies.emulation.surrogate import Surrogate
 
     Columns = dict[str, NDArray[Any]]
-
-# Force and bands of the levels that a set may have, by name.
-LEVELS = {
-    f"{force}_level" if bands == BANDWIDTHS[0] else f"{force}_{bands}_level": (force, bands)
-    for bands in BANDWIDTHS
-    for force in FORCES
-}
-# Unit and meaning of the numbers of each set, by name.
-SCALARS = {
-    name: (schema.SCALARS[name][0] or "1", schema.SCALARS[name][1]) for name in schema.OUTCOMES
-}
 
 
 @dataclass(frozen=True)
@@ -55,7 +43,7 @@ class Block:
 def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
-    Returns the `SCALARS`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
+    Returns the `OUTCOMES`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
     ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and the like, and
     `FURTHER`; of a surrogate ``doubtful``; where they are counted,
     the ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
@@ -69,7 +57,7 @@ def evaluate(block: Block) -> Columns:
     if block.surrogate:
         return block.surrogate.predict(block.case, block.columns)
     found = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
-    columns: Columns = {name: getattr(found, name) for name in SCALARS}
+    columns: Columns = {name: getattr(found, name) for name in OUTCOMES}
     for name, (force, bands) in level_names(block.case).items():
         columns[name] = found.levels[force, bands]
     columns |= {f"contact_{bands}_level": level for bands, level in found.contact_levels.items()}

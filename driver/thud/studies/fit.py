@@ -9,7 +9,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Unpack
 
-from thud.case.case import Case, check_case
 from thud.base.checks import (
     LARGEST_SEED,
     refuse,
@@ -20,6 +19,8 @@ from thud.base.checks import (
 from thud.base.errors import FitWarning, InputError
 from thud.base.files import read_input
 from thud.base.key import check_keywords
+from thud.base.units import scaled
+from thud.case.case import Case, check_case
 from thud.studies.directory import FORMATS
 from thud.studies.emulation.answered_levels import answered, confirmed, within_region
 from thud.studies.emulation.plan import read_plan
@@ -32,12 +33,10 @@ from thud.studies.fitting.result import Fit, file_ends
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
-from thud.base.units import scaled
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Sequence
-    from collections.abc import Set as AbstractSet
+    from collections.abc import Iterable, Sequence, Set as AbstractSet
     from pathlib import Path
 
     from matplotlib.figure import Figure

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud.case.case import Case
     from thud.base.files import Results
+    from thud.case.case import Case
     from thud.case.keys import Value
     from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.parameter import Parameter

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base.checks import require_choice
-from thud.base.errors import InputError
 from thud.base.extras import require_extra
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from types import ModuleType
 
     from thud.studies.kind import Kind
@@ -44,44 +42,12 @@ KINDS = {
     "surrogate": Entry("surrogate", "what other studies ask instead of a slow model"),
     "fit": Entry("fit", "parameters of a model from a force or from levels", has_sets=False),
 }
-# Public names by the modules of this package.
-PUBLIC = {entry.module: entry.module for entry in KINDS.values()} | {
-    "DesignMap": "design_map",
-    "Fit": "fitting.result",
-    "ForceTarget": "fitting.force_target",
-    "LevelTarget": "fitting.level_target",
-    "Parameter": "parameter",
-    "Sensitivity": "sensitivity",
-    "Study": "study",
-    "Surrogate": "emulation.surrogate",
-    "Uncertainty": "uncertainty",
-    "read_study": "kinds",
-    "read_surrogate": "emulation.surrogate",
-    "read_sweep": "blocks",
-}
 
 
 def load(module: str) -> ModuleType:
     """Return a module of this package. Raises InputError where its dependencies are missing."""
     with require_extra("studies"):
         return importlib.import_module(f"thud.studies.{module}")
-
-
-def public(name: str) -> object:
-    """Return a public object; where its packages are missing, a function that says so."""
-    try:
-        return getattr(load(PUBLIC[name]), name)
-    except InputError as error:
-        return _missing(str(error))
-
-
-def _missing(sentence: str) -> Callable[..., NoReturn]:
-    # Without them, dir, help and star imports still work.
-    def missing(*_: object, **__: object) -> NoReturn:
-        raise InputError(sentence)
-
-    missing.__doc__ = f"Not available: {sentence}."
-    return missing
 
 
 def get_kind(name: str) -> Kind[Any, Any]:

@@ -22,8 +22,8 @@ from thud.base.checks import (
 )
 from thud.base.immutable import Plain
 from thud.base.key import Key
-from thud.case.keys import Value, find_key
 from thud.base.units import power_of, scaled
+from thud.case.keys import Value, find_key
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -10,9 +10,9 @@ import xarray as xr
 
 from thud.base.checks import refuse
 from thud.base.display import Displayed
-from thud.level.levels import get_bands
+from thud.impact.datasets import coordinate
 from thud.impact.outcomes import FURTHER
-from thud.studies.dataset import coordinate
+from thud.level.levels import get_bands
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind
 
@@ -109,7 +109,7 @@ class SensitivityKind(SetKind[Sensitivity]):
 
     def draw(self, result: Sensitivity) -> Figure:
         """Return the indices as bars."""
-        from thud.plot import draw_sensitivity  # noqa: PLC0415 - takes its time
+        from thud.plot import draw_sensitivity
 
         return draw_sensitivity(result)
 
@@ -181,7 +181,10 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
         # As the indices, none where nothing varies.
         spread[spread <= _ROUNDING] = np.nan
         variables["surrogate"] = ("output", known / spread, meaning)
-    names = {"output": list(outputs), "parameter": list(map(coordinate, study.parameters))}
+    names = {
+        "output": list(outputs),
+        "parameter": [coordinate(p.name, p.key) for p in study.parameters],
+    }
     left_out = int((~usable).sum())
     return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)
 
@@ -194,7 +197,7 @@ def sobol_indices(
     `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is
     that of the resampling. Indices have shape (dimension,), and are NaN where nothing varies.
     """
-    from SALib.analyze import sobol  # noqa: PLC0415 - takes its time
+    from SALib.analyze import sobol
 
     # Rounding errors are not variance; a surrogate may withhold a quantity.
     if not np.ptp(values) > 1e-12 * np.abs(values).max():

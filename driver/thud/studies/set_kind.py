@@ -7,8 +7,9 @@ from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
-from thud.base.schema import KEYS
 from thud.base.checks import refuse, require_choice
+from thud.base.schema import KEYS
+from thud.base.tables import format_rows
 from thud.case.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
 from thud.studies.blocks import read_identity, result_names
@@ -24,7 +25,6 @@ from thud.studies.parameter import varied
 from thud.studies.sets import SetStudy
 from thud.studies.study import table_of
 from thud.studies.temperature import read_temperature
-from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import os
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from thud.case.case import Case
     from thud.base.files import Results
+    from thud.case.case import Case
     from thud.case.keys import Value
     from thud.studies.kind import How
     from thud.studies.parameter import Parameter

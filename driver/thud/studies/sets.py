@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from thud.impact.ensemble import get_cost
 from thud.case.keys import DENSITY
+from thud.impact.ensemble import get_cost
 from thud.studies.designs import makers, unit_sets
 from thud.studies.study import Study, wall_volume
 

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud.case.case import Case
     from thud.base.files import Results
+    from thud.case.case import Case
     from thud.case.keys import Value
     from thud.studies.kind import How
     from thud.studies.sets import SetStudy
@@ -78,7 +78,7 @@ class SurrogateKind(DropsKind[Surrogate]):
 
     def draw(self, result: Surrogate) -> Figure:
         """Return the errors of the held-out drops."""
-        from thud.plot import draw_surrogate  # noqa: PLC0415 - takes its time
+        from thud.plot import draw_surrogate
 
         return draw_surrogate(result)
 

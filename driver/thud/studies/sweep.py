@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Unpack
 
 import xarray as xr
 
+from thud.base.tables import format_rows
 from thud.level.levels import BANDWIDTHS
 from thud.studies.set_kind import SetKind
-from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     import os
@@ -47,7 +47,7 @@ class Sweep(SetKind[xr.Dataset]):
 
     def draw(self, result: xr.Dataset) -> Figure:
         """Return levels against the first numeric parameter."""
-        from thud.plot import draw_sweep  # noqa: PLC0415 - takes its time
+        from thud.plot import draw_sweep
 
         return draw_sweep(result)
 

@@ -11,8 +11,8 @@ from scipy.stats import binomtest
 
 from thud.base.checks import refuse
 from thud.base.display import Displayed
-from thud.level.levels import get_bands, octave_limits
 from thud.impact.outcomes import RATING
+from thud.level.levels import get_bands, octave_limits
 from thud.studies.set_kind import SetKind
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ class UncertaintyKind(SetKind[Uncertainty]):
 
     def draw(self, result: Uncertainty) -> Figure:
         """Return the distribution of the levels."""
-        from thud.plot import draw_uncertainty  # noqa: PLC0415 - takes its time
+        from thud.plot import draw_uncertainty
 
         return draw_uncertainty(result)
 

@@ -10,7 +10,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.immutable import freeze
-from thud.impact.impact import Impact, compute
+from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS
 from thud.studies.fitting.level_target import LevelMisfit
 from thud.studies.study import value_in
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.case.case import Case
+    from thud.impact.impact import Impact
     from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range

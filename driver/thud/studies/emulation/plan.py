@@ -47,7 +47,7 @@ class Plan:
     def identity(self) -> dict[str, str]:
         """What a surrogate depends on besides its drops, as texts by place and key."""
         with require_extra("surrogate"):
-            import sklearn  # noqa: PLC0415 - optional
+            import sklearn
         return {
             "scikit-learn_version": sklearn.__version__,
             **{f"[surrogate] {word}": f"{value!r}" for word, value in vars(self).items()},

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.stats import binom
 
 from thud.base.bridge import version
-from thud.case.case import Case, case_text
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.base.files import is_failure, read_input, replace_file
+from thud.case.case import Case, case_text
 from thud.case.keys import OF_FILES, put
 from thud.level.levels import get_bands
 from thud.studies.emulation.verdict import judge_many
@@ -206,7 +206,7 @@ class Surrogate(Displayed):
         """
         self.require(case, columns)
         with require_extra("surrogate"):
-            from sklearn.gaussian_process.kernels import Matern  # noqa: PLC0415 - optional
+            from sklearn.gaussian_process.kernels import Matern
 
         count = len(next(iter(columns.values())))
         given = {n: np.asarray(columns.get(n, value_in(case, n))) for n in self.keys}

@@ -13,7 +13,9 @@ from scipy.linalg import cho_solve
 from thud.base.checks import refuse
 from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
+from thud.base.threads import one_thread
 from thud.case.keys import find_key
+from thud.impact.datasets import LEVELS, OUTCOMES
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
 from thud.studies.designs import unit_sets
@@ -23,10 +25,8 @@ from thud.studies.emulation.surrogate import (
     Surrogate,
     read_surrogate,
 )
-from thud.studies.evaluation import LEVELS, SCALARS
 from thud.studies.parameter import Parameter
 from thud.studies.sets import SetStudy
-from thud.base.threads import one_thread
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -157,7 +157,7 @@ def _learn(
             f"the number of peaks differs among the drops of the surrogate ({listed} drops)",
             "ranges in which it is the same: a count cannot be interpolated",
         )
-    quantities = {str(n): _decibels(str(n), v) for n, v in whole.items() if n in SCALARS | LEVELS}
+    quantities = {str(n): _decibels(str(n), v) for n, v in whole.items() if n in OUTCOMES | LEVELS}
     region = np.array([(p.low, p.high) for p in drops.parameters])
     points = unit_sets(drops.design, len(region), drops.size, drops.seed, 0, drops.size)
     points[:, region[:, 0] == region[:, 1]] = 0.0
@@ -194,9 +194,9 @@ def regress(points: Values, values: Values, judged: NDArray[np.bool_]) -> dict[s
     `Surrogate`: length, weights, mean, scale, residuals.
     """
     with require_extra("surrogate"):
-        from sklearn.exceptions import ConvergenceWarning  # noqa: PLC0415 - optional
-        from sklearn.gaussian_process import GaussianProcessRegressor  # noqa: PLC0415
-        from sklearn.gaussian_process.kernels import (  # noqa: PLC0415
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import (
             ConstantKernel,
             Matern,
             WhiteKernel,

@@ -9,8 +9,8 @@ import numpy as np
 
 from thud.base.checks import refuse, refuse_value, require_choice, require_number, require_whole
 from thud.base.immutable import Immutable
-from thud.impact.impact import FORCES, Impact
-from thud.level.levels import RECORDED_BAND
+from thud.impact.impact import Impact
+from thud.level.levels import FORCES, RECORDED_BAND
 from thud.recordings.record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
 from thud.studies.fitting.force_misfit import ForceMisfit

@@ -10,8 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse, require_choice, shown
 from thud.base.immutable import Plain, freeze
-from thud.impact.impact import FORCES
-from thud.level.levels import BANDWIDTHS, get_bands
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.misfit import Misfit, numbers, require_positive
 
 # Relative step of the derivatives of a contact time: its end moves from ring to ring of the modal

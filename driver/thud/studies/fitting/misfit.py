@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from thud.base.checks import refuse_value, require_number
-from thud.impact.impact import compute
+from thud.impact.compute import compute
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

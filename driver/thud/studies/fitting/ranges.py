@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base.schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
 from thud.base.errors import InputError
+from thud.base.schema import KEYS
 from thud.case.keys import limits, put, users
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:
-    from thud.case.case import Case
     from thud.base.key import Key
+    from thud.case.case import Case
     from thud.studies.parameter import Parameter
 
 # A start at a limit is moved away from it by this part of itself.

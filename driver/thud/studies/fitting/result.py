@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 
 from thud.base.bridge import version
-from thud.case.case import case_text
 from thud.base.display import Displayed, left_out
 from thud.base.files import Results
 from thud.base.immutable import Immutable
 from thud.base.key import check_keywords
-from thud.studies.fitting.inference import coverage_factor
-from thud.studies.fitting.misfit import SHIFT
 from thud.base.tables import format_rows
 from thud.base.units import handy_unit
+from thud.case.case import case_text
+from thud.studies.fitting.inference import coverage_factor
+from thud.studies.fitting.misfit import SHIFT
 
 if TYPE_CHECKING:
     import os
@@ -322,7 +322,7 @@ class Fit(Displayed):
 
     def figures(self, units: Units | None = None) -> dict[str, Figure]:
         """Return the figures by name; `units` as in `table`."""
-        from thud.plot import draw_fit  # noqa: PLC0415 - matplotlib takes its time
+        from thud.plot import draw_fit
 
         return draw_fit(self, self.shown_units(units))
 
@@ -358,7 +358,7 @@ class Fit(Displayed):
         contents = self.files()
         if figures:
             with left_out("the figure of the fit"):
-                from thud.plot import picture_files  # noqa: PLC0415 - Matplotlib takes its time
+                from thud.plot import picture_files
 
                 contents |= picture_files(self.figures(units))
         return Results(Path(directory), "fit", replace=replace).write(contents)

@@ -11,6 +11,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
 from thud.base.errors import InputError, NumericalError, ThudError
+from thud.base.units import handy_unit
 from thud.studies.fitting.inference import (
     INSEPARABLE,
     Inference,
@@ -25,7 +26,6 @@ from thud.studies.fitting.inference import (
 from thud.studies.fitting.objective import Objective, new_parts
 from thud.studies.fitting.residual_tests import UNLIKELY
 from thud.studies.fitting.result import Fit, FittedTarget
-from thud.base.units import handy_unit
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -1,0 +1,149 @@
+from . import plot as plot
+from .base.errors import (
+    FitWarning as FitWarning,
+    InputError as InputError,
+    LockWarning as LockWarning,
+    NumericalError as NumericalError,
+    PlausibilityWarning as PlausibilityWarning,
+    ThudError as ThudError,
+    WorkerWarning as WorkerWarning,
+)
+from .base.units import quantity as quantity
+from .case.case import (
+    Case as Case,
+    read_case as read_case,
+    write_case as write_case,
+)
+from .comparison.comparison import (
+    Comparison as Comparison,
+    compare as compare,
+    read_all as read_all,
+)
+from .floors.floor_comparison import (
+    FloorComparison as FloorComparison,
+    compare_floors as compare_floors,
+)
+from .floors.impedance import (
+    BallImpedance as BallImpedance,
+    ball_impedance as ball_impedance,
+)
+from .floors.mobility_fit import (
+    MobilityFit as MobilityFit,
+    fit_mobility as fit_mobility,
+)
+from .floors.modal_room import (
+    ModalRoom as ModalRoom,
+    modal_room as modal_room,
+)
+from .floors.prediction import (
+    RoomPrediction as RoomPrediction,
+    predict_level as predict_level,
+)
+from .floors.survey import (
+    RoomLevels as RoomLevels,
+    read_room_levels as read_room_levels,
+)
+from .floors.tapping import (
+    TappingLevel as TappingLevel,
+    tapping_level as tapping_level,
+)
+from .impact.compression import (
+    CompressionCurve as CompressionCurve,
+    compress as compress,
+)
+from .impact.compute import solve_case as solve_case
+from .impact.ensemble import solve_many as solve_many
+from .impact.floor_impact import (
+    FloorEnergy as FloorEnergy,
+    FloorImpact as FloorImpact,
+)
+from .impact.free_modes import (
+    FreeModes as FreeModes,
+    free_modes as free_modes,
+    loss_factors as loss_factors,
+)
+from .impact.impact import Impact as Impact
+from .impact.mobility import mobility as mobility
+from .impact.motion import Motion as Motion
+from .impact.outcomes import Ensemble as Ensemble
+from .impact.results import read_results as read_results
+from .impact.solve import solve as solve
+from .level.criteria import (
+    Conformity as Conformity,
+    Criterion as Criterion,
+)
+from .level.levels import (
+    Bands as Bands,
+    force_exposure_levels as force_exposure_levels,
+    get_bands as get_bands,
+    judge as judge,
+)
+from .level.rating import (
+    Rating as Rating,
+    rating as rating,
+    standardised_level as standardised_level,
+)
+from .recordings.read_recording import read_recording as read_recording
+from .recordings.recording import Recording as Recording
+from .report.write import write_report as write_report
+from .studies.blocks import read_sweep as read_sweep
+from .studies.compression_fit import (
+    CompressionFit as CompressionFit,
+    fit_compression as fit_compression,
+)
+from .studies.design_map import (
+    DesignMap as DesignMap,
+    design_map as design_map,
+)
+from .studies.emulation.surrogate import (
+    Surrogate as Surrogate,
+    read_surrogate as read_surrogate,
+)
+from .studies.fit import fit as fit
+from .studies.fitting.force_target import ForceTarget as ForceTarget
+from .studies.fitting.level_target import LevelTarget as LevelTarget
+from .studies.fitting.result import Fit as Fit
+from .studies.kinds import read_study as read_study
+from .studies.parameter import Parameter as Parameter
+from .studies.sensitivity import (
+    Sensitivity as Sensitivity,
+    sensitivity as sensitivity,
+)
+from .studies.study import Study as Study
+from .studies.surrogate import surrogate as surrogate
+from .studies.sweep import sweep as sweep
+from .studies.uncertainty import (
+    Uncertainty as Uncertainty,
+    uncertainty as uncertainty,
+)
+
+__version__: str
+
+# Made by ./bootstrap schema.
+from .base.schema import (
+    Ball as Ball,
+    Compression as Compression,
+    Drop as Drop,
+    FiniteElement as FiniteElement,
+    FloatingFloor as FloatingFloor,
+    FloorName as FloorName,
+    FloorOptions as FloorOptions,
+    HollowSphere as HollowSphere,
+    HuntCrossley as HuntCrossley,
+    InfinitePlate as InfinitePlate,
+    JoistFloor as JoistFloor,
+    Levels as Levels,
+    Limits as Limits,
+    MeasuredMobility as MeasuredMobility,
+    MeasuredModes as MeasuredModes,
+    ModalBall as ModalBall,
+    ModelName as ModelName,
+    ModelOptions as ModelOptions,
+    Modes as Modes,
+    Oscillator as Oscillator,
+    Plate as Plate,
+    Rigid as Rigid,
+    Room as Room,
+    Sampling as Sampling,
+    TwoMass as TwoMass,
+)

@@ -1,0 +1,43 @@
+"""Impacts of cases, and from bundles of the library."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from thud.base.bridge import api, call, text
+from thud.base.checks import require_kind
+from thud.base.errors import InputError, PlausibilityWarning
+from thud.case.case import Case, case_text
+from thud.impact.floor_impact import new_floor_impact
+from thud.impact.impact import Impact, history
+
+if TYPE_CHECKING:
+    from thud.base.bridge import Bundle
+
+
+def solve_case(case: Case) -> Impact:
+    """Compute the impact of a case; see `solve`."""
+    impact = compute(case)
+    for remark in impact.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
+    return impact
+
+
+def compute(case: Case) -> Impact:
+    """Compute the impact of a case without warnings."""
+    require_kind("case", case, Case)
+    if case.model is None:
+        message = "&model is missing; allowed: a case with a source model"
+        raise InputError(message)
+    # Free modes and compression of the case have their own functions.
+    plain = replace(case, modes=None, compression=None)
+    return new_impact(case, call(api.solve, case_text(plain)))
+
+
+def new_impact(case: Case, found: Bundle) -> Impact:
+    """Return the impact in a bundle of the library."""
+    remarks = tuple(map(text, found.get("remarks", {}).values()))
+    common = history(case, found, remarks)
+    return Impact(**common, on_floor=new_floor_impact(case, found, common["floor_force"]))

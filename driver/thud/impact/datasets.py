@@ -1,0 +1,159 @@
+"""Impacts and ensembles as datasets of xarray: names, units and meanings, which studies share."""
+
+from __future__ import annotations
+
+import platform
+import re
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from thud.base import schema
+from thud.base.bridge import compiler, version
+from thud.case.keys import find_key, users
+from thud.impact.outcomes import FURTHER, ROOM_LEVEL
+from thud.level.levels import BANDWIDTHS, FORCES, get_bands
+from thud.level.rating import rated_bands
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from numpy.typing import NDArray
+
+    from thud.base.key import Key
+    from thud.base.schema import BandSet
+    from thud.case.case import Case
+    from thud.impact.impact import Impact
+    from thud.impact.outcomes import Ensemble
+
+# Force and bands of the levels that a set may have, by name.
+LEVELS = {
+    f"{force}_level" if bands == BANDWIDTHS[0] else f"{force}_{bands}_level": (force, bands)
+    for bands in BANDWIDTHS
+    for force in FORCES
+}
+# Unit and meaning of the numbers of each set, by name.
+OUTCOMES = {
+    name: (schema.SCALARS[name][0] or "1", schema.SCALARS[name][1]) for name in schema.OUTCOMES
+}
+_LEVEL = "force exposure level of the {} force, re 1 N and 1 s"
+# Dimensions that are bands: those of the levels, and the thirds in a room.
+BANDS = (*BANDWIDTHS, ROOM_BAND := "room_third")
+MEANINGS = {
+    **OUTCOMES,
+    **{name: ("dB", _LEVEL.format(force)) for name, (force, _) in LEVELS.items()},
+    "margin": ("dB", "minimum distance of the judged octave levels to a limit, positive inside"),
+    "conforms": ("1", "all criteria of the standard are met"),
+    "status": ("1", "0: computed; otherwise the exit code of the error"),
+    "reason": ("1", "why there are no results"),
+}
+# Those and what only sets on floors, of a surrogate, and of its training, have.
+CONTACT = {f"contact_{bands}_level": bands for bands in BANDWIDTHS}
+ALL = {
+    **MEANINGS,
+    **dict.fromkeys(CONTACT, ("dB", "force exposure level on the floor that moves, re 1 N, 1 s")),
+    **FURTHER,
+    "doubtful": ("1", "the verdict could change by the errors of the surrogate"),
+    "peaks": ("1", "number of peaks of the judged force"),
+}
+# Name and unit of a history.
+_HISTORY = re.compile(r"(.*?)_((?:m|s|N|Pa|J|Hz|kg)(?:_per_\w+)?)")
+
+
+def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]]) -> xr.Dataset:
+    """Return the dataset of an impact and of its histories, by name and unit."""
+    variables: dict[str, Any] = {}
+    for column, values in histories.items():
+        named = _HISTORY.fullmatch(column)
+        name, unit = named.groups() if named else (column, "")
+        words = attributes(unit.replace("_per_", "/"), name.replace("_", " "))
+        variables[name] = ("time", values, words)
+    for name, (force, bands) in LEVELS.items():
+        variables[name] = (bands, impact.levels(bands, force=force), attributes(*MEANINGS[name]))
+    for name, entry in schema.SCALARS.items():
+        variables[name] = ((), getattr(impact, name), attributes(*entry))
+    conforms = impact.conformity().conforms
+    variables["conforms"] = ((), conforms, attributes(*MEANINGS["conforms"]))
+    coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
+    remarks = {"remarks": "\n".join(impact.remarks)}
+    found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | remarks)
+    # The arrays of the impact are read-only.
+    return found.copy(deep=True)
+
+
+def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
+    """Return the dataset of many drops, along the dimension ``set``."""
+    assert ensemble.case.model is not None  # noqa: S101 - `solve_many` has set it
+    coordinates: dict[str, Any] = band_coordinates(bands for _, bands in ensemble.levels)
+    for name, values in ensemble.parameters.items():
+        key, _ = find_key(name, users(ensemble.case))
+        words = attributes(key.unit, key.meaning)
+        coordinates[coordinate(name, key)] = ("set", values, words)
+    variables: dict[str, Any] = {}
+    for name, entry in MEANINGS.items():
+        if name not in LEVELS:
+            variables[name] = ("set", getattr(ensemble, name), attributes(*entry))
+        elif LEVELS[name] in ensemble.levels:
+            values = ensemble.levels[LEVELS[name]]
+            variables[name] = (("set", LEVELS[name][1]), values, attributes(*entry))
+    for bands, level in ensemble.contact_levels.items():
+        words = attributes("dB", "force exposure level on the floor that moves, re 1 N and 1 s")
+        variables[f"contact_{bands}_level"] = (("set", bands), level, words)
+    for name, (unit, meaning) in FURTHER.items():
+        if (values := getattr(ensemble, name)) is not None:
+            dimensions = ("set", ROOM_BAND) if name == ROOM_LEVEL else ("set",)
+            variables[name] = (dimensions, values, attributes(unit, meaning))
+            coordinates |= room_coordinates() if name == ROOM_LEVEL else {}
+    for force in ("elastic", "floor"):
+        if (values := getattr(ensemble, f"{force}_force")) is not None:
+            seconds = np.arange(values.shape[1]) / ensemble.sample_rate
+            coordinates["time"] = _time(seconds)
+            words = attributes("N", f"{force} force")
+            variables[f"{force}_force"] = (("set", "time"), values, words)
+    return xr.Dataset(variables, coordinates, origin(ensemble.case)).copy(deep=True)
+
+
+def _time(seconds: NDArray[np.float64]) -> tuple[str, NDArray[np.float64], dict[str, str]]:
+    return "time", seconds, attributes("s", "time since the start of the record")
+
+
+def attributes(unit: str, meaning: str) -> dict[str, str]:
+    """Return unit and meaning as attributes of a variable."""
+    return {"units": unit or "1", "long_name": meaning}
+
+
+def coordinate(parameter: str, key: Key) -> str:
+    """Return the name of a parameter's coordinate; some keys are named as results are."""
+    name = parameter.replace("(", "_").replace(".", "_").rstrip(")")
+    return f"{key.group}_{name}" if name in ALL else name
+
+
+def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:
+    """Return the nominal frequencies of bands by the names of their dimensions."""
+    attributes = {"units": "Hz", "long_name": "nominal frequency"}
+    return {bands: (bands, get_bands(bands).nominal, attributes) for bands in kinds}
+
+
+def room_coordinates() -> dict[str, Any]:
+    """Return the nominal frequencies of the thirds in a room by the name of their dimension."""
+    attributes = {"units": "Hz", "long_name": "nominal frequency"}
+    return {ROOM_BAND: (ROOM_BAND, rated_bands(BANDWIDTHS[1]), attributes)}
+
+
+def origin(case: Case) -> dict[str, str]:
+    """Return the case of results and what has computed them."""
+    return {
+        "model": case.model.name if case.model else "",
+        "judged_force": case.levels.force,
+        "limits": case.limits.source,
+        "case": f"{case.to_namelist()}",
+        "thud_version": version(),
+        "compiler": compiler(),
+        "python_version": platform.python_version(),
+        "numpy_version": np.__version__,
+        "xarray_version": xr.__version__,
+        "machine": platform.machine(),
+        "date_created": datetime.now(UTC).isoformat(timespec="seconds"),
+    }

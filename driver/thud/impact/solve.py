@@ -1,0 +1,75 @@
+"""One drop by its keywords."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from thud.base.schema import Ball, Drop, Sampling
+from thud.case.case import Case, new_model
+from thud.impact.compute import solve_case
+
+if TYPE_CHECKING:
+    from thud.base.schema import FloorOptions, ModelName, ModelOptions
+    from thud.impact.impact import Impact
+
+
+def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
+    ball: Ball | None = None,
+    drop: Drop | None = None,
+    model: ModelName | ModelOptions = "hollow_sphere",
+    *,
+    sample_rate: float = Sampling.sample_rate,
+    duration: float = Sampling.duration,
+    substeps: int = Sampling.substeps,
+    floor: FloorOptions | None = None,
+    **options: object,
+) -> Impact:
+    """Drop a ball on a floor.
+
+    Parameters
+    ----------
+    ball, drop
+        By default the rubber ball of the paper, from 1 m.
+    model
+        ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
+        one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``;
+        or an object of the classes below, which holds the options.
+    sample_rate
+        Samples per second, Hz.
+    duration
+        Length of the record, s; longer than the contact.
+    substeps
+        Integration steps per sampling interval.
+    floor
+        Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
+        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards judge the force
+        on a rigid one.
+    **options
+        Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,
+        `HuntCrossley` and `TwoMass`; such as ``momentum_flux="retarding"``.
+
+    Returns
+    -------
+    Impact
+        Force, motion and scalar results.
+
+    Raises
+    ------
+    InputError
+        Names group, key, value and allowed range.
+    NumericalError
+        Where the drop leaves the range of the model or the steps are too coarse.
+
+    Warns
+    -----
+    PlausibilityWarning
+        As `Impact.remarks`.
+    """
+    case = Case(
+        ball=Ball() if ball is None else ball,
+        drop=Drop() if drop is None else drop,
+        model=new_model(model, options),
+        sampling=Sampling(sample_rate, duration, substeps),
+        floor=floor,
+    )
+    return solve_case(case)
