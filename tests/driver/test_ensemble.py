@@ -16,7 +16,7 @@ from hypothesis import given, settings, strategies as st
 
 import thud
 from thud.impact import ensemble
-from thud.impact.outcomes import FURTHER
+from thud.impact.quantities import FURTHER
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -30,9 +30,9 @@ SHOWN = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.report import recording_files as results
     from thud.recordings.kept import KeptDrops
     from thud.recordings.read_recording import read_recording
+    from thud.report import recording_files as results
 
     figures = not options.no_figures
     files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])

@@ -23,7 +23,8 @@ from thud.base.key import check_keywords
 from thud.base.schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case.case import Case, case_text, new_model
 from thud.case.keys import find_key, users
-from thud.impact.outcomes import RATING, ROOM_LEVEL, Ensemble
+from thud.impact.outcomes import Ensemble
+from thud.impact.quantities import RATING, ROOM_LEVEL
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 
 # Not empty in a forked process.

@@ -13,7 +13,7 @@ from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact, history
 from thud.impact.mobility import mobility
-from thud.impact.outcomes import FURTHER
+from thud.impact.quantities import FURTHER
 from thud.level.levels import force_exposure_levels
 
 if TYPE_CHECKING:

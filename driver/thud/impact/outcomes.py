@@ -10,6 +10,7 @@ import numpy as np
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.base.schema import OUTCOMES, SCALARS
+from thud.impact.quantities import FURTHER, ROOM_LEVEL
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -18,17 +19,6 @@ if TYPE_CHECKING:
 
     from thud.base.schema import BandSet, LevelsForce
     from thud.case.case import Case
-
-
-ROOM_LEVEL = "room_level"
-RATING = "standardised_rating"
-# Unit and meaning of what drops on a floor have in addition, levels of the contact force apart.
-FURTHER = {
-    "floor_work": ("J", "energy that the source gives to the floor"),
-    ROOM_LEVEL: ("dB", "maximum Fast level in the room, re 20 uPa"),
-    "room_rating": ("dB", "A-weighted maximum Fast level in the room, re 20 uPa"),
-    RATING: ("dB", "A-weighted maximum Fast level, standardised, re 20 uPa"),
-}
 
 
 @dataclass(frozen=True, eq=False)

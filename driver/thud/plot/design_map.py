@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.ticker import MaxNLocator, StrMethodFormatter
 
-from thud.impact.outcomes import RATING
+from thud.impact.quantities import RATING
 from thud.plot.look import FORCE_WORDS, SIZE, empty_axes, legend_above, own_style
 from thud.plot.parameter_axis import show_parameter
 

@@ -7,17 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import (
-    ALL,
-    BANDS,
-    CONTACT,
-    ROOM_BAND,
-    band_coordinates,
-    coordinate,
-    origin,
-    room_coordinates,
-)
-from thud.impact.outcomes import ROOM_LEVEL
+from thud.impact.datasets import band_coordinates, coordinate, origin, room_coordinates
+from thud.impact.quantities import ALL, BANDS, CONTACT, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
 from thud.studies.designs import makers
 from thud.studies.evaluation import level_names

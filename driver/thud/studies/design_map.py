@@ -11,7 +11,7 @@ from thud.base.display import Displayed
 from thud.case.case import Case
 from thud.case.keys import DENSITY
 from thud.impact.datasets import coordinate
-from thud.impact.outcomes import RATING
+from thud.impact.quantities import RATING
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume
 

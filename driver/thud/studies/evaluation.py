@@ -9,9 +9,8 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.base.checks import refuse
-from thud.impact.datasets import LEVELS, OUTCOMES
 from thud.impact.ensemble import solve_many
-from thud.impact.outcomes import FURTHER
+from thud.impact.quantities import FURTHER, LEVELS, OUTCOMES
 from thud.level.levels import BANDWIDTHS, peak_count
 
 if TYPE_CHECKING:

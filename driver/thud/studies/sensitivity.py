@@ -11,7 +11,7 @@ import xarray as xr
 from thud.base.checks import refuse
 from thud.base.display import Displayed
 from thud.impact.datasets import coordinate
-from thud.impact.outcomes import FURTHER
+from thud.impact.quantities import FURTHER
 from thud.level.levels import get_bands
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind

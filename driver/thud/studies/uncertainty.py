@@ -11,7 +11,7 @@ from scipy.stats import binomtest
 
 from thud.base.checks import refuse
 from thud.base.display import Displayed
-from thud.impact.outcomes import RATING
+from thud.impact.quantities import RATING
 from thud.level.levels import get_bands, octave_limits
 from thud.studies.set_kind import SetKind
 

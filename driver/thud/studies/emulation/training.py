@@ -15,7 +15,7 @@ from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
 from thud.base.threads import one_thread
 from thud.case.keys import find_key
-from thud.impact.datasets import LEVELS, OUTCOMES
+from thud.impact.quantities import LEVELS, OUTCOMES
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
 from thud.studies.designs import unit_sets
