@@ -17,7 +17,6 @@ from .case.case import (
 from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
-    read_all as read_all,
 )
 from .floors.floor_comparison import (
     FloorComparison as FloorComparison,

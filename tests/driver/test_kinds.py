@@ -39,7 +39,7 @@ def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
     kinds = copy / "studies/kinds.py"
     kinds.write_text(kinds.read_text().replace("KINDS = {\n", f"KINDS = {{\n{line}"))
     with (copy / "__init__.pyi").open("a") as stub:
-        stub.write(re.findall(r"`(from .studies.scatter .*)`", text)[0] + "\n")
+        stub.write(re.findall(r"`(from .studies.scatter [^`]*)`", text)[0] + "\n")
     (tmp_path / "mass.toml").write_text("design.size = 9\nparameters.mass.std = 0.1")
     for command in (
         ["-m", "thud", "scatter", "mass.toml"],

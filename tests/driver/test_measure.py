@@ -26,12 +26,13 @@ from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 import thud
 from thud import cli
 from thud.base.errors import ReportWarning
-from thud.recordings import kept, measurement, results
+from thud.recordings import kept, measurement
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.levels import measure_levels
 from thud.recordings.measurement import measure_window
 from thud.recordings.signal import Signal
 from thud.recordings.verdict import average_estimates
+from thud.report import recording_files as results
 from thud.report.data import report_data
 
 if TYPE_CHECKING:

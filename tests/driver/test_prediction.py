@@ -12,7 +12,8 @@ import pytest
 from conftest import REPOSITORY, naming, recorded
 
 import thud
-from thud import _api, plot
+from thud import plot
+from thud.base import bridge as _api
 from thud.base.bridge import floor_api
 from thud.base.errors import ReportWarning
 from thud.cli import main

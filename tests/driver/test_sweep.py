@@ -20,7 +20,8 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.stats import qmc
 
 import thud
-from thud import cli, tables, units
+from thud import cli
+from thud.base import tables, units
 from thud.base.schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, put

@@ -45,7 +45,8 @@ plate = np.pad(flagship.floor_force, 4000) + noise
 np.savetxt(folder / "record.csv", np.c_[np.arange(len(plate)) / flagship.sample_rate, plate])
 record: thud.Recording = thud.read_recording(folder / "record.csv", height=1.0, mass=2.5)
 page: thud.Comparison = thud.compare({**impacts, "record": record}, force="floor")
-cases = thud.read_all([folder / "mine.nml"])
+restored: thud.Case = thud.read_case(folder / "mine.nml")
+files = thud.write_report(record, folder / "report")
 for figure in (
     flagship.plot(),
     pressed.plot(),
@@ -102,7 +103,7 @@ warnings.simplefilter("ignore", thud.PlausibilityWarning)
 warnings.simplefilter("ignore", thud.LockWarning)
 warnings.simplefilter("ignore", thud.WorkerWarning)
 results = [
-    thud.comparison.compare(impacts),
+    thud.compare(impacts),
     *again,
     modes,
     bands,
