@@ -38,7 +38,7 @@ Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
 from collections.abc import Sequence
 from typing import Literal, TypedDict, Unpack, overload
 
-from thud.base.schema import (
+from thud.base._schema import (
 {names})
 from thud.impact.impact import Impact
 '''
@@ -181,13 +181,13 @@ def public_names(schema: Entry) -> list[str]:
 
 def with_public_names(stub: str, schema: Entry) -> str:
     """Return the stub of the package with the names of the schema, the last that it imports."""
-    begin = "from .base.schema import (\n"
+    begin = "from .base._schema import (\n"
     head = stub[: stub.index(begin)] + begin
     return head + "".join(f"    {name} as {name},\n" for name in public_names(schema)) + ")\n"
 
 
 def python_module(schema: Entry) -> str:
-    """Return the text of ``base/schema.py``."""
+    """Return the text of ``base/_schema.py``."""
     keys, models, floors = schema["keys"], schema["models"], schema["floors"]
     groups, optional = shared_groups(schema), optional_groups(schema)
     choices = [literal(choice_name(key), key["choices"]) for key in keys if key["choices"]]
@@ -312,7 +312,7 @@ def main() -> None:
     schema = json.load(sys.stdin)
     root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
     package = root / "driver/thud"
-    (package / "base/schema.py").write_text(python_module(schema), encoding="utf-8")
+    (package / "base/_schema.py").write_text(python_module(schema), encoding="utf-8")
     (package / "impact/solve.pyi").write_text(python_calls(schema), encoding="utf-8")
     stub = package / "__init__.pyi"
     stub.write_text(with_public_names(stub.read_text(encoding="utf-8"), schema), encoding="utf-8")

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import thud
-from thud.plot.force_history import draw_forces
-from thud.plot.levels import draw_levels
-from thud.plot.look import LEVEL, SIZE, WIDTH, dress, legend_above, new_figure
+from thud.plot.force_history_figure import draw_forces
+from thud.plot.levels_figure import draw_levels
+from thud.plot.style import LEVEL, SIZE, WIDTH, dress, legend_above, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
-from thud.plot.look import COLOURS, WIDTH, new_figure
+from thud.plot.style import COLOURS, WIDTH, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.ticker import NullLocator
 
 from thud.plot import COLOURS, SIZE, dress, legend_above, save
-from thud.plot.look import LEVEL, WIDTH, empty_axes, new_figure
+from thud.plot.style import LEVEL, WIDTH, empty_axes, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -94,7 +94,7 @@ from .studies.design_map import (
     DesignMap as DesignMap,
     design_map as design_map,
 )
-from .studies.emulation.surrogate import (
+from .studies.emulation.emulator import (
     Surrogate as Surrogate,
     read_surrogate as read_surrogate,
 )
@@ -119,7 +119,7 @@ from .studies.uncertainty import (
 __version__: str
 
 # Made by ./bootstrap schema.
-from .base.schema import (
+from .base._schema import (
     Ball as Ball,
     Compression as Compression,
     Drop as Drop,

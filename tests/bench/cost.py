@@ -13,8 +13,8 @@ import sys
 import time
 from typing import Any
 
+from thud.base._schema import FLOORS
 from thud.base.errors import ThudError
-from thud.base.schema import FLOORS
 from thud.explorer.answer import MAX_SAMPLES, answer_case, new_case
 from thud.explorer.form import form
 from thud.impact.ensemble import get_cost

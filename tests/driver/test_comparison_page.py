@@ -12,8 +12,8 @@ from test_figure_look import assert_clean
 
 import thud
 from thud.comparison.comparison import _cell
-from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
+from thud.plot.comparison_page import comparison_page
 
 SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
 IMPACTS: dict[str, thud.Impact | thud.Recording] = {"shell <1>": SHELL, "soft $x^{$": SOFT}

@@ -25,7 +25,7 @@ from starlette.testclient import TestClient
 
 import thud
 from thud import cli
-from thud.base.schema import FLOORS, MODELS
+from thud.base._schema import FLOORS, MODELS
 from thud.case.case import check_case
 from thud.explorer import server
 from thud.explorer.answer import new_case

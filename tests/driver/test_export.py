@@ -17,11 +17,11 @@ from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
 import thud
-from thud.cli.export import EXPORT, KINDS
+from thud.cli.export_command import EXPORT, KINDS
 from thud.export import force_files as export_force
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.recordings.read_recording import read_recording
-from thud.recordings.reading import open_signals
+from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -28,7 +28,7 @@ from PIL import Image
 
 import thud
 from thud import cli, plot
-from thud.plot.look import COLOURS, line_style, marker_style
+from thud.plot.style import COLOURS, line_style, marker_style
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -272,7 +272,7 @@ def test_commands_without_a_matplotlib_that_works_keep_the_results(
 def test_every_figure_is_drawn_in_its_own_style() -> None:
     found = 0
     for module in pkgutil.iter_modules(plot.__path__, f"{plot.__name__}."):
-        if module.name == "thud.plot.look":
+        if module.name == "thud.plot.style":
             continue
         for name, draw in vars(importlib.import_module(module.name)).items():
             if not inspect.isfunction(draw) or name.startswith("_"):

@@ -11,8 +11,8 @@ import pytest
 from scipy import stats
 
 import thud
-from thud.plot.confidence import LINE, _label, confidence
-from thud.plot.fit import draw_fit, target_and_fit
+from thud.plot.confidence_figure import LINE, _label, confidence
+from thud.plot.fit_figure import draw_fit, target_and_fit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -142,7 +142,7 @@ def name(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 def _report() -> str:
-    from thud.report.data import report_data
+    from thud.report.contents import report_data
 
     data = report_data(thud.read_recording(RECORDINGS / "drop_1.csv", height=1.0, mass=2.5))
     return json.dumps({**data, "date": "2024-05-03"})

@@ -15,12 +15,12 @@ from conftest import naming
 from scipy.stats import binom
 
 import thud
-from thud.cli.history import run_history
+from thud.cli.history_command import run_history
 from thud.level.levels import get_bands
 from thud.recordings.verdict import VERDICTS, Contribution, Quantity, decide
-from thud.report.data import FORMAT
-from thud.report.history import YEAR, History, _trend, read_history
-from thud.report.history_figure import draw_history
+from thud.report.ball_history import YEAR, History, _trend, read_history
+from thud.report.ball_history_figure import draw_history
+from thud.report.contents import FORMAT
 
 if TYPE_CHECKING:
     from pathlib import Path

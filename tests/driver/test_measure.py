@@ -26,14 +26,14 @@ from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 import thud
 from thud import cli
 from thud.base.errors import ReportWarning
-from thud.recordings import kept, measurement
+from thud.recordings import checkpoint as kept, measure_drops as measurement
 from thud.recordings.config import Config, checked_config, read_config
-from thud.recordings.levels import measure_levels
-from thud.recordings.measurement import measure_window
+from thud.recordings.measure_drops import measure_window
+from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.signal import Signal
 from thud.recordings.verdict import average_estimates
 from thud.report import recording_files as results
-from thud.report.data import report_data
+from thud.report.contents import report_data
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

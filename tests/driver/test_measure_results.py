@@ -204,7 +204,7 @@ def test_without_xarray_a_remark_tells_what_is_left_out(
     results.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES
     monkeypatch.setitem(sys.modules, "xarray", None)
-    monkeypatch.delitem(sys.modules, "thud.report.dataset")
+    monkeypatch.delitem(sys.modules, "thud.report.netcdf")
     with pytest.warns(ReportWarning, match=naming("recording.nc", "xarray", "pip install")):
         results.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES - {"recording.nc"}

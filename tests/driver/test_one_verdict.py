@@ -15,7 +15,7 @@ from thud import cli
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from thud.base.schema import LevelsForce
+    from thud.base._schema import LevelsForce
 
 WITH_IMPACT = [path for path in INPUTS if thud.read_case(path).model]
 # The batches of the shell model repeat the single solver to this part of the peak, and dB.

@@ -18,7 +18,7 @@ from conftest import REPOSITORY, naming
 
 import thud
 from thud.base import units
-from thud.base.schema import KEYS, MODELS
+from thud.base._schema import KEYS, MODELS
 from thud.studies.parameter import fitted
 
 if TYPE_CHECKING:

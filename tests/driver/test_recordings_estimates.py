@@ -16,13 +16,13 @@ from synthetic import band_limited, coloured_noise, half_sine, make_drop, make_r
 import thud
 from thud.impact.contact_time import contact_span
 from thud.level.levels import record_force
+from thud.recordings.budgets import average_mass, average_restitution, drop_quantities
 from thud.recordings.config import Config
 from thud.recordings.contact import Estimate
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
-from thud.recordings.levels import measure_levels
-from thud.recordings.quantities import average_mass, average_restitution, drop_quantities
+from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import GRAVITY, Fall
 from thud.recordings.signal import Signal
 

@@ -20,7 +20,7 @@ from recording_files import WRITERS, half_sine
 
 from thud.base.errors import InputError
 from thud.recordings import probe
-from thud.recordings.reading import open_signals
+from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -19,19 +19,19 @@ from synthetic import make_drop
 import thud
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.band_noise import band_noise
+from thud.recordings.budgets import find_deviant
 from thud.recordings.contact import Estimate, cells_between, even_edges
-from thud.recordings.levels import (
+from thud.recordings.low_pass import attenuation, low_pass_force
+from thud.recordings.noise import Background
+from thud.recordings.outliers import find_outliers
+from thud.recordings.plate import Plate, check_plate, correct_plate
+from thud.recordings.recorded_levels import (
     METHODS,
     LevelEstimate,
     average_levels,
     compare_methods,
     measure_levels,
 )
-from thud.recordings.low_pass import attenuation, low_pass_force
-from thud.recordings.noise import Background
-from thud.recordings.outliers import find_outliers
-from thud.recordings.plate import Plate, check_plate, correct_plate
-from thud.recordings.quantities import find_deviant
 from thud.recordings.verdict import (
     Contribution,
     Quantity,

@@ -28,9 +28,9 @@ from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
-from thud.recordings.reading import open_signals
+from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.signal import Signal
-from thud.recordings.units import Calibration, newtons_per_unit
+from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable

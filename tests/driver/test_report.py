@@ -25,12 +25,12 @@ import thud
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
 from thud.level.levels import record_force
-from thud.plot.recording import recording_forces, recording_levels
+from thud.plot.recording_figure import recording_forces, recording_levels
 from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Estimate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
-from thud.report.data import read_date, report_data
+from thud.report.contents import read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
 from thud.report.pdf import html_to_pdf

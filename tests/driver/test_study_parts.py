@@ -14,14 +14,14 @@ from conftest import naming
 from scipy.stats import norm
 
 import thud
-from thud.base.schema import KEYS
+from thud.base._schema import KEYS
 from thud.studies import designs
 from thud.studies.design_map import KIND as DESIGN, DesignMap, _mark
 from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region
+from thud.studies.emulation.doubtful import judge_many
+from thud.studies.emulation.emulator import Surrogate
 from thud.studies.emulation.plan import MAX_DROPS, MIN_DROPS, Plan, read_plan
-from thud.studies.emulation.surrogate import Surrogate
 from thud.studies.emulation.training import regress
-from thud.studies.emulation.verdict import judge_many
 from thud.studies.parameter import MAX_VALUES, Parameter, varied
 from thud.studies.sensitivity import sobol_indices
 from thud.studies.temperature import Temperature, read_temperature

@@ -13,10 +13,10 @@ from scipy.stats import binom, norm
 
 import thud
 from thud import cli
+from thud.studies.emulation.doubtful import judge_many
+from thud.studies.emulation.emulator import keys_of
 from thud.studies.emulation.plan import Plan
-from thud.studies.emulation.surrogate import keys_of
 from thud.studies.emulation.training import regress
-from thud.studies.emulation.verdict import judge_many
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -22,7 +22,7 @@ from scipy.stats import qmc
 import thud
 from thud import cli
 from thud.base import tables, units
-from thud.base.schema import MODELS
+from thud.base._schema import MODELS
 from thud.base.units import MULTIPLES, scaled
 from thud.case.keys import known_keys, put
 from thud.impact.ensemble import get_cost

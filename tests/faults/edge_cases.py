@@ -9,7 +9,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import thud
-from thud.base.schema import FLOORS, KEYS, MODELS
+from thud.base._schema import FLOORS, KEYS, MODELS
 
 if TYPE_CHECKING:
     import random

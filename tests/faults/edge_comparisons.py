@@ -10,7 +10,7 @@ import numpy as np
 from edge_cases import LUMPED
 
 import thud
-from thud.base.schema import KEYS
+from thud.base._schema import KEYS
 
 if TYPE_CHECKING:
     import random

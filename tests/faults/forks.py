@@ -211,7 +211,7 @@ def _be_humble() -> None:
 
 def _log_work() -> None:
     """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
-    from thud.recordings import kept
+    from thud.recordings import checkpoint as kept
     from thud.studies import backends, blocks, dataset, sets
 
     sets._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time

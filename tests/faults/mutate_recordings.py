@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from recording_files import WRITERS, half_sine
 
 from thud.base.errors import InputError
-from thud.recordings.reading import open_signals
+from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     import random

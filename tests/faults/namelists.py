@@ -14,8 +14,8 @@ from attempts import SANITIZED
 from sentences import fault_of
 
 import thud
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
 from thud.base.bridge import api, call, ensemble_api
-from thud.base.schema import FLOORS, GROUPS, KEYS, MODELS, Compression, Modes, Room
 from thud.case.case import case_text
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ import psutil
 from campaign import Finding
 from injection import PATIENCE
 
-from thud.base.schema import GROUPS, MODELS
+from thud.base._schema import GROUPS, MODELS
 
 if TYPE_CHECKING:
     import random

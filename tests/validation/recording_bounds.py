@@ -25,8 +25,8 @@ from thud.recordings import contact as contact_module
 from thud.recordings.band_noise import band_functionals
 from thud.recordings.contact import Contact, Estimate
 from thud.recordings.drops import Window
-from thud.recordings.levels import ENERGY_DECIBEL, measure_levels
 from thud.recordings.noise import MAINS, Background
+from thud.recordings.recorded_levels import ENERGY_DECIBEL, measure_levels
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:

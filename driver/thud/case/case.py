@@ -10,13 +10,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import f90nml
 import numpy as np
 
-from thud.base.bridge import api, call, text
-from thud.base.checks import LARGEST, refuse, require_choice, require_kind, require_words, shown
-from thud.base.display import Displayed
-from thud.base.errors import InputError
-from thud.base.files import replace_file
-from thud.base.key import Group, require_keywords
-from thud.base.schema import (
+from thud.base._schema import (
     FLOORS,
     GROUPS,
     KEYS,
@@ -33,6 +27,12 @@ from thud.base.schema import (
     Room,
     Sampling,
 )
+from thud.base.bridge import api, call, text
+from thud.base.checks import LARGEST, refuse, require_choice, require_kind, require_words, shown
+from thud.base.display import Displayed
+from thud.base.errors import InputError
+from thud.base.files import replace_file
+from thud.base.key import Group, require_keywords
 
 if TYPE_CHECKING:
     from dataclasses import Field

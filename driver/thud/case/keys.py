@@ -8,10 +8,10 @@ from functools import lru_cache
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from thud.base._schema import GROUPS, KEYS
 from thud.base.checks import refuse, shown, suggestion
 from thud.base.errors import InputError
 from thud.base.key import Key
-from thud.base.schema import GROUPS, KEYS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

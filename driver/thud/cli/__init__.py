@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NoReturn
 from thud.base.bridge import version
 from thud.base.checks import suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
-from thud.cli.calibrate import CALIBRATE
+from thud.cli.calibrate_command import CALIBRATE
 from thud.cli.command import (
     NO_FIGURES,
     QUIET,
@@ -23,17 +23,17 @@ from thud.cli.command import (
     sentence,
     shown_at_once,
 )
-from thud.cli.examples import EXAMPLES
-from thud.cli.explore import EXPLORE
-from thud.cli.export import EXPORT
-from thud.cli.figures import compare_cases, draw_figures
-from thud.cli.floor import FLOOR
-from thud.cli.history import run_history
-from thud.cli.measure import MEASURE
-from thud.cli.mobility import MOBILITY
-from thud.cli.rate import RATE
-from thud.cli.run import run_cases
-from thud.cli.studies import study_commands
+from thud.cli.examples_command import EXAMPLES
+from thud.cli.explore_command import EXPLORE
+from thud.cli.export_command import EXPORT
+from thud.cli.figures_command import compare_cases, draw_figures
+from thud.cli.floor_command import FLOOR
+from thud.cli.history_command import run_history
+from thud.cli.measure_command import MEASURE
+from thud.cli.mobility_command import MOBILITY
+from thud.cli.rate_command import RATE
+from thud.cli.run_command import run_cases
+from thud.cli.studies_command import study_commands
 from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:

@@ -130,7 +130,7 @@ def conclude(  # noqa: PLR0913, PLR0917 - each of them differs
     contents = dict([file])
     if not options.no_figures:
         with left_out(figure):
-            from thud.plot.look import picture_files
+            from thud.plot.style import picture_files
 
             contents |= picture_files(draw_all({figure: found.plot}))
     results.write(contents)

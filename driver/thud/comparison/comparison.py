@@ -22,10 +22,10 @@ from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.impact.impact import Impact
 from thud.level.levels import FORCES, SOURCES, get_bands
-from thud.plot.comparison import comparison_page
 from thud.plot.comparison_html import comparison_html
-from thud.plot.levels import common_source
-from thud.plot.look import page_files
+from thud.plot.comparison_page import comparison_page
+from thud.plot.levels_figure import common_source
+from thud.plot.style import page_files
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
 from thud.recordings.restitution import Fall
@@ -33,7 +33,7 @@ from thud.recordings.restitution import Fall
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from thud.base.schema import LevelsForce, LimitsSource
+    from thud.base._schema import LevelsForce, LimitsSource
     from thud.level.criteria import Criterion
     from thud.recordings.verdict import Decision
 

@@ -7,7 +7,7 @@ import re
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
-from thud.base.schema import FLOORS, GROUPS, KEYS, MODELS
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
 from thud.base.units import handy_unit, power_of, scaled
 from thud.case.case import OPTIONAL
 from thud.case.keys import plain_words

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import BandSet, InfinitePlate
 from thud.base.bridge import call, floor_api
 from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_real
 from thud.base.display import Displayed
-from thud.base.schema import BandSet, InfinitePlate
 from thud.case.case import Case, case_text
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import FloorOptions
+    from thud.base._schema import FloorOptions
 
 # From floors that a ball hardly leaves to floors that change a level by 0.01 dB, N s/m.
 RESISTANCES = np.geomspace(10**2.75, 1e6, 14)
@@ -157,7 +157,7 @@ class BallImpedance(Displayed):
         floors
             Floors by their names in the legend.
         """
-        from thud.plot.impedance import ball_impedances
+        from thud.plot.impedance_figure import ball_impedances
 
         return ball_impedances({"": self}, floors or {})
 

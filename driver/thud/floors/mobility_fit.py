@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import f90nml
 import numpy as np
 
+from thud.base._schema import MeasuredMobility
 from thud.base.bridge import call, mobility_api
 from thud.base.checks import (
     refuse,
@@ -24,7 +25,6 @@ from thud.base.checks import (
 from thud.base.columns import read_titled
 from thud.base.display import Displayed
 from thud.base.errors import NumericalError, ThudError
-from thud.base.schema import MeasuredMobility
 from thud.case.case import Case
 from thud.impact.mobility import mobility
 from thud.level.levels import get_bands
@@ -157,7 +157,7 @@ class MobilityFit(Displayed):
 
     def plot(self) -> Figure:
         """Draw the measured mobility and the fit."""
-        from thud.plot.mobility_fit import mobility_fit
+        from thud.plot.mobility_fit_figure import mobility_fit
 
         return mobility_fit(self)
 

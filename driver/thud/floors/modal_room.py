@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import lfilter, sosfilt
 
+from thud.base._schema import Plate, Room
 from thud.base.bridge import call, floor_api
 from thud.base.checks import (
     refuse,
@@ -26,7 +27,6 @@ from thud.base.checks import (
 )
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.base.schema import Plate, Room
 from thud.case.case import Case, case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 from thud.level.levels import get_bands
@@ -134,7 +134,7 @@ class ModalRoom(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of all positions against the statistical answer."""
-        from thud.plot.modal_room import draw_modal_room
+        from thud.plot.modal_room_figure import draw_modal_room
 
         return draw_modal_room(self)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base.schema import FloorOptions, Room
+    from thud.base._schema import FloorOptions, Room
 
 THIRDS = BANDWIDTHS[1]
 # Change of the force by a floor that gives way, dB, from which it is remarked.
@@ -186,7 +186,7 @@ class RoomPrediction(Displayed):
 
     def plot(self, measured: RoomLevels | None = None) -> Figure:
         """Draw the chain: force, energy, floor and room, with measured levels if given."""
-        from thud.plot.prediction import draw_prediction
+        from thud.plot.prediction_figure import draw_prediction
 
         return draw_prediction(self, measured)
 

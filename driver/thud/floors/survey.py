@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base.schema import BandSet
+    from thud.base._schema import BandSet
 
 # Rounded mid frequencies in a decade (ISO 3, R10), and how far a title may be from one.
 R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
@@ -205,7 +205,7 @@ class RoomLevels(Displayed):
 
     def plot(self) -> Figure:
         """Draw the levels of positions, their mean, the standardised ones and the background."""
-        from thud.plot.room import room_levels
+        from thud.plot.room_figure import room_levels
 
         return room_levels(self)
 

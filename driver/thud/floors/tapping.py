@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 
+from thud.base._schema import Plate, Room
 from thud.base.bridge import call, floor_api
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
-from thud.base.schema import Plate, Room
 from thud.case.case import Case, case_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.base.schema import FloorOptions
+    from thud.base._schema import FloorOptions
 
 
 # Thirds 50 to 3150 Hz: rounded mid frequencies; those from 100 Hz on are rated.

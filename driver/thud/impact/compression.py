@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from thud.base._schema import Ball, Compression
 from thud.base.bridge import api, call
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.base.key import check_keywords
-from thud.base.schema import Ball, Compression
 from thud.case.case import Case, case_text, new_model
 
 if TYPE_CHECKING:
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.base._schema import CompressionGas, ModelName, ModelOptions
     from thud.base.bridge import Bundle
-    from thud.base.schema import CompressionGas, ModelName, ModelOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class CompressionCurve(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force against the deflection."""
-        from thud.plot.compression import compression
+        from thud.plot.compression_figure import compression
 
         return compression({"": self})
 

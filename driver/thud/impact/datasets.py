@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from thud.base import schema
+from thud.base import _schema as schema
 from thud.base.bridge import compiler, version
 from thud.case.keys import find_key, users
 from thud.impact.quantities import ALL, FURTHER, LEVELS, MEANINGS, ROOM_BAND, ROOM_LEVEL
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from thud.base._schema import BandSet
     from thud.base.key import Key
-    from thud.base.schema import BandSet
     from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.impact.outcomes import Ensemble

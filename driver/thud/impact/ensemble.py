@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base._schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.base.bridge import call, call_through, collect, ensemble_api, text
 from thud.base.checks import (
     refuse,
@@ -20,7 +21,6 @@ from thud.base.checks import (
 )
 from thud.base.immutable import freeze
 from thud.base.key import check_keywords
-from thud.base.schema import KEYS, OUTCOMES, HollowSphere, Limits, Sampling
 from thud.case.case import Case, case_text, new_model
 from thud.case.keys import find_key, users
 from thud.impact.outcomes import Ensemble
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike, NDArray
 
+    from thud.base._schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
     from thud.base.bridge import Bundle
     from thud.base.key import Key
-    from thud.base.schema import BandSet, LevelsBands, LevelsForce, LimitsSource, ModelName
 
 MAX_THREADS = 1024
 # Approximate time of one call of the library, s: interrupts are handled between calls.

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
+    from thud.base._schema import BandSet, FloorOptions, LevelsMethod
     from thud.base.bridge import Bundle
-    from thud.base.schema import BandSet, FloorOptions, LevelsMethod
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ class FloorImpact(Impact):
 
     def plot(self) -> Figure:
         """Draw contact against blocked force, their levels, and the mobility of the floor."""
-        from thud.plot.floor import draw_floor
+        from thud.plot.floor_figure import draw_floor
 
         return draw_floor(self)
 

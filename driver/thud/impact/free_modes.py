@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.bridge import api, call, text
 from thud.base.checks import require_kind
 from thud.base.display import Displayed
 from thud.base.errors import InputError, PlausibilityWarning
 from thud.base.key import check_keywords
-from thud.base.schema import Ball, FiniteElement, Modes
 from thud.case.case import Case, case_text
 
 if TYPE_CHECKING:

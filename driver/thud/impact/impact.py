@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base.bridge import Bundle
-    from thud.base.schema import (
+    from thud.base._schema import (
         BandSet,
         LevelsForce,
         LevelsMethod,
         LimitsSource,
     )
+    from thud.base.bridge import Bundle
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
     from thud.level.criteria import Conformity
@@ -224,7 +224,7 @@ class Impact(Displayed):
 
     def plot(self) -> Figure:
         """Return a figure of the force that the case judges, and of its octave levels."""
-        from thud.plot.overview import overview
+        from thud.plot.overview_figure import overview
 
         return overview(self)
 

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import FloorOptions
 from thud.base.bridge import call, floor_api
 from thud.base.checks import refuse, require_array, require_kind, require_pair, require_real
-from thud.base.schema import FloorOptions
 from thud.case.case import Case, case_text
 
 if TYPE_CHECKING:

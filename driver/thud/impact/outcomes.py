@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import OUTCOMES, SCALARS
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
-from thud.base.schema import OUTCOMES, SCALARS
 from thud.impact.quantities import FURTHER, ROOM_LEVEL
 from thud.level.levels import BANDWIDTHS
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from numpy.typing import NDArray
 
-    from thud.base.schema import BandSet, LevelsForce
+    from thud.base._schema import BandSet, LevelsForce
     from thud.case.case import Case
 
 

@@ -1,6 +1,6 @@
 """Names, units and meanings of the results of drops."""
 
-from thud.base import schema
+from thud.base import _schema as schema
 from thud.level.levels import BANDWIDTHS, FORCES
 
 ROOM_LEVEL = "room_level"

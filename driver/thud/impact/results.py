@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import f90nml.scanner
 import numpy as np
 
+from thud.base._schema import SCALARS
 from thud.base.checks import refuse, shown
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import MANIFEST, checksum, locked, read_input, read_manifest
-from thud.base.schema import SCALARS
 from thud.case.case import Case
 from thud.impact.floor_impact import FloorImpact
 from thud.impact.impact import Impact

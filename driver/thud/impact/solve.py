@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from thud.base.schema import Ball, Drop, Sampling
+from thud.base._schema import Ball, Drop, Sampling
 from thud.case.case import Case, new_model
 from thud.impact.compute import solve_case
 
 if TYPE_CHECKING:
-    from thud.base.schema import FloorOptions, ModelName, ModelOptions
+    from thud.base._schema import FloorOptions, ModelName, ModelOptions
     from thud.impact.impact import Impact
 
 

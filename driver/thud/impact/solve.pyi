@@ -6,7 +6,7 @@ Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
 from collections.abc import Sequence
 from typing import Literal, TypedDict, Unpack, overload
 
-from thud.base.schema import (
+from thud.base._schema import (
     Ball,
     Drop,
     FiniteElementLaw,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from thud.base.display import Displayed
 
 if TYPE_CHECKING:
-    from thud.base.schema import LimitsSource
+    from thud.base._schema import LimitsSource
 
 # Header of a table of criteria.
 CELLS = ("criterion", "value", "limits", "verdict")

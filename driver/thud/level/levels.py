@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, cast, get_args
 
 import numpy as np
 
+from thud.base._schema import LevelsForce, LevelsMethod
 from thud.base.bridge import call_direct, level_api, trimmed
 from thud.base.checks import refuse_value, require_array, require_choice, require_real
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.base.schema import LevelsForce, LevelsMethod
 from thud.level.criteria import Conformity, Criterion
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import BandSet, LimitsSource
+    from thud.base._schema import BandSet, LimitsSource
 
 
 def _names(values: Iterable[bytes]) -> tuple[str, ...]:

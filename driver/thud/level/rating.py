@@ -15,7 +15,7 @@ from thud.level.levels import BANDWIDTHS
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import BandSet
+    from thud.base._schema import BandSet
 
 # Levels beyond it, dB, are none of sound.
 LARGEST_LEVEL = 1000.0

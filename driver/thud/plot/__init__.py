@@ -28,17 +28,29 @@ from thud.floors.prediction import predict_level
 from thud.impact.compression import CompressionCurve
 from thud.impact.free_modes import FreeModes
 from thud.impact.impact import Impact
-from thud.plot.comparison import comparison_page as comparison_page
-from thud.plot.compression import compression as compression
-from thud.plot.design_map import draw_design_map as draw_design_map
-from thud.plot.fit import draw_fit as draw_fit
-from thud.plot.floor import draw_floor as draw_floor
-from thud.plot.floor_mobilities import floor_mobilities as floor_mobilities
-from thud.plot.force_history import force_history as force_history
-from thud.plot.impedance import ball_impedances as ball_impedances
-from thud.plot.level_changes import level_changes as level_changes
-from thud.plot.levels import levels as levels
-from thud.plot.look import (
+from thud.plot.comparison_page import comparison_page as comparison_page
+from thud.plot.compression_figure import compression as compression
+from thud.plot.design_map_figure import draw_design_map as draw_design_map
+from thud.plot.fit_figure import draw_fit as draw_fit
+from thud.plot.floor_figure import draw_floor as draw_floor
+from thud.plot.floor_mobilities_figure import floor_mobilities as floor_mobilities
+from thud.plot.force_history_figure import force_history as force_history
+from thud.plot.impedance_figure import ball_impedances as ball_impedances
+from thud.plot.level_changes_figure import level_changes as level_changes
+from thud.plot.levels_figure import levels as levels
+from thud.plot.loss_factor_figure import loss_factor as loss_factor
+from thud.plot.mobility_fit_figure import mobility_fit as mobility_fit
+from thud.plot.modes_figure import mode_shapes as mode_shapes
+from thud.plot.motion_figure import animate as animate, motion as motion
+from thud.plot.plate_modes_figure import plate_modes as plate_modes
+from thud.plot.prediction_figure import draw_decay as draw_decay, draw_prediction as draw_prediction
+from thud.plot.recording_figure import (
+    recording_forces as recording_forces,
+    recording_levels as recording_levels,
+)
+from thud.plot.room_figure import room_levels as room_levels
+from thud.plot.sensitivity_figure import draw_sensitivity as draw_sensitivity
+from thud.plot.style import (
     COLOURS as COLOURS,
     FORMATS as FORMATS,
     LINES as LINES,
@@ -54,21 +66,9 @@ from thud.plot.look import (
     save as save,
     save_all as save_all,
 )
-from thud.plot.loss_factor import loss_factor as loss_factor
-from thud.plot.mobility_fit import mobility_fit as mobility_fit
-from thud.plot.modes import mode_shapes as mode_shapes
-from thud.plot.motion import animate as animate, motion as motion
-from thud.plot.plate_modes import plate_modes as plate_modes
-from thud.plot.prediction import draw_decay as draw_decay, draw_prediction as draw_prediction
-from thud.plot.recording import (
-    recording_forces as recording_forces,
-    recording_levels as recording_levels,
-)
-from thud.plot.room import room_levels as room_levels
-from thud.plot.sensitivity import draw_sensitivity as draw_sensitivity
-from thud.plot.surrogate import draw_surrogate as draw_surrogate
-from thud.plot.sweep import draw_sweep as draw_sweep
-from thud.plot.uncertainty import draw_uncertainty as draw_uncertainty
+from thud.plot.surrogate_figure import draw_surrogate as draw_surrogate
+from thud.plot.sweep_figure import draw_sweep as draw_sweep
+from thud.plot.uncertainty_figure import draw_uncertainty as draw_uncertainty
 
 
 def case_figures(

@@ -11,7 +11,7 @@ from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
 from thud.base.errors import InputError
-from thud.plot.look import SIZE
+from thud.plot.style import SIZE
 
 # Of monotonic lightness, for any colour vision and for print.
 COLOUR_MAP = "cividis"

@@ -9,7 +9,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from thud.plot.look import COLOURS, styled
+from thud.plot.style import COLOURS, styled
 
 # Line styles and markers of `thud.plot.look` by the names of plotly.
 _DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")

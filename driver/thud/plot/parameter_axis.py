@@ -9,7 +9,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullF
 
 from thud.base.units import handy_unit
 from thud.case.keys import plain_words
-from thud.plot.look import SIZE
+from thud.plot.style import SIZE
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,7 +15,7 @@ from thud.level.levels import get_bands
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import BandSet
+    from thud.base._schema import BandSet
 
 # Order of the Butterworth low-pass of which each filter is the band-pass: six poles. Order 2 misses
 # the mask of class 1 by 18 dB.

@@ -9,11 +9,11 @@ import numpy as np
 
 from thud.base.checks import refuse, require_number
 from thud.recordings.channel import shown_path
+from thud.recordings.force_units import ALLOWED, Calibration, find_unit, require_unit
 from thud.recordings.formats import read_channels
-from thud.recordings.reading import choose_channels, regular_file
 from thud.recordings.restitution import GRAVITY
 from thud.recordings.signal import Signal
-from thud.recordings.units import ALLOWED, Calibration, find_unit, require_unit
+from thud.recordings.signal_files import choose_channels, regular_file
 
 if TYPE_CHECKING:
     import os

@@ -15,17 +15,17 @@ from thud.base.errors import InputError
 from thud.level.levels import SOURCES, get_bands, judge
 from thud.recordings.channel import MIB, shown_path, shown_text
 from thud.recordings.excursion import POLARITIES
+from thud.recordings.force_units import read_chain, require_unit
 from thud.recordings.plate import Plate, check_plate
-from thud.recordings.reading import regular_file
-from thud.recordings.units import read_chain, require_unit
+from thud.recordings.signal_files import regular_file
 
 if TYPE_CHECKING:
     import os
     from collections.abc import Callable
 
-    from thud.base.schema import LimitsSource
+    from thud.base._schema import LimitsSource
+    from thud.recordings.force_units import Calibration
     from thud.recordings.plate import PlateCheck
-    from thud.recordings.units import Calibration
 
 LONGEST = 500
 ABSOLUTE_ZERO = -273.15

@@ -16,14 +16,14 @@ from thud.base.immutable import Immutable
 from thud.level.levels import RECORDED_BAND, record_force
 from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
-from thud.recordings.levels import measure_levels
 from thud.recordings.noise import Noise
+from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.restitution import GRAVITY, Fall
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.base.schema import BandSet
+    from thud.base._schema import BandSet
     from thud.recordings.drops import Window
 
 __all__ = ["Drop", "Estimate", "measure_drop"]

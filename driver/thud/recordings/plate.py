@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.base.schema import BandSet
+    from thud.base._schema import BandSet
 
 # What the standard asks of a force plate: flat between these frequencies, Hz, up to this force, N,
 # and linear to this share. It gives no tolerance for "flat"; that of the linearity is taken.

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 from thud.base.checks import require_whole
 from thud.impact.ensemble import MAX_THREADS
 from thud.recordings.config import Config, read_config
-from thud.recordings.reading import open_signals
 from thud.recordings.recording import Recording
+from thud.recordings.signal_files import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from thud.base.schema import LimitsSource
-    from thud.recordings.kept import KeptDrops
+    from thud.base._schema import LimitsSource
+    from thud.recordings.checkpoint import KeptDrops
 
 
 def read_recording(  # noqa: PLR0913 - the keys of the configuration

@@ -12,12 +12,12 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.display import Displayed
+from thud.recordings.budgets import drop_quantities, find_deviant, told_restitution
 from thud.recordings.config import Config, checked_config
 from thud.recordings.excursion import doubt, scan
-from thud.recordings.levels import average_levels, compare_methods, measure_levels
 from thud.recordings.low_pass import describe_low_pass
-from thud.recordings.measurement import measure_signals
-from thud.recordings.quantities import drop_quantities, find_deviant, told_restitution
+from thud.recordings.measure_drops import measure_signals
+from thud.recordings.recorded_levels import average_levels, compare_methods, measure_levels
 from thud.recordings.signal import Signal
 from thud.recordings.verdict import decide, level_quantities
 
@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import BandSet, LevelsForce, LimitsSource
+    from thud.base._schema import BandSet, LevelsForce, LimitsSource
+    from thud.recordings.checkpoint import KeptDrops
     from thud.recordings.estimates import Drop
-    from thud.recordings.kept import KeptDrops
-    from thud.recordings.levels import AverageLevels
-    from thud.recordings.measurement import Origin
+    from thud.recordings.measure_drops import Origin
     from thud.recordings.outliers import Outlier
+    from thud.recordings.recorded_levels import AverageLevels
     from thud.recordings.verdict import Quantity, Verdict
 
 
@@ -328,7 +328,7 @@ class Recording(Displayed):
 
     def plot(self, what: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
-        from thud.plot.recording import recording_figure
+        from thud.plot.recording_figure import recording_figure
 
         return recording_figure(self, what)
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from thud.base.schema import Drop
+from thud.base._schema import Drop
 from thud.recordings.contact import Estimate
 
 if TYPE_CHECKING:

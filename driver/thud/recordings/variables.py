@@ -9,8 +9,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel
 from thud.recordings.grid import even_grid
-from thud.recordings.signal import ArraySamples
-from thud.recordings.words import (
+from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
     UNIT,
@@ -20,6 +19,7 @@ from thud.recordings.words import (
     split_title,
     text_of,
 )
+from thud.recordings.signal import ArraySamples
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

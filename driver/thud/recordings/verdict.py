@@ -13,16 +13,16 @@ from thud.base.checks import refuse, shown
 from thud.base.display import Displayed
 from thud.base.immutable import Immutable
 from thud.level.levels import SOURCES, judge
-from thud.recordings.levels import WITHIN_REPEATABILITY
+from thud.recordings.recorded_levels import WITHIN_REPEATABILITY
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from thud.base.schema import LimitsSource
+    from thud.base._schema import LimitsSource
     from thud.recordings.estimates import Estimate
-    from thud.recordings.levels import AverageLevels
+    from thud.recordings.recorded_levels import AverageLevels
 
 CONFIDENCE = 0.95
 VERDICTS = ("conforms", "does not conform", "cannot be decided")

@@ -9,8 +9,8 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from thud.base.display import left_out
-from thud.plot.look import own_style
-from thud.recordings.levels import BACKGROUND, MARGIN
+from thud.plot.style import own_style
+from thud.recordings.recorded_levels import BACKGROUND, MARGIN
 from thud.recordings.verdict import VERDICTS
 from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
 from thud.report.notes import fit_lines, group_places

@@ -16,7 +16,7 @@ from thud.base.extras import require_extra
 from thud.level.levels import get_bands
 from thud.recordings.contact import Estimate
 from thud.recordings.verdict import VERDICTS
-from thud.report.data import criteria_data, report_data
+from thud.report.contents import criteria_data, report_data
 from thud.report.notes import group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_rows
 from thud.report.write import HTML, JSON, PDF, json_bytes, page_contents, write_files
@@ -187,7 +187,7 @@ def save(recording: Recording, results: Results, *, figures: bool = True) -> Non
     }
     if figures and _has_matplotlib():
         # It takes its time.
-        from thud.plot.look import picture_files
+        from thud.plot.style import picture_files
 
         drawn = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
         contents |= page_contents(data, list(drawn.values()), results.folder)
@@ -208,7 +208,7 @@ def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
     """Return the content of the NetCDF file by its name; warn where xarray is missing."""
     try:
         with require_extra("studies"):
-            from thud.report.dataset import netcdf
+            from thud.report.netcdf import netcdf
     except InputError as error:
         message = f"{folder}: {DATASET} is not written: {error}"
         warnings.warn(message, ReportWarning, stacklevel=3)

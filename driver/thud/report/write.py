@@ -54,7 +54,7 @@ def write_report(
         where the report of another recording is replaced.
     """
     # SciPy takes its time.
-    from thud.report.data import report_data
+    from thud.report.contents import report_data
 
     folder, data = Path(directory), report_data(recording)
     figures = draw_all({name: partial(recording.plot, name) for name in ("force", "levels")})
@@ -119,7 +119,7 @@ def _checksums(data: dict[str, Any]) -> list[str]:
 
 def _earlier(folder: Path) -> list[str] | None:
     """Return the checksums of the recording whose report is in a directory; None of none."""
-    from thud.report.data import FORMAT
+    from thud.report.contents import FORMAT
 
     try:
         data = json.loads(content_of(folder / JSON) or "")

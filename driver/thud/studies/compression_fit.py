@@ -10,11 +10,11 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import least_squares
 
+from thud.base._schema import Ball, Compression
 from thud.base.checks import require_array, require_real
 from thud.base.display import Displayed
 from thud.base.errors import FitWarning, InputError, NumericalError
 from thud.base.key import check_keywords
-from thud.base.schema import Ball, Compression
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.inference import coverage_factor
 from thud.studies.fitting.residual_tests import runs_doubt
@@ -22,7 +22,7 @@ from thud.studies.fitting.residual_tests import runs_doubt
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import CompressionGas, ModelName, ModelOptions
+    from thud.base._schema import CompressionGas, ModelName, ModelOptions
 
 # Points of the curves of the model, between which it is interpolated.
 _POINTS = 81

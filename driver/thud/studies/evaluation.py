@@ -16,9 +16,9 @@ from thud.level.levels import BANDWIDTHS, peak_count
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.base.schema import BandSet, LevelsForce
+    from thud.base._schema import BandSet, LevelsForce
     from thud.case.case import Case
-    from thud.studies.emulation.surrogate import Surrogate
+    from thud.studies.emulation.emulator import Surrogate
 
     Columns = dict[str, NDArray[Any]]
 

@@ -23,8 +23,8 @@ from thud.base.units import scaled
 from thud.case.case import Case, check_case
 from thud.studies.directory import FORMATS
 from thud.studies.emulation.answered_levels import answered, confirmed, within_region
+from thud.studies.emulation.emulator import Surrogate, read_surrogate
 from thud.studies.emulation.plan import read_plan
-from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.case.case import Case
     from thud.case.keys import Value
-    from thud.studies.emulation.surrogate import Surrogate
+    from thud.studies.emulation.emulator import Surrogate
     from thud.studies.parameter import Parameter
     from thud.studies.study import Source
 

@@ -7,8 +7,8 @@ from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Unpack
 
+from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_choice
-from thud.base.schema import KEYS
 from thud.base.tables import format_rows
 from thud.case.keys import OF_FILES, users
 from thud.studies.backends import checked_backend
@@ -17,8 +17,8 @@ from thud.studies.computing import compute_sets
 from thud.studies.dataset import disk_space
 from thud.studies.designs import read_design
 from thud.studies.directory import FORMATS
+from thud.studies.emulation.emulator import Surrogate, read_surrogate
 from thud.studies.emulation.plan import read_plan
-from thud.studies.emulation.surrogate import Surrogate, read_surrogate
 from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.kind import Kind
 from thud.studies.parameter import varied

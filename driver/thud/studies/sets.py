@@ -16,8 +16,8 @@ from thud.studies.study import Study, wall_volume
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from thud.studies.emulation.emulator import Surrogate
     from thud.studies.emulation.plan import Plan
-    from thud.studies.emulation.surrogate import Surrogate
     from thud.studies.temperature import Temperature
 
     Columns = dict[str, NDArray[Any]]

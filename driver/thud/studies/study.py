@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
+from thud.base._schema import MODELS
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_kind, require_words, shown
 from thud.base.errors import InputError
 from thud.base.files import read_input
-from thud.base.schema import MODELS
 from thud.case.case import Case, check_case, new_model, read_case, tables_case
 from thud.case.keys import DENSITY, TEMPERATURE, Value, find_key, put, users
 from thud.studies.parameter import Parameter, checked, quantity

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 from thud.base.checks import refuse
-from thud.studies.emulation.surrogate import Surrogate, read_surrogate
+from thud.studies.emulation.emulator import Surrogate, read_surrogate
 from thud.studies.emulation.training import surrogate_name, train
 from thud.studies.parameter import Parameter
 from thud.studies.set_kind import DropsKind

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base.schema import LimitsSource
+    from thud.base._schema import LimitsSource
     from thud.case.case import Case
     from thud.case.keys import Value
     from thud.studies.kind import How

@@ -13,7 +13,7 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.recordings.channel import MIB, Channel, guarded, library, shown_path, shown_text
 from thud.recordings.grid import even_grid
-from thud.recordings.words import (
+from thud.recordings.header_aliases import (
     DATE,
     TIME_UNITS,
     UNIT,

@@ -14,7 +14,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.recordings.channel import BoundedFile, Channel, guarded, library, shown_path
-from thud.recordings.words import DATE, UNIT, find_rate, find_word, text_of
+from thud.recordings.header_aliases import DATE, UNIT, find_rate, find_word, text_of
 
 if TYPE_CHECKING:
     from pathlib import Path

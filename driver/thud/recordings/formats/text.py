@@ -22,10 +22,9 @@ from thud.base.columns import (
     to_number,
 )
 from thud.recordings.channel import WHOLE, Channel, require_small, shown_path, shown_text
+from thud.recordings.force_units import find_unit
 from thud.recordings.grid import even_grid
-from thud.recordings.signal import ArraySamples
-from thud.recordings.units import find_unit
-from thud.recordings.words import (
+from thud.recordings.header_aliases import (
     DATE,
     RATE,
     STEP,
@@ -37,6 +36,7 @@ from thud.recordings.words import (
     plain,
     split_title,
 )
+from thud.recordings.signal import ArraySamples
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,8 +10,8 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.recordings.channel import Channel, library, require_small, shown_path
 from thud.recordings.grid import even_grid
+from thud.recordings.header_aliases import TIME_UNITS
 from thud.recordings.signal import ArraySamples
-from thud.recordings.words import TIME_UNITS
 
 if TYPE_CHECKING:
     from pathlib import Path

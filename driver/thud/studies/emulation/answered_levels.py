@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
-    from thud.studies.emulation.surrogate import Surrogate
+    from thud.studies.emulation.emulator import Surrogate
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
     from thud.studies.fitting.result import Fit

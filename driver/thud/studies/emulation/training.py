@@ -20,7 +20,7 @@ from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
 from thud.studies.designs import unit_sets
 from thud.studies.directory import require_version
-from thud.studies.emulation.surrogate import (
+from thud.studies.emulation.emulator import (
     SMOOTHNESS,
     Surrogate,
     read_surrogate,

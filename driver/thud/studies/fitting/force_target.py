@@ -11,7 +11,7 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_numbe
 from thud.base.immutable import Immutable
 from thud.impact.impact import Impact
 from thud.level.levels import FORCES, RECORDED_BAND
-from thud.recordings.record import MIN_ROWS, Record, read_record
+from thud.recordings.force_record import MIN_ROWS, Record, read_record
 from thud.recordings.recording import Recording
 from thud.studies.fitting.force_misfit import ForceMisfit
 from thud.studies.fitting.misfit import require_positive
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base.schema import LevelsForce
+    from thud.base._schema import LevelsForce
 
 # A record must hold the whole pulse: mean of its last millisecond over its peak.
 OPEN_END = 0.1

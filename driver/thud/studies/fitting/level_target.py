@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.base.schema import BandSet, LevelsForce
+    from thud.base._schema import BandSet, LevelsForce
     from thud.impact.impact import Impact
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
 from thud.base.errors import InputError
-from thud.base.schema import KEYS
 from thud.case.keys import limits, put, users
 from thud.studies.parameter import fitted
 

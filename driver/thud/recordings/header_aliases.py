@@ -1,0 +1,151 @@
+"""Words of headers: what loggers call sample rate, sampling interval, date, unit and time."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import TYPE_CHECKING
+
+from thud.base.columns import GROUPING, MARKS, to_number
+from thud.recordings.force_units import UNITS, find_unit
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import numpy as np
+
+
+def _words(text: str) -> frozenset[str]:
+    """Return the words of a text."""
+    return frozenset(text.split())
+
+
+# Names in lower case, letters and digits only.
+RATE = _words(
+    "samplerate samplingrate samplefrequency samplingfrequency fs sr sfreq fsample srate "
+    "samplerateperchannel samplespersecond samplespersec scanrate matsamplerate abtastrate "
+    "abtastfrequenz messrate frequenceechantillonnage"
+)
+STEP = _words(
+    "dt deltat deltax timestep samplinginterval sampleinterval sampletime samplingtime "
+    "sampleperiod samplingperiod timeincrement xincrement wfincrement increment interval ts "
+    "tsample abtastintervall abtastzeit"
+)
+DATE = _words(
+    "date datum datetime recorded recordingdate measurementdate measured starttime timestamp "
+    "wfstarttime startdate datestarted created"
+)
+UNIT = _words("unit units einheit unitstring yunit yunits yunitlabel forceunit unitsy")
+TIME = _words("time times t zeit temps tempo sec seconds xvalue abscissa timestamps")
+
+RATE_UNITS = {"": 1.0, "hz": 1.0, "khz": 1e3, "mhz": 1e6, "s/s": 1.0, "1/s": 1.0, "sps": 1.0}
+TIME_UNITS = {
+    "": 1.0, "s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "sekunden": 1.0, "ms": 1e-3,
+    "msec": 1e-3, "milliseconds": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "microseconds": 1e-6,
+    "ns": 1e-9,
+}  # fmt: skip
+# "Force [kN]", "Force (kN)", "Force / kN", "Force in kN", "Force_kN", "Force, kN".
+TITLE = (
+    re.compile(r"(?P<name>[^\[\](){}]*)[\[({](?P<unit>[^\[\](){}]{0,20})[\])}]\s*"),
+    re.compile(r"(?P<name>.*?\S)(?:\s*[/,]\s*|\s+in\s+|_+|\s+)(?P<unit>[^\s/,_]{1,12})\s*"),
+)
+NUMBER = re.compile(
+    rf"(?P<number>[-+]?[\d.,](?:[\d.,{GROUPING}]*[\d.,])?(?:e[-+]?\d+)?)\s*(?P<unit>.*)",
+    re.IGNORECASE,
+)
+# Longer titles and values carry no such words.
+LONGEST = 200
+
+
+def plain(name: str) -> str:
+    """Return a name in lower case, letters and digits only.
+
+    >>> plain("Sample_Rate ")
+    'samplerate'
+    """
+    return "".join(c for c in name[:LONGEST].casefold() if c.isalnum())
+
+
+def split_title(title: str) -> tuple[str, str]:
+    """Return name and unit of a title; the unit is empty where there is none.
+
+    >>> split_title("Force [kN]")
+    ('Force', 'kN')
+    >>> split_title("time_s")
+    ('time', 's')
+    """
+    text = title.strip().strip("\"'").strip()[:LONGEST]
+    bracket, loose = (pattern.fullmatch(text) for pattern in TITLE)
+    if bracket:
+        return bracket["name"].strip(), bracket["unit"].strip()
+    if loose and (find_unit(loose["unit"]) or loose["unit"].casefold() in TIME_UNITS | RATE_UNITS):
+        return loose["name"].strip(), loose["unit"]
+    return text, ""
+
+
+def read_number(text: object, decimal: str = "") -> tuple[float, str] | None:
+    """Return a number and the unit after it; None where there is no number.
+
+    Where both decimal marks fit, the given one is meant. Without one it is the point, and a number
+    such as 51,200, which may have either, is none.
+
+    >>> read_number("51,2 kHz")
+    (51.2, 'kHz')
+    """
+    if isinstance(text, int | float):
+        return float(text), ""
+    found = NUMBER.fullmatch(str(text).strip().strip("\"'").strip()[:LONGEST])
+    if not found:
+        return None
+    values = {mark: to_number(found["number"], mark) for mark in MARKS}
+    known = {value for value in values.values() if value is not None}
+    if not known or (len(known) > 1 and not decimal and "," in found["number"]):
+        return None
+    value = values[decimal or "."] if len(known) > 1 else known.pop()
+    return (value, found["unit"].strip(" []()")) if value is not None else None
+
+
+def find_rate(items: Iterable[tuple[str, object]], decimal: str = "") -> float | None:
+    """Return the sample rate, Hz, from names and values of a header; None where there is none.
+
+    The decimal mark is that of `read_number`.
+    """
+    for title, value in items:
+        name, unit = split_title(title)
+        word = plain(name)
+        number = read_number(value, decimal) if word in RATE or word in STEP else None
+        if number is None or not number[0] > 0:
+            continue
+        given = (number[1] or unit).casefold()
+        if word in RATE and given in RATE_UNITS:
+            return number[0] * RATE_UNITS[given]
+        if word in STEP and given in TIME_UNITS:
+            rate = 1 / (number[0] * TIME_UNITS[given])
+            return rate if math.isfinite(rate) else None
+    return None
+
+
+def find_word(items: Iterable[tuple[str, object]], words: frozenset[str]) -> str:
+    """Return the first value of a header whose name is among words; empty where there is none."""
+    for title, value in items:
+        if plain(split_title(title)[0]) in words and str(value).strip():
+            return str(value).strip().strip("\"'")[:LONGEST]
+    return ""
+
+
+def is_time(title: str) -> bool:
+    """Whether a title is that of a column of times."""
+    name, unit = split_title(title)
+    return plain(name) in TIME or (unit.casefold() in TIME_UNITS and unit not in {"", *UNITS})
+
+
+def text_of(value: object) -> str:
+    """Return an attribute as text: bytes, text, a number, or an array with one of these."""
+    item: np.ndarray | object = value
+    if hasattr(item, "tolist"):
+        item = item.tolist()
+    while isinstance(item, list | tuple) and len(item) == 1:
+        item = item[0]
+    if isinstance(item, bytes):
+        return item.decode("utf-8", "replace")
+    return "" if isinstance(item, list | tuple) or item is None else str(item)

@@ -1,0 +1,207 @@
+"""Signals of one source to drops and where they come from."""
+
+from __future__ import annotations
+
+from collections import deque
+from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tqdm import tqdm
+
+from thud.base.checks import refuse
+from thud.base.errors import NumericalError
+from thud.base.processes import no_interrupt_in_processes, process_pool
+from thud.base.threads import limit_threads, one_thread
+from thud.recordings.checkpoint import KeptDrops
+from thud.recordings.drops import find_windows
+from thud.recordings.estimates import measure_drop
+from thud.recordings.plate_correction import correct_window
+from thud.recordings.ringing import tell_ringing
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from concurrent.futures import ProcessPoolExecutor
+
+    from thud.recordings.config import Config
+    from thud.recordings.drops import Window
+    from thud.recordings.estimates import Drop
+    from thud.recordings.signal import Signal
+
+# Drops, and seconds of a signal, that are worth processes, which take a second to start.
+WORTH = 40
+LONG = 600.0
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where drops come from.
+
+    Attributes
+    ----------
+    name, path, checksum, date, calibration : str
+        As those of a `Signal`; the checksum is SHA-256.
+    sample_rate : float
+        Samples per second, Hz.
+    drops : int
+        Number of drops that were found.
+    steps, remarks : tuple of str
+        What reading has done, and what is doubtful; a sentence each.
+    """
+
+    name: str
+    path: str
+    checksum: str
+    date: str
+    calibration: str
+    sample_rate: float
+    drops: int
+    steps: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @classmethod
+    def of(cls, signal: Signal, drops: int) -> Origin:
+        """Return the origin of a number of drops of a signal."""
+        return cls(
+            signal.name,
+            signal.path,
+            signal.checksum,
+            signal.date,
+            signal.calibration,
+            signal.sample_rate,
+            drops,
+            signal.steps,
+            signal.remarks,
+        )
+
+
+def measure_signals(
+    signals: Iterable[Signal],
+    config: Config,
+    *,
+    progress: bool = False,
+    workers: int = 1,
+    keep: str | os.PathLike[str] | KeptDrops | None = None,
+) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
+    """Return the drops of signals, their origins, and the relative uncertainty of the force.
+
+    The last is the largest of the signals, and None where it is not known of one. The others are
+    those of `read_recording`.
+
+    Raises
+    ------
+    InputError
+        Where there are no signals, or a drop cannot be measured.
+    """
+    drops: list[Drop] = []
+    origins: list[Origin] = []
+    uncertainties: list[float | None] = []
+    # Its many small products are slower by threads.
+    keeping = nullcontext(keep) if isinstance(keep, KeptDrops) else KeptDrops(keep)
+    with one_thread(), keeping as kept, _Processes(workers) as processes:
+        for given in signals:
+            signal = given
+            if config.calibration_uncertainty is not None:
+                signal = replace(given, calibration_uncertainty=config.calibration_uncertainty)
+            # They start while the signal is searched.
+            processes.start(worth=signal.path and signal.n_sample > LONG * signal.sample_rate)
+            windows = find_windows(signal, progress=progress)
+            drops += _measure(windows, config, kept, processes, progress=progress)
+            uncertainties.append(signal.calibration_uncertainty)
+            origins.append(Origin.of(signal, len(windows)))
+    if not drops:
+        refuse("there are no recordings", "one file or more")
+    known = [one for one in uncertainties if one is not None]
+    uncertainty = max(known) if len(known) == len(uncertainties) else None
+    return tuple(drops), tuple(origins), uncertainty
+
+
+def _measure(
+    windows: Sequence[Window],
+    config: Config,
+    kept: KeptDrops,
+    processes: _Processes,
+    *,
+    progress: bool,
+) -> list[Drop]:
+    """Return the drops in the windows of one signal, those that are kept among them."""
+    signal = windows[0].signal
+    found = kept.open(signal, config)
+    left = [window for window in windows if window.start not in found]
+    # An array would go to the processes with each of its windows.
+    processes.start(worth=signal.path and len(left) >= WORTH)
+    call = partial(measure_window, config=config)
+    results = processes.map(call, left) if signal.path else map(call, left)
+    with tqdm(
+        total=len(windows), initial=len(windows) - len(left), unit="drop", desc=signal.name,
+        disable=not progress,
+    ) as bar:  # fmt: skip
+        for window, drop in zip(left, results, strict=True):
+            kept.add(window.start, drop)
+            found[window.start] = drop
+            bar.update()
+    return [found[window.start] for window in windows]
+
+
+class _Processes(ExitStack):
+    """Processes that measure drops, started where that is worth it; a context manager."""
+
+    def __init__(self, workers: int) -> None:
+        super().__init__()
+        self.workers = workers
+        self._pool: ProcessPoolExecutor | None = None
+
+    def start(self, *, worth: object) -> None:
+        """Start the processes where it is worth it, and wait for nothing."""
+        if not worth or self.workers < 2 or self._pool:  # noqa: PLR2004 - one is this process
+            return
+        self._pool = self.enter_context(process_pool(self.workers, limit_threads))
+        with no_interrupt_in_processes():
+            for _ in range(self.workers):
+                self._pool.submit(int)
+
+    def map(self, call: Callable[[Window], Drop], windows: Sequence[Window]) -> Iterator[Drop]:
+        """Yield the results of calls in order, here where no processes were started."""
+        if not self._pool:
+            yield from map(call, windows)
+            return
+        calls = deque(self._pool.submit(call, window) for window in windows)
+        try:
+            while calls:
+                # What was taken is dropped, so that it is not held twice.
+                yield calls.popleft().result()
+        except BrokenExecutor as error:
+            message = (
+                f"{windows[0].signal.name}: a process that measured drops has died; allowed: "
+                "measure again, or with one worker"
+            )
+            raise NumericalError(message) from error
+        finally:
+            for one in calls:
+                one.cancel()
+
+
+def measure_window(window: Window, config: Config) -> Drop:
+    """Return what the drop in a window tells, the resonance of the plate taken out before."""
+    steps, remarks = tuple[str, ...](), tuple[str, ...]()
+    plate = config.resonance
+    if plate is not None:
+        window, steps, remarks = correct_window(window, plate)
+    drop = measure_drop(
+        window,
+        height=config.height,
+        mass=config.mass,
+        calibration_uncertainty=window.signal.calibration_uncertainty or 0.0,
+        mass_uncertainty=config.mass_uncertainty or 0.0,
+        height_uncertainty=config.height_uncertainty or 0.0,
+    )
+    # Factors that the background has cached serve the fit alone, and are larger than all else.
+    contact = replace(drop.contact, background=replace(drop.contact.background))
+    ringing = tell_ringing(contact, plate)
+    drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
+    if plate is None:
+        return drop
+    return replace(drop, steps=(*steps, *drop.steps), remarks=(*remarks, *drop.remarks))

@@ -1,0 +1,302 @@
+"""Force exposure levels of recorded drops: background, uncertainty, average and outliers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thud.base.checks import refuse, require_choice
+from thud.base.immutable import Immutable
+from thud.level.levels import force_exposure_levels, get_bands
+from thud.recordings.band_noise import band_noise
+from thud.recordings.bank import filter_levels
+from thud.recordings.low_pass import attenuation, low_pass_force
+from thud.recordings.outliers import SIGNIFICANCE, Outlier, find_outliers
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from thud.base._schema import BandSet
+    from thud.recordings.estimates import Drop
+
+METHODS = ("exact", "fft", "filter")
+# Level above the background, dB, below which a level is only an upper bound, and below which the
+# standards demand the correction (ISO 10140-4, ISO 16283-2).
+BACKGROUND = (6.0, 15.0)
+# Silence on both sides of the gate for what the low-pass spreads, s: what lies beyond moves no
+# octave by more than 2e-4 dB at 8 kHz and above, 3e-3 dB below.
+MARGIN = 3e-3
+# dB per relative change of an energy.
+ENERGY_DECIBEL = 10 / math.log(10)
+# Contributions that differ from drop to drop, so that the scatter of drops shows them.
+WITHIN_REPEATABILITY = ("noise",)
+
+
+@dataclass(frozen=True, eq=False)
+class LevelEstimate(Immutable):
+    """Levels of one drop.
+
+    Attributes
+    ----------
+    name, bands, method : str
+        Name of the drop, ``"octave"`` or ``"third"``, and how the levels were measured.
+    level : ndarray, shape (n_band,)
+        Force exposure levels, dB, corrected for the background.
+    uncertainty : ndarray, shape (n_band,)
+        Combined standard uncertainty of `contributions`, dB.
+    measured, background : ndarray, shape (n_band,)
+        Levels before the correction, and the level of the noise over the same gate, dB.
+    flag : ndarray of str, shape (n_band,)
+        ``""``: more than 15 dB above the background; ``"corrected"``: 6 to 15 dB above it;
+        ``"background"``: less than 6 dB above it, the level is an upper bound; ``"rate"``: NaN,
+        the sample rate is too low for the band.
+    contributions : dict of ndarray, shape (n_band,)
+        Standard uncertainties, dB: noise, method, filter.
+    steps : tuple of str
+        What was done, a sentence each.
+    """
+
+    name: str
+    bands: BandSet
+    method: str
+    level: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+    measured: NDArray[np.float64]
+    background: NDArray[np.float64]
+    flag: NDArray[np.str_]
+    contributions: dict[str, NDArray[np.float64]]
+    steps: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class AverageLevels(Immutable):
+    """Energy average of the levels of drops.
+
+    Attributes
+    ----------
+    bands, method : str
+        As those of the drops.
+    names : tuple of str, shape (n_drop,)
+        Drops.
+    drops : ndarray, shape (n_drop, n_band)
+        Level of each drop, dB.
+    level, background : ndarray, shape (n_band,)
+        Level of the mean energy, corrected for the mean background, and the latter, dB.
+    uncertainty : ndarray, shape (n_band,)
+        Combined standard uncertainty, dB.
+    flag : ndarray of str, shape (n_band,)
+        As that of a drop, from the mean energies.
+    spread : ndarray, shape (n_band,)
+        Standard deviation of the drops' levels, dB; NaN for a single drop.
+    contributions : dict of ndarray, shape (n_band,)
+        Standard uncertainties of the average, dB. The repeatability, of ``n_drop - 1`` degrees of
+        freedom, holds the noise, which differs from drop to drop, where it is known.
+    outliers : tuple of Outlier
+        Drops that differ from the others.
+    """
+
+    bands: BandSet
+    method: str
+    names: tuple[str, ...]
+    drops: NDArray[np.float64]
+    level: NDArray[np.float64]
+    background: NDArray[np.float64]
+    uncertainty: NDArray[np.float64]
+    flag: NDArray[np.str_]
+    spread: NDArray[np.float64]
+    contributions: dict[str, NDArray[np.float64]]
+    outliers: tuple[Outlier, ...] = field(default=())
+
+
+def measure_levels(
+    drops: Sequence[Drop],
+    bands: BandSet = "octave",
+    method: str = "exact",
+    *,
+    low_pass: bool = False,
+) -> list[LevelEstimate]:
+    """Return the levels of drops, corrected for the background, with their uncertainty.
+
+    The force within the gate of each drop is taken; outside, it is zero. All methods read this
+    force: ``"exact"`` its band energy, ``"fft"`` the 1 Hz bins of a window of 1 s, ``"filter"`` the
+    energy behind filters of class 1. The expected energy of the noise is subtracted.
+
+    Parameters
+    ----------
+    drops
+        Drops of recordings.
+    bands
+        ``"octave"`` or ``"third"``.
+    method
+        ``"exact"``, ``"fft"`` or ``"filter"``.
+    low_pass
+        Whether the force is low-passed at 1.25 kHz before, as in the paper.
+
+    Raises
+    ------
+    InputError
+        Where the method or the bands are not known.
+    """
+    require_choice("method", method, METHODS)
+    noise = band_noise(drops, get_bands(bands))
+    return [
+        _drop_levels(drop, bands, method, one, low_pass=low_pass)
+        for drop, one in zip(drops, noise, strict=True)
+    ]
+
+
+def _drop_levels(
+    drop: Drop, bands: BandSet, method: str, noise: NDArray[np.float64], *, low_pass: bool
+) -> LevelEstimate:
+    """Return the levels of a drop from the energies of its noise, [n_band, 2]."""
+    force, steps = _gated(drop, low_pass=low_pass)
+    rate, edges = drop.sample_rate, get_bands(bands)
+    exact = _levels(force, rate, bands, "exact")
+    measured = exact if method == "exact" else _levels(force, rate, bands, method)
+    expected, deviation = noise.T
+    with np.errstate(divide="ignore"):
+        background = 10 * np.log10(expected)
+    level, flag = _corrected(measured, background)
+    contributions = {
+        "noise": ENERGY_DECIBEL * deviation / 10 ** (level / 10),
+        "method": np.abs(measured - exact) / math.sqrt(3),
+        "filter": attenuation(edges.upper, rate) / math.sqrt(3) * low_pass,
+    }
+    steps = (*steps, f"levels: {_DESCRIPTIONS[method]}", *_background_steps(edges.nominal, flag))
+    return LevelEstimate(
+        drop.name, bands, method, level, _root_sum(contributions), measured, background, flag,
+        contributions, steps,
+    )  # fmt: skip
+
+
+def compare_methods(
+    drop: Drop, bands: BandSet = "octave", *, low_pass: bool = False
+) -> dict[str, NDArray[np.float64]]:
+    """Return the levels of a drop by each method, dB, shape (n_band,), background included."""
+    force, _ = _gated(drop, low_pass=low_pass)
+    return {method: _levels(force, drop.sample_rate, bands, method) for method in METHODS}
+
+
+def average_levels(estimates: Sequence[LevelEstimate]) -> AverageLevels:
+    """Return the energy average of the levels of drops, their spread and their outliers.
+
+    Raises
+    ------
+    InputError
+        Where there are no drops, or their bands or methods differ.
+    """
+    if len({(e.bands, e.method) for e in estimates}) != 1:
+        refuse("the drops differ in bands or method, or there are none", "levels of one kind")
+    first, count = estimates[0], len(estimates)
+    drops = np.array([e.level for e in estimates])
+    energies = np.array([10 ** (e.measured / 10) for e in estimates])
+    with np.errstate(divide="ignore"):
+        background = 10 * np.log10(np.mean([10 ** (e.background / 10) for e in estimates], axis=0))
+    level, flag = _corrected(10 * np.log10(energies.mean(axis=0)), background)
+    unknown = np.full(level.shape, np.nan)
+    weights = 10 ** (drops / 10)
+    weights /= weights.sum(axis=0)
+    contributions = {}
+    for name in first.contributions:
+        parts = weights * np.array([e.contributions[name] for e in estimates])
+        # Relative to the energy of the average, as the energies of the drops add.
+        own = name in WITHIN_REPEATABILITY
+        contributions[name] = np.sqrt((parts**2).sum(axis=0)) if own else parts.sum(axis=0)
+    if count > 1:
+        error = energies.std(axis=0, ddof=1) / math.sqrt(count)
+        error *= ENERGY_DECIBEL / 10 ** (level / 10)
+        contributions = {"repeatability": error, **contributions}
+    counted = {
+        n: c for n, c in contributions.items() if count == 1 or n not in WITHIN_REPEATABILITY
+    }
+    return AverageLevels(
+        first.bands, first.method, tuple(e.name for e in estimates), drops, level, background,
+        _root_sum(counted), flag, drops.std(axis=0, ddof=1) if count > 1 else unknown,
+        contributions, _level_outliers(estimates, drops),
+    )  # fmt: skip
+
+
+_DESCRIPTIONS = {
+    "exact": "band energy of the force within the gate (exact)",
+    "fft": "1 Hz bins of a rectangular window of 1 s, zero outside the gate (fft)",
+    "filter": "Butterworth filters of class 1 of IEC 61260-1, the gated force padded until they "
+    "have rung out (filter)",
+}
+
+
+def _gated(drop: Drop, *, low_pass: bool) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Return the force of the gate, low-passed with some silence on both sides, and the steps."""
+    first, stop = drop.gate
+    force = drop.force[first:stop]
+    begin, end = 1e3 * drop.time[[first, stop - 1]]
+    steps = [f"gate: {begin:.1f} to {end:.1f} ms after first touch, zero outside"]
+    if low_pass:
+        force = np.pad(force, math.ceil(MARGIN * drop.sample_rate))
+        force, sentence = low_pass_force(force, drop.sample_rate)
+        steps.append(sentence)
+    return force, tuple(steps)
+
+
+def _levels(
+    force: NDArray[np.float64], rate: float, bands: BandSet, method: str
+) -> NDArray[np.float64]:
+    """Return levels by a method, dB; NaN where the rate is too low for the band."""
+    if method == "filter":
+        return filter_levels(force, rate, bands)
+    return force_exposure_levels(force, rate, bands, "fft" if method == "fft" else "exact")
+
+
+def _corrected(
+    measured: NDArray[np.float64], background: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.str_]]:
+    """Return levels corrected for the background, and flags.
+
+    Below 6 dB the correction is that at 6 dB. The standards ask for none above 15 dB; it is made
+    there too, up to 0.14 dB, as the measured energy is too large by that of the noise.
+    """
+    low, high = BACKGROUND
+    above = measured - background
+    level = measured + 10 * np.log10(1 - 10 ** (-np.maximum(above, low) / 10))
+    flag = np.where(above < low, "background", np.where(above <= high, "corrected", ""))
+    return level, np.where(np.isnan(measured), "rate", flag)
+
+
+def _root_sum(contributions: dict[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return the combined standard uncertainty."""
+    return np.asarray(np.sqrt(np.sum([part**2 for part in contributions.values()], axis=0)))
+
+
+def _background_steps(nominal: NDArray[np.float64], flag: NDArray[np.str_]) -> tuple[str, ...]:
+    """Return sentences on the correction for the background."""
+    words = {
+        "corrected": "corrected for the background, 6 to 15 dB below",
+        "background": "less than 6 dB above the background, an upper bound",
+        "rate": "not measured, the sample rate is too low",
+    }
+    return tuple(
+        f"{', '.join(f'{f:g}' for f in nominal[flag == key])} Hz: {what}"
+        for key, what in words.items()
+        if (flag == key).any()
+    )
+
+
+def _level_outliers(
+    estimates: Sequence[LevelEstimate], drops: NDArray[np.float64]
+) -> tuple[Outlier, ...]:
+    """Return the outliers in any band, at 5 % for all bands together (Bonferroni)."""
+    nominal = get_bands(estimates[0].bands).nominal
+    names = [e.name for e in estimates]
+    own = np.array([e.contributions["noise"] for e in estimates])
+    return tuple(
+        outlier
+        for band, middle in enumerate(nominal)
+        for outlier in find_outliers(
+            drops[:, band], names, f"level at {middle:g} Hz, dB,", own[:, band],
+            SIGNIFICANCE / len(nominal),
+        )
+    )  # fmt: skip

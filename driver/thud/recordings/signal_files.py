@@ -1,0 +1,252 @@
+"""Files of recorded channels as signals in newtons."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thud.base.checks import refuse, require_choice, require_kind, require_number, shown
+from thud.recordings.channel import MIB, Channel, shown_path, shown_text
+from thud.recordings.excursion import POLARITIES, doubt, find_sign, scan
+from thud.recordings.force_units import (
+    ALLOWED,
+    ASSUMED,
+    UNITS,
+    Calibration,
+    find_unit,
+    newtons_per_unit,
+    require_unit,
+)
+from thud.recordings.formats import read_channels
+from thud.recordings.signal import Signal
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import numpy as np
+    from numpy.typing import NDArray
+
+# Minimum and maximum sample rate, Hz: the octave of 500 Hz needs 1.42 kHz and a filter's slope.
+RATES = (2500.0, 1e8)
+SHORTEST = 8
+# A file of which less than this is stored is a hole; pieces of it that are looked at.
+STORED = 0.01
+MOST_PIECES = 1000
+
+
+def open_signals(  # noqa: PLR0913 - the keys of the configuration
+    path: str | os.PathLike[str],
+    *,
+    channel: int | str | None = None,
+    unit: str | None = None,
+    calibration: float | str | Calibration | None = None,
+    polarity: str | None = None,
+    sample_rate: float | None = None,
+) -> list[Signal]:
+    """Open a recording; see docs/recordings_reading.md for the formats.
+
+    Parameters
+    ----------
+    path
+        File; its format is found by content.
+    channel
+        Number, from 1 (of a table: of the column), or name; without it the channels in units of
+        force, or the only one.
+    unit
+        Unit of the recorded values, where the file does not say it or is wrong.
+    calibration
+        N per unit, a chain of factors such as ``"4.1 pC/N, 10 mV/pC"``, or a `Calibration`.
+    polarity
+        Sign of a compression in the file, ``"positive"`` or ``"negative"``; without it that of
+        the larger excursion.
+    sample_rate
+        Samples per second, Hz, where the file does not say it or is wrong.
+
+    Returns
+    -------
+    list of Signal
+
+    Raises
+    ------
+    InputError
+        One sentence: the file is missing, damaged, too large or of no known format; channel,
+        unit, rate, calibration or sign are not known; the force is not that of such a source.
+    """
+    if polarity is not None:
+        require_choice("polarity", polarity, POLARITIES)
+    given_unit = None if unit is None else require_unit(unit, "recording")
+    if sample_rate is not None:
+        require_number("sample_rate", sample_rate)
+    given = _Given(given_unit, calibration, polarity, sample_rate)
+    file = regular_file(path)
+    channels = read_channels(file)
+    return [
+        _signal(file, one, given, several=len(channels) > 1)
+        for one in choose_channels(channels, channel, shown_path(file))
+    ]
+
+
+def regular_file(path: str | os.PathLike[str]) -> Path:
+    """Return a path; raise InputError where it is no regular file that can be read and is stored.
+
+    To open a pipe could block; a hole of gigabytes is read for minutes.
+    """
+    require_kind("recording", path, str | os.PathLike)
+    file = Path(path)
+    name = shown_path(file)
+    try:
+        found = file.stat()
+        if stat.S_ISREG(found.st_mode):
+            with file.open("rb") as opened:
+                stored = _stored(opened.fileno(), found.st_size)
+    except OSError as error:
+        reason = os.strerror(error.errno or errno.EIO)
+        refuse(f"{name}: cannot be read ({reason})", "a file that can be read", error)
+    except ValueError as error:  # a zero byte
+        refuse(f"{shown(name)}: cannot be read", "the path of a file", error)
+    if not stat.S_ISREG(found.st_mode):
+        kind = "a directory" if stat.S_ISDIR(found.st_mode) else "no regular file"
+        refuse(f"{name}: is {kind}", "a file")
+    if found.st_size > MIB and stored < STORED * found.st_size:
+        refuse(
+            f"{name}: {found.st_size / MIB:.0f} MiB of which {stored / MIB:.1f} MiB are stored",
+            "a complete file",
+        )
+    return file
+
+
+def _stored(descriptor: int, size: int) -> int:
+    """Return the number of bytes of a file that are no holes, at least of its first pieces."""
+    place = stored = 0
+    for _ in range(MOST_PIECES):
+        try:
+            begin = os.lseek(descriptor, place, os.SEEK_DATA)
+            place = os.lseek(descriptor, begin, os.SEEK_HOLE)
+        except OSError as error:
+            # No data after this place, or a file system that does not know.
+            return stored if error.errno == errno.ENXIO else size
+        stored += place - begin
+        if place >= size:
+            return stored
+    return size
+
+
+def choose_channels(channels: list[Channel], channel: int | str | None, name: str) -> list[Channel]:
+    """Return the channels that are meant; raise InputError where that is not clear."""
+    listed = ", ".join(
+        f"{one.number}" + (f" {shown_text(one.name)!r}" if one.name else "")
+        for one in channels[:20]
+    )
+    if channel is None:
+        forces = [one for one in channels if UNITS.get(find_unit(one.unit), ("",))[0] == "N"]
+        if not forces and len(channels) > 1:
+            refuse(
+                f"{name}: has {len(channels)} channels, none of them in a unit of force",
+                f"channel = one of {listed}",
+            )
+        return forces or channels
+    found = [one for one in channels if channel in {one.number, one.name}]
+    if not found and isinstance(channel, str):
+        word = channel.strip().casefold()
+        found = [
+            one
+            for one in channels
+            if word
+            in {str(one.number), one.name.casefold(), one.name.rpartition("/")[2].casefold()}
+        ]
+    if len(found) != 1:
+        refuse(f"{name}: channel = {shown(channel)} fits {len(found)} channels", f"one of {listed}")
+    return found
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What the user says about the values of a file."""
+
+    unit: str | None
+    calibration: float | str | Calibration | None
+    polarity: str | None
+    sample_rate: float | None
+
+
+def _signal(path: Path, one: Channel, given: _Given, *, several: bool) -> Signal:
+    """Return the signal of a channel; raise InputError where something is not known about it."""
+    name = shown_path(Path(path.name))
+    if several:
+        name += f", {shown_text(one.name) or f'channel {one.number}'}"
+    if one.n_sample < SHORTEST:
+        refuse(f"{name}: {one.n_sample} samples", f"{SHORTEST} samples or more")
+    rate, steps = _rate(one, given, name)
+    unit, told = _unit(one, given, name)
+    factor, words, uncertainty = newtons_per_unit(unit, given.calibration, one.counts, name)
+    # The values of integers are fractions of full scale.
+    scale = factor * one.counts if one.counts and unit == "counts" else factor
+    seen = scan(one.samples, one.n_sample, name)
+    sign, changed = find_sign(seen, scale, given.polarity, name)
+    return Signal(
+        name=name,
+        path=str(path),
+        sample_rate=rate,
+        n_sample=one.n_sample,
+        samples=Scaled(one.samples, sign * scale),
+        full_scale=abs(scale) if one.counts else None,
+        date=shown_text(one.date),
+        calibration=words,
+        calibration_uncertainty=uncertainty,
+        steps=(*one.steps, *steps, *told, *changed),
+        remarks=doubt(seen, sign * scale, name, assumed=unit == ASSUMED),
+    )
+
+
+def _rate(one: Channel, given: _Given, name: str) -> tuple[float, tuple[str, ...]]:
+    """Return the sample rate of a channel, Hz, and what was done."""
+    rate = one.sample_rate if given.sample_rate is None else float(given.sample_rate)
+    if rate is None:
+        refuse(f"{name}: the sample rate is not known", "sample_rate in Hz, or a column of times")
+    if not RATES[0] <= rate <= RATES[1]:
+        refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
+    if one.sample_rate in {None, rate}:
+        return rate, ()
+    was = f"{one.sample_rate:.7g} Hz"
+    return rate, (f"The rate of the file, {was}, was replaced by {rate:.7g} Hz as given.",)
+
+
+def _unit(one: Channel, given: _Given, name: str) -> tuple[str, tuple[str, ...]]:
+    """Return the unit of the values of a channel, and what was done."""
+    known = find_unit(one.unit)
+    if given.unit is not None:
+        if known == "FS" and given.unit not in {"FS", "counts"}:
+            refuse(
+                f"{name}: the samples are integers, not values in {given.unit}",
+                "calibration per full scale, such as '10 V/FS, 4 mV/N' or '5000 N/FS'",
+            )
+        if known in {"", "FS", given.unit}:
+            return given.unit, ()
+        return given.unit, (
+            f"The unit of the file, {known}, was replaced by {given.unit} as given.",
+        )
+    if known:
+        return known, ()
+    if not one.unit and given.calibration is None:
+        return ASSUMED, ("The file names no unit; the values were taken to be in N.",)
+    if one.unit or isinstance(given.calibration, str | Calibration):
+        said = f"in {shown_text(one.unit)!r}" if one.unit else "without a unit"
+        refuse(f"{name}: the values are {said}", f"unit = one of {ALLOWED}")
+    return "", ()
+
+
+@dataclass(frozen=True, eq=False)
+class Scaled:
+    """Samples times a number."""
+
+    samples: Callable[[int, int], NDArray[np.float64]]
+    factor: float
+
+    def __call__(self, start: int, stop: int) -> NDArray[np.float64]:
+        """Return the samples from start to before stop."""
+        values = self.samples(start, stop)
+        return values if self.factor == 1.0 else values * self.factor

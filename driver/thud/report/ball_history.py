@@ -1,0 +1,349 @@
+"""One ball over its life: the criteria of its calibration reports against their dates."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from thud.base.checks import refuse
+from thud.base.files import read_input
+from thud.base.immutable import Immutable
+from thud.recordings.verdict import VERDICTS
+from thud.report.contents import FORMAT, read_date
+from thud.report.rows import Style, criterion_row, limits_of, number, style_of
+
+if TYPE_CHECKING:
+    import os
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+YEAR = timedelta(days=365.25)
+# Probability that a trend is told of any criterion of a ball that does not change.
+SIGNIFICANCE = 0.05
+# Reports that make a trend: two lie on any line.
+MIN_REPORTS = 3
+# Later dates are not told, years after the last report.
+FARTHEST = 100.0
+# Reports in the table: the first, and the last ones.
+MAX_COLUMNS = 8
+# Marks of values in the table.
+WORDS = {VERDICTS[0]: "", VERDICTS[1]: " no", VERDICTS[2]: " ?"}
+# Largest report, bytes.
+LARGEST = 2**28
+# What a point of a chart needs of a report.
+KEYS = ("ball", "serial", "source", "date", "verdict", "criteria")
+CRITERION_KEYS = (
+    "name", "unit", "band", "value", "uncertainty", "expanded_uncertainty", "upper_bound", "lower",
+    "upper", "limits_of_standard", "margin", "verdict", "spread", "background", "contributions",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Trend(Immutable):
+    """Straight line through the values of a criterion.
+
+    Attributes
+    ----------
+    slope, expanded : float
+        Change per year and its expanded uncertainty (95 %).
+    significant : bool
+        Whether it is more than chance, at 5 % for all criteria together.
+    time, value : ndarray, shape (2,)
+        Times of the first and the last report, years since the first, and the line there.
+    reached, earliest, latest : float
+        Time at which the line reaches a limit, and between what (95 %), years since the first
+        report; NaN where there is no such time or the trend is not significant.
+    """
+
+    slope: float
+    expanded: float
+    significant: bool
+    time: NDArray[np.float64]
+    value: NDArray[np.float64]
+    reached: float = math.nan
+    earliest: float = math.nan
+    latest: float = math.nan
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Reports of one ball in the order of their dates.
+
+    Attributes
+    ----------
+    title : str
+        Ball and serial number.
+    dates : tuple of datetime, shape (n_report,)
+        Dates of the measurements.
+    reports : tuple of dict, shape (n_report,)
+        Content of each ``report.json``.
+    """
+
+    title: str
+    dates: tuple[datetime, ...]
+    reports: tuple[dict[str, Any], ...]
+
+    @property
+    def years(self) -> NDArray[np.float64]:
+        """Time since the first report, years, shape (n_report,)."""
+        return np.array([(date - self.dates[0]) / YEAR for date in self.dates])
+
+    def day(self, years: float) -> datetime:
+        """Return the day of a time since the first report, years."""
+        return self.dates[0] + years * YEAR
+
+    def criteria(self) -> list[list[dict[str, Any]]]:
+        """Return the entries of each criterion, in the order of the dates."""
+        return [list(one) for one in zip(*(r["criteria"] for r in self.reports), strict=True)]
+
+    def trends(self) -> list[Trend | None]:
+        """Return the trend of each criterion; None with fewer than three dates, or equal values."""
+        series = [(one, self._known(one)) for one in self.criteria()]
+        able = [len(set(years)) >= MIN_REPORTS and np.ptp(v) > 0 for _, (years, v, _) in series]
+        return [
+            _trend(*known, limits_of(one[-1]), SIGNIFICANCE / sum(able)) if is_able else None
+            for (one, known), is_able in zip(series, able, strict=True)
+        ]
+
+    def _known(
+        self, entries: list[dict[str, Any]]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Return times, values and standard uncertainties; upper bounds are no values."""
+        rows = [
+            (year, one["value"], one["uncertainty"] or 0.0)
+            for year, one in zip(self.years, entries, strict=True)
+            if one["value"] is not None and not one["upper_bound"]
+        ]
+        columns = np.array(rows, dtype=np.float64).reshape(-1, 3)
+        return columns[:, 0], columns[:, 1], columns[:, 2]
+
+    def table(self) -> list[tuple[str, ...]]:
+        """Return rows of text: values of each report, the last ones of many, drifts and limits."""
+        criteria, last = self.criteria(), len(self.dates) - 1
+        styles = [style_of(one[0]) for one in criteria]
+        columns = [("", *(style.title for style in styles), "verdict")]
+        for i in range(last + 1):
+            if 0 < i <= last + 1 - MAX_COLUMNS:
+                continue
+            cells = (criterion_row(one[i])[1] + WORDS[one[i]["verdict"]] for one in criteria)
+            day = self.dates[i].date().isoformat()
+            columns.append((day, *cells, self.reports[i]["verdict"]))
+        together = list(zip(styles, self.trends(), strict=True))
+        columns.append(("per year", *(_slope(style, trend) for style, trend in together), ""))
+        columns.append(("limit on", *(self._limit(trend) for _, trend in together), ""))
+        return list(zip(*columns, strict=True))
+
+    def remarks(self) -> list[str]:
+        """Return a sentence for each criterion with a trend that is more than chance."""
+        found = []
+        for one, trend in zip(self.criteria(), self.trends(), strict=True):
+            if trend is None or not trend.significant:
+                continue
+            style = style_of(one[0])
+            told = f"{style.title}: changes by {_slope(style, trend).rstrip(' *')} per year"
+            day = self._told(trend.reached)
+            if day:
+                ends = [self._told(end) or "later" for end in (trend.earliest, trend.latest)]
+                word = "reached" if trend.reached < self.years[-1] else "reaches"
+                told += f"; {word} a limit on {day} (95 %: {ends[0]} to {ends[1]})"
+            found.append(told)
+        return found
+
+    def _limit(self, trend: Trend | None) -> str:
+        return "–" if trend is None else self._told(trend.reached) or "–"
+
+    def _told(self, years: float) -> str:
+        """Return the day of a time; nothing where it is not known or far."""
+        last = float(self.years[-1])
+        if not -FARTHEST < years - last < FARTHEST:
+            return ""
+        try:
+            return self.day(years).date().isoformat()
+        except OverflowError:
+            return ""
+
+
+def read_history(
+    paths: Iterable[str | os.PathLike[str]], *, different_balls: bool = False
+) -> History:
+    """Read the reports of one ball.
+
+    Parameters
+    ----------
+    paths
+        Files ``report.json``, or directories that hold them at any depth.
+    different_balls
+        Whether reports of different balls, serial numbers or sources are allowed.
+
+    Raises
+    ------
+    InputError
+        Where a report cannot be read or has no date, or the balls differ.
+    """
+    files = list(dict.fromkeys(file for path in paths for file in _files(Path(path))))
+    if not files:
+        refuse("there are no reports", "one report.json or more")
+    dated = sorted(((*_read(file), file) for file in files), key=lambda one: one[0])
+    for _, report, file in dated[1:]:
+        _require_same(report, file, dated[0][1], dated[0][2], different_balls=different_balls)
+    names = dict.fromkeys(
+        " ".join(filter(None, (report["ball"], report["serial"]))) for _, report, _ in dated
+    )
+    title = next(iter(names)) if len(names) == 1 else f"{len(names)} balls"
+    reports = tuple(report for _, report, _ in dated)
+    return History(title or "ball", tuple(date for date, _, _ in dated), reports)
+
+
+def _require_same(
+    report: dict[str, Any],
+    file: Path,
+    first: dict[str, Any],
+    origin: Path,
+    *,
+    different_balls: bool,
+) -> None:
+    """Raise InputError where a report is not of the source, or the ball, of the first."""
+    one, other = ([c["name"] for c in r["criteria"]] for r in (report, first))
+    if report["source"] != first["source"] or one != other:
+        what = f"{file}: its source {report['source']!r} or its criteria are not those of {origin}"
+        refuse(what, "reports of one source")
+    for key, words in (("serial", "serial number"), ("ball", "ball")):
+        if report[key] != first[key] and not different_balls:
+            what = f"{file}: its {words} {report[key]!r} is not that of {origin}, {first[key]!r}"
+            refuse(what, "reports of one ball, or --different-balls")
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the reports of a path."""
+    if not path.is_dir():
+        return [path]
+    found = sorted(path.rglob("report.json"))
+    if not found:
+        refuse(f"{path}: holds no report.json", "a directory of reports")
+    return found
+
+
+def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
+    """Return the date and the content of a report."""
+    allowed = "report.json of thud-driver measure"
+    try:
+        if path.stat().st_size > LARGEST:
+            refuse(f"{path}: is larger than {LARGEST >> 20} MiB", allowed)
+        report = json.loads(read_input(path))
+    except (OSError, ValueError, RecursionError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "no JSON"
+        refuse(f"{path}: cannot be read ({reason})", allowed, error)
+    if not isinstance(report, dict) or report.get("format") != FORMAT or not _is_whole(report):
+        refuse(f"{path}: is no calibration report of this version", allowed)
+    date = read_date(report["date"].split(" to ")[0])
+    if date is None:
+        refuse(
+            f"{path}: its date {report['date']!r} is not known",
+            'a date of the recording or of the configuration, such as "2024-05-03"',
+        )
+    return date, report
+
+
+def _is_whole(report: dict[str, Any]) -> bool:
+    """Whether a report holds what a chart needs, numbers where they are due."""
+    entries = report.get("criteria")
+    if any(key not in report for key in KEYS) or not isinstance(entries, list) or not entries:
+        return False
+    if not all(isinstance(report[key], str) for key in KEYS if key != "criteria"):
+        return False
+    return all(
+        isinstance(one, dict)
+        and all(key in one for key in CRITERION_KEYS)
+        and all(_is_number(one[key]) for key in ("lower", "upper"))
+        and all(
+            one[key] is None or _is_number(one[key])
+            for key in (
+                "value", "uncertainty", "expanded_uncertainty", "band", "margin", "spread",
+                "background",
+            )
+        )
+        and all(isinstance(one[key], str) for key in ("name", "unit"))
+        and one["verdict"] in VERDICTS
+        for one in entries
+    )  # fmt: skip
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _trend(
+    time: NDArray[np.float64],
+    value: NDArray[np.float64],
+    uncertainty: NDArray[np.float64],
+    limits: tuple[float, float],
+    significance: float,
+) -> Trend:
+    """Return the line of least squares, weighted by 1/uncertainty2, and what it tells.
+
+    Its uncertainty is the larger of that which the values state and that which they show by their
+    scatter, of n - 2 degrees of freedom: a line that only one of them supports is not told.
+    """
+    count = len(time)
+    stated = bool((uncertainty > 0).all())
+    weight = 1 / uncertainty**2 if stated else np.ones(count)
+    middle, mean = (float(weight @ column / weight.sum()) for column in (time, value))
+    spread = float(weight @ (time - middle) ** 2)
+    slope = float(weight @ ((time - middle) * (value - mean))) / spread
+    rest = value - mean - slope * (time - middle)
+    scatter = math.sqrt(float(weight @ rest**2) / (count - 2))
+
+    def factor(probability: float) -> float:
+        """Return the half width of an interval over 1/sqrt(sum of weights)."""
+        quantile = student.ppf(1 - probability / 2, [count - 2, np.inf])
+        return float(max(quantile[0] * scatter, quantile[1] if stated else 0.0))
+
+    expanded = factor(0.05) / math.sqrt(spread)
+    bound = factor(significance) / math.sqrt(spread)
+    # Values that are equal but for rounding have no trend.
+    rounding = 1e-9 * max(float(np.abs(value).max()), 1e-300)
+    significant = abs(slope) > bound and abs(slope) * float(np.ptp(time)) > rounding
+    ends = np.array([time[0], time[-1]])
+    line = mean + slope * (ends - middle)
+    times = (math.nan, math.nan, math.nan)
+    if significant:
+        limit = limits[1] if slope > 0 else limits[0]
+        times = _reach(limit - mean, slope, factor(0.05), weight.sum(), spread)
+    return Trend(slope, expanded, significant, ends, line, *(middle + one for one in times))
+
+
+def _reach(
+    distance: float, slope: float, factor: float, weights: float, spread: float
+) -> tuple[float, float, float]:
+    """Return when a line reaches a limit, and between what, since the weighted mean time.
+
+    Fieller: the times at which the limit lies on the edge of the interval of the line,
+    (distance - slope t)2 = factor2 (1/weights + t2/spread).
+    """
+    a = slope**2 - factor**2 / spread
+    b = slope * distance
+    c = distance**2 - factor**2 / weights
+    root = b**2 - a * c
+    if a <= 0 or root < 0:
+        return distance / slope, math.nan, math.nan
+    low, high = (b - math.sqrt(root)) / a, (b + math.sqrt(root)) / a
+    return distance / slope, low, high
+
+
+def _slope(style: Style, trend: Trend | None) -> str:
+    """Return a drift with its expanded uncertainty, marked where it is more than chance."""
+    if trend is None:
+        return "–"
+    slope, expanded = trend.slope / style.unit, trend.expanded / style.unit
+    decimals = style.decimals + 1
+    sign = "+" if round(slope, decimals) > 0 else ""
+    mark = " *" if trend.significant else ""
+    return f"{sign}{number(slope, decimals)} ± {number(expanded, decimals)}{mark}"

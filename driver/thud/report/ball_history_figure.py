@@ -1,0 +1,103 @@
+"""The control chart of a ball: each criterion against the date, with its limits."""
+
+from __future__ import annotations
+
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+from matplotlib.ticker import MultipleLocator
+
+from thud.plot.style import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure, own_style
+from thud.report.rows import NOT_KNOWN, limits_of, style_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from thud.report.ball_history import History, Trend
+
+# Marker and its filling by verdict: distinct in grey as well.
+MARKS = {
+    "conforms": ("o", COLOURS[0]),
+    "cannot be decided": ("s", "white"),
+    "does not conform": ("X", COLOURS[1]),
+}
+# Room beyond the first and the last report, as part of the time between them, and at least.
+ROOM, MIN_ROOM = 0.06, timedelta(days=15)
+
+
+@own_style()
+def draw_history(history: History) -> Figure:
+    """Draw each criterion of a ball against the date of its reports.
+
+    Grey is what the limits allow, bars are expanded uncertainties (95 %), markers tell the verdict;
+    trends that are more than chance have a line.
+    """
+    criteria, trends = history.criteria(), history.trends()
+    rows = -(-len(criteria) // 2)
+    figure = new_figure(0.5 + 1.15 * rows, 2 * WIDTH)
+    panels = figure.subplots(rows, 2, sharex=True, squeeze=False).T.ravel()
+    for axes, entries, trend in zip(panels, criteria, trends, strict=False):
+        _draw_criterion(dress(axes), history, entries, trend)
+    for axes in panels[len(criteria) :]:
+        axes.remove()
+    figure.align_ylabels()
+    room = max(ROOM * (history.dates[-1] - history.dates[0]), MIN_ROOM)
+    first = panels[0]
+    first.set_xlim(history.dates[0] - room, history.dates[-1] + room)
+    locator = AutoDateLocator(minticks=3, maxticks=6)  # type: ignore[no-untyped-call]
+    first.xaxis.set_major_locator(locator)
+    formatter = ConciseDateFormatter(locator)  # type: ignore[no-untyped-call]
+    first.xaxis.set_major_formatter(formatter)
+    _add_legend(first, trends)
+    return figure
+
+
+def _draw_criterion(
+    axes: Axes, history: History, entries: list[dict[str, Any]], trend: Trend | None
+) -> None:
+    """Draw one criterion."""
+    style = style_of(entries[0])
+    bounds = np.array([limits_of(one) for one in entries]) / style.unit
+    # A count has one value that is allowed, and its area no width.
+    is_count = bounds[0, 0] == bounds[0, 1]
+    bounds += is_count * np.array([-0.4, 0.4])
+    # Beyond both ends of the axis.
+    span = history.dates[-1] - history.dates[0] + MIN_ROOM
+    edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
+    lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
+    axes.fill_between(edges, lower, upper, step="mid", color=GREY, linewidth=0)
+    for date, one in zip(history.dates, entries, strict=True):
+        if one["value"] is None:
+            continue
+        marker, colour = MARKS.get(one["verdict"], ("D", "white"))
+        bar = (one["expanded_uncertainty"] or 0.0) / style.unit
+        axes.errorbar(
+            date, one["value"] / style.unit, yerr=bar,  # type: ignore[arg-type]
+            marker=marker, markersize=4.5, markerfacecolor=colour, color="black", capsize=2,
+            elinewidth=0.8, markeredgewidth=0.7,
+        )  # fmt: skip
+    if all(one["value"] is None for one in entries):
+        axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center", fontsize=SIZE)
+    if trend is not None and trend.significant:
+        dates = np.array([history.day(year) for year in trend.time])
+        axes.plot(dates, trend.value / style.unit, color=COLOURS[0], linewidth=1, linestyle="--")
+    axes.margins(y=0.15)
+    if is_count:
+        axes.yaxis.set_major_locator(MultipleLocator(1))
+    axes.set_ylabel(style.title.replace(", ", ",\n"), fontsize=SIZE)
+
+
+def _add_legend(axes: Axes, trends: list[Trend | None]) -> None:
+    """Put a legend above the panels."""
+    axes.fill_between([], [], color=GREY, linewidth=0, label="allowed")
+    for verdict, (marker, colour) in MARKS.items():
+        axes.errorbar(
+            [], [], yerr=[], label=verdict, marker=marker, markersize=4.5, markerfacecolor=colour,
+            color="black", linestyle="none", capsize=2, elinewidth=0.8, markeredgewidth=0.7,
+        )  # fmt: skip
+    if any(trend is not None and trend.significant for trend in trends):
+        axes.plot([], [], color=COLOURS[0], linewidth=1, linestyle="--", label="trend")
+    legend_above(axes)
