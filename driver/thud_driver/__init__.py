@@ -13,21 +13,18 @@ import sys
 import time
 import warnings
 from contextlib import suppress
-from threading import Thread, main_thread
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from io import TextIOWrapper
-    from types import FrameType, TracebackType
+    from types import FrameType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 # Errors of a screen that nobody reads: its pipe or its descriptor is closed.
 _CLOSED = frozenset({errno.EPIPE, errno.EBADF})
 # Time in which another signal is a copy of the first: some callers send it to process and group, s.
 _COPIES = 1.0
-# Time between two attempts to interrupt, and time after which an import is not waited for, s.
-_PAUSE, _PATIENCE = 0.005, 0.4
 
 
 def main() -> int:
@@ -46,8 +43,7 @@ def main() -> int:
     # Coroutines that an interrupt ends would say that nobody has awaited them.
     warnings.filterwarnings("ignore", "coroutine ")
     interrupt = _Interrupt()
-    sys.unraisablehook = interrupt.retry
-    sys.excepthook = interrupt.show
+    sys.unraisablehook = interrupt.show_lost
     _handle(interrupt)
     try:
         code = run()
@@ -82,66 +78,23 @@ def _say(number: int) -> int:
 
 
 class _Interrupt:
-    """Handler that raises KeyboardInterrupt with the number of the signal, once."""
+    """Handler of signals: the first raises KeyboardInterrupt, the next ends the process."""
 
     def __init__(self) -> None:
-        self.first = 0.0
         self.number = 0
-        self.heard = False
-        self.sender: Thread | None = None
+        self.time = 0.0
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        if not self.first:
-            self.first = time.monotonic()
-            self.number = number
-            self.attempt(number, frame)
-        elif time.monotonic() > self.first + _COPIES:
+        if not self.number:
+            self.number, self.time = number, time.monotonic()
+            raise KeyboardInterrupt
+        if time.monotonic() > self.time + _COPIES:
             _end(number, frame)
 
-    def attempt(self, number: int, frame: FrameType | None) -> None:
-        """Raise it, but not in imports and `retry`: they lose or print what they do not expect."""
-        while frame and not (
-            frame.f_code.co_filename.startswith("<frozen importlib")
-            or frame.f_code is _Interrupt.retry.__code__
-        ):
-            frame = frame.f_back
-        if not frame:
-            self.heard = True
-            signal.signal(number, self)
-            raise KeyboardInterrupt(number)
-        if time.monotonic() > self.first + _PATIENCE:
-            _end(number, frame)
-        self.again(number)
-
-    def again(self, number: int) -> None:
-        """Try again a little later."""
-        signal.signal(number, self.attempt)
-        self.heard = False
-        if not self.sender:
-            self.sender = Thread(target=self._send, args=(number,), daemon=True)
-            self.sender.start()
-
-    def _send(self, number: int) -> None:
-        # A call of the library that begins just then leaves the first unheard, and hears the next;
-        # the main thread may wait for the system, which a signal to another would not end.
-        while True:
-            time.sleep(_PAUSE)
-            if not self.heard:
-                signal.pthread_kill(cast("int", main_thread().ident), number)
-
-    def retry(self, lost: sys.UnraisableHookArgs) -> None:
-        """Take up what a callback, such as one of a weak reference, could not raise."""
-        if isinstance(lost.exc_value, KeyboardInterrupt):
-            self.again(*lost.exc_value.args or SIGNALS[:1])
-        elif not self.number:  # objects that an interrupt has left half made fail as they go
+    def show_lost(self, lost: sys.UnraisableHookArgs) -> None:
+        """Show an error that could not be raised; objects half made at an interrupt have some."""
+        if not self.number:
             sys.__unraisablehook__(lost)
-
-    def show(
-        self, kind: type[BaseException], error: BaseException, trace: TracebackType | None
-    ) -> None:
-        """Show an error; compiled modules show an interrupt before `retry` takes it up."""
-        if not isinstance(error, KeyboardInterrupt):
-            sys.__excepthook__(kind, error, trace)
 
 
 def _open_screen() -> None:

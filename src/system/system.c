@@ -18,8 +18,8 @@
 #include <time.h>
 #include <unistd.h>
 
-// Of the module thud_interrupt: loops that poll it end their work.
-extern volatile sig_atomic_t thud_latest_signal;
+// Number of the signal that asks to end the work, 0 for none; loops that poll it, by the module thud_interrupt, end theirs.
+volatile sig_atomic_t thud_latest_signal = 0;
 
 static volatile sig_atomic_t deferred = 0;
 static const char *volatile interruption = "\nthud: interrupted; nothing was written\n";

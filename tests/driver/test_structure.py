@@ -57,9 +57,34 @@ def fortran_uses(root: Path) -> dict[str, set[str]]:
         for path, text in texts.items()
         for name in module_line.findall(text)
     }
-    return {
+    found = {
         path.relative_to(root).as_posix(): {places[name] for name in use_line.findall(text)}
         for path, text in texts.items()
+    }
+    for path, used in c_uses(root, texts).items():
+        found.setdefault(path, set()).update(used)
+    return found
+
+
+def c_uses(root: Path, texts: dict[Path, str]) -> dict[str, set[str]]:
+    """Return the files whose names each file uses through C, by paths below the root.
+
+    A name of C has its place where C defines it, or else in the module that declares it as a
+    variable.
+    """
+    sources = {path: path.read_text(encoding="utf-8") for path in sorted(root.rglob("*.c"))}
+    defined = re.compile(r"^(?!extern)[\w ]+?[ *](thud_\w+)(?: = |\()[^;{]*(?:;|\n\{)", re.MULTILINE)
+    places = {
+        name: path.relative_to(root).as_posix()
+        for path, text in sources.items()
+        for name in defined.findall(text)
+    }
+    return {
+        path.relative_to(root).as_posix(): {
+            places[name] for name in re.findall(r"\bthud_\w+", text) if name in places
+        }
+        - {path.relative_to(root).as_posix()}
+        for path, text in (sources | texts).items()
     }
 
 

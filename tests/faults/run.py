@@ -27,7 +27,6 @@ from edge_cases import LUMPED, WEIGHTS
 from edges import check_many, check_models
 from foreign_files import check_foreign
 from kills import check_kills, check_slow_kills
-from memory import check_memory
 from places import check_places, check_steps, plan as plan_steps
 from servers import check_explorer
 from soak import check_soak
@@ -51,7 +50,6 @@ def parts() -> dict[str, Part]:
         "explorer": Part(2000, 8, check_explorer),
         "clusters": Part(400, 2, check_clusters),
         "soak": Part(100_000, 100, check_soak, share=100),
-        "memory": Part(1000, 12, check_memory),
         "namelists": Part(1_000_000, 400, each(namelists.attempt), limit=10, may_stop=True),
         "recordings": Part(100_000, 1000, each(mutate_recordings.attempt), limit=20),
         "studies": Part(100_000, 60, each(study_files.attempt), limit=20, may_stop=True),

@@ -1,4 +1,4 @@
-!> Interrupts of long work: whoever handles signals notes them here, long loops ask.
+!> Interrupts of long work: a handler of signals notes them in system.c; loops ask here.
 module thud_interrupt
    use, intrinsic :: iso_c_binding, only: c_int
    use thud_error, only: error_type, signal_base
@@ -7,8 +7,8 @@ module thud_interrupt
 
    public :: check_interrupt, is_interrupted, latest_signal
 
-   !> Number of the signal that asks to end the work, 0 for none; a handler of signals may set it.
-   integer(c_int), volatile, bind(c, name='thud_latest_signal') :: latest_signal = 0_c_int
+   !> Number of the signal that asks to end the work, 0 for none; defined in system.c.
+   integer(c_int), volatile, bind(c, name='thud_latest_signal') :: latest_signal
 
 contains
 
