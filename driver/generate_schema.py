@@ -40,6 +40,7 @@ from typing import Literal, TypedDict, Unpack, overload
 
 from thud.base._schema import (
 {names})
+from thud.case.case import Case
 from thud.impact.impact import Impact
 '''
 # A model is given by name, in its place or as a keyword; the first is the default.
@@ -50,6 +51,11 @@ def solve(
     **options: Unpack[{options}],
 ) -> Impact:
     """Drop a ball on a floor{by}."""
+'''
+OF_CASE = '''
+@overload
+def solve(ball: Case) -> Impact:
+    """Compute the impact of a case."""
 '''
 # What a class has beside its keys.
 STANDARD_BALL = '''
@@ -253,6 +259,7 @@ def python_calls(schema: Entry) -> str:
         parts += [f"    {key['name']}: {python_type(key)}\n" for key in members]
         if base == "TypedDict":
             parts.append("    floor: FloorOptions | None\n")
+    parts.append(OF_CASE)
     for model in models:
         words = {"options": f"{class_name(model)}Options", "by": f" by the model ``{model}``"}
         name = f"Literal[{quoted(model)}]"

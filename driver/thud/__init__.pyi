@@ -50,7 +50,6 @@ from .impact.compression import (
     CompressionCurve as CompressionCurve,
     compress as compress,
 )
-from .impact.compute import solve_case as solve_case
 from .impact.ensemble import solve_many as solve_many
 from .impact.floor_impact import (
     FloorEnergy as FloorEnergy,

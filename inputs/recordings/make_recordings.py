@@ -44,7 +44,7 @@ def drop(height: float) -> thud.Impact:
     case = dataclasses.replace(
         MODEL, drop=dataclasses.replace(MODEL.drop, height=height), sampling=sampling
     )
-    return thud.solve_case(case)
+    return thud.solve(case)
 
 
 def felt(force: np.ndarray) -> np.ndarray:

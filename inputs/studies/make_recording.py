@@ -26,7 +26,7 @@ TRUTH = Path(__file__).parents[1] / "rubber_ball_fe_viscous.nml"
 
 def main() -> None:
     """Write the recording."""
-    impact = thud.solve_case(thud.read_case(TRUTH))
+    impact = thud.solve(thud.read_case(TRUTH))
     time = np.arange(round(LENGTH * RATE)) / RATE
     force = np.random.default_rng(SEED).normal(scale=NOISE, size=len(time))
     force += OFFSET + DRIFT * time + HUM * np.sin(2 * np.pi * MAINS * time)

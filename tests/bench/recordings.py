@@ -41,7 +41,7 @@ def pulses(height: float) -> list[tuple[float, np.ndarray]]:
     found, touch = [], 0.0
     for _ in range(1 + BOUNCES):
         drop = replace(case.drop, height=height)
-        impact = thud.solve_case(replace(case, drop=drop, sampling=sampling))
+        impact = thud.solve(replace(case, drop=drop, sampling=sampling))
         found.append((touch, impact.floor_force))
         velocity = impact.restitution * math.sqrt(2 * drop.gravity * height)
         touch += impact.contact_time + 2 * velocity / drop.gravity

@@ -40,7 +40,7 @@ def pulses() -> dict[str, np.ndarray]:
     found = {"half sine": 1500 * np.sin(np.pi * time / 0.02)}
     for name in CASES:
         case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"{name}.nml")
-        impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.05)))
+        impact = thud.solve(replace(case, sampling=thud.Sampling(FINE, 0.05)))
         found[name] = impact.floor_force[: int(np.ceil(impact.exact_contact_time * FINE)) + 1]
     return found
 

@@ -72,7 +72,7 @@ def test_values_of_other_types_are_refused(value: object) -> None:
 @pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\0b"], ids=repr)
 def test_names_are_plain_text(name: str) -> None:
     with pytest.raises(thud.InputError, match=naming("&case: name", repr(name))):
-        thud.solve_case(thud.Case(name=name))
+        thud.solve(thud.Case(name=name))
 
 
 @pytest.mark.parametrize("name", ["a" + 300 * " " + "b", "a" * 129, "a\\b", "a/b"])

@@ -363,7 +363,7 @@ def test_levels_of_long_contacts_are_those_of_single_drops() -> None:
     columns = {"mass": [250.0, 2.5, 240.0], "height": [0.01, 1.0, 0.01]}
     many = thud.solve_many(columns, case)
     for i, (mass, height) in enumerate(zip(*columns.values(), strict=True)):
-        single = thud.solve_case(
+        single = thud.solve(
             dataclasses.replace(case, ball=thud.Ball(mass=mass), drop=thud.Drop(height=height))
         )
         alone = thud.solve_many({name: [one[i]] for name, one in columns.items()}, case)
@@ -428,7 +428,7 @@ def test_numbers_below_a_floor_stand_in_their_columns(bands: Any) -> None:  # no
         levels=thud.Levels(bands=bands),
     )  # fmt: skip
     found = thud.solve_many({"height": [0.9]}, case)
-    impact = thud.solve_case(replace(case, drop=thud.Drop(0.9)))
+    impact = thud.solve(replace(case, drop=thud.Drop(0.9)))
     assert impact.on_floor is not None
     kinds = ["octave", "third"] if bands == "both" else [bands]
     assert list(found.contact_levels) == kinds

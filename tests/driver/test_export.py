@@ -160,7 +160,7 @@ def test_rates_that_are_refused(rate: float, message: str) -> None:
 
 def test_force_is_that_which_the_case_judges() -> None:
     case = thud.Case(levels=thud.Levels(force="elastic"))
-    impact = thud.solve_case(case)
+    impact = thud.solve(case)
     assert np.array_equal(blocked_force(impact).force, impact.elastic_force)
     assert np.array_equal(FORCE.force, IMPACT.floor_force)
     assert "elastic" in blocked_force(impact).words()[0]

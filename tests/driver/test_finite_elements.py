@@ -54,7 +54,7 @@ def same(one: object, other: object) -> bool:
 def test_results_are_read_back_to_the_last_bit(run: Callable[..., object], name: str) -> None:
     run(REPOSITORY / f"inputs/{name}.nml")
     found = thud.read_results(f"outputs/{name}")
-    assert same(found, thud.solve_case(found.case))
+    assert same(found, thud.solve(found.case))
 
 
 def test_results_that_are_none_are_told(tmp_path: Path) -> None:
@@ -266,7 +266,7 @@ def test_impossible_cases_get_one_sentence(text: str, words: str) -> None:
 def check_refusal(text: str, words: str) -> None:
     Path("case.nml").write_text(text, encoding="utf-8")
     with pytest.raises(thud.ThudError, match=words) as caught:
-        thud.solve_case(thud.read_case("case.nml"))
+        thud.solve(thud.read_case("case.nml"))
     assert "\n" not in str(caught.value)
 
 

@@ -82,7 +82,7 @@ def test_confidence_below_rounding_has_intervals_without_width() -> None:
 def test_every_model_can_be_fitted(
     case: thud.Case, truth: dict[str, float], starts: dict[str, float]
 ) -> None:
-    target = thud.solve_case(with_values(case, truth))
+    target = thud.solve(with_values(case, truth))
     fit = thud.fit(target, starts or list(truth), case)
     assert fit.values == pytest.approx(truth, rel=SOLVED)
     assert not fit.warnings
@@ -91,7 +91,7 @@ def test_every_model_can_be_fitted(
 def test_finite_element_loss_factor_from_noisy_force() -> None:
     case = thud.Case(model=COARSE)
     truth = {"youngs_modulus": 2.08e6, "loss_factor": 0.25}
-    record = noisy_record(thud.solve_case(with_values(case, truth)), 5.0, seed=1)
+    record = noisy_record(thud.solve(with_values(case, truth)), 5.0, seed=1)
     fit = thud.fit(thud.ForceTarget(record, offset=False), list(truth), case)
     for name, value in truth.items():
         # A miss by four standard errors has a probability of 6e-5.
@@ -129,7 +129,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, cou
     confidence = 0.9
     truth = {"youngs_modulus": 1.8e6, "height": 1.1, "time_shift": 220 / RATE - 0.1}
     case = thud.Case(sampling=thud.Sampling(duration=0.026))
-    impact = thud.solve_case(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
+    impact = thud.solve(replace(case, ball=TRUTH, drop=thud.Drop(1.1)))
     impact = replace(impact, floor_force=np.append(impact.floor_force, np.zeros(2000)))
     starts = {"youngs_modulus": 1.8e6, "height": 1.1}
     covered = dict.fromkeys(truth, 0)
@@ -313,13 +313,13 @@ def test_parameters_that_are_not_identifiable_are_named(
 def test_parameter_without_effect_is_named() -> None:
     case = thud.Case(model=thud.ModalBall())
     with pytest.warns(thud.FitWarning, match=naming("loss_frequency")):
-        fit = thud.fit(thud.solve_case(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
+        fit = thud.fit(thud.solve(case), {"youngs_modulus": 1.5e6, "loss_frequency": 80}, case)
     assert fit.values["youngs_modulus"] == pytest.approx(1.6e6, rel=1e-6)
     assert np.isfinite(fit.standard_errors["youngs_modulus"])
 
 
 def test_modulus_and_wall_are_hardly_identifiable_from_low_octaves() -> None:
-    impact = thud.solve_case(MODAL)
+    impact = thud.solve(MODAL)
     names = ["youngs_modulus", "wall_thickness"]
     low = thud.LevelTarget(impact.levels(force="floor")[:2], 0.5, frequencies=[31.5, 63])
     with pytest.warns(thud.FitWarning, match=naming(*names)):
@@ -333,7 +333,7 @@ def test_modulus_and_wall_are_hardly_identifiable_from_low_octaves() -> None:
 @pytest.mark.parametrize("bands", ["octave", "third"])
 def test_levels_and_what_else_is_known(bands: str) -> None:
     truth = {"youngs_modulus": 1.75e6, "loss_factor": 0.18}
-    impact = thud.solve_case(with_values(MODAL, truth))
+    impact = thud.solve(with_values(MODAL, truth))
     target = thud.LevelTarget(
         impact.levels(bands, force="floor"),
         uncertainty=0.2,
@@ -357,7 +357,7 @@ def test_contact_time_is_reported_between_samples() -> None:
 
 
 def test_model_that_cannot_follow_is_reported() -> None:
-    record = noisy_record(thud.solve_case(MODAL), 5.0, 1)
+    record = noisy_record(thud.solve(MODAL), 5.0, 1)
     with pytest.warns(thud.FitWarning, match=naming("model", "force")):
         thud.fit(thud.ForceTarget(record, offset=False), ["youngs_modulus"])
     with (
@@ -441,7 +441,7 @@ def test_best_of_several_starts_counts() -> None:
     case = thud.Case(model=COARSE)
     names = {"youngs_modulus": thud.Parameter(5e6, 1e6, 6e6), "loss_factor": None}
     once, often = (
-        quiet_fit(thud.solve_case(case), names, case, max_steps=2, starts=starts, seed=4)
+        quiet_fit(thud.solve(case), names, case, max_steps=2, starts=starts, seed=4)
         for starts in (1, 4)
     )
     assert often.noise <= once.noise
@@ -491,7 +491,7 @@ def test_contact_times_that_jump_hide_no_parameter() -> None:
     # The end of the contact moves from ring to ring: here between two close moduli, by 1.5e-5 s.
     model = thud.ModalBall(damping_law="rising", loss_factor=0.1889)
     case = thud.Case(ball=thud.Ball(youngs_modulus=1.71513e6), model=model)
-    impact = thud.solve_case(case)
+    impact = thud.solve(case)
     target = thud.LevelTarget(
         impact.levels(force="floor").tolist(), 0.3, contact_time=(impact.exact_contact_time, 1e-4)
     )

@@ -51,7 +51,7 @@ def record(
     case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the force of a drop with quiet, white noise and an offset."""
-    impact = thud.solve_case(replace(case, drop=thud.Drop(height)))
+    impact = thud.solve(replace(case, drop=thud.Drop(height)))
     contact = int(impact.contact_time * RATE) + 2
     force = np.pad(impact.floor_force[:contact], QUIET) + offset
     force += np.random.default_rng(seed).normal(scale=noise, size=len(force))
@@ -107,7 +107,7 @@ def test_information_of_records_adds() -> None:
 
 
 def test_forces_and_levels_are_fitted_together() -> None:
-    impact = thud.solve_case(replace(CASE, drop=thud.Drop(0.5)))
+    impact = thud.solve(replace(CASE, drop=thud.Drop(0.5)))
     targets = [
         thud.ForceTarget(record(CASE, 1.0, 5.0, 3)),
         thud.LevelTarget(impact.levels(force="floor"), 0.1, fixed={"height": 0.5}),

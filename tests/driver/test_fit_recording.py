@@ -62,7 +62,7 @@ def write(path: Path, *impacts: thud.Impact, **faults: object) -> float:
 def record(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, float]:
     """Return a recording of the ball by finite elements, and its noise, N."""
     path = tmp_path_factory.mktemp("recordings") / "ball.wav"
-    noise = write(path, thud.solve_case(CASE), hum=(50.0, 2.0))
+    noise = write(path, thud.solve(CASE), hum=(50.0, 2.0))
     return read_recording(path), noise
 
 
@@ -85,7 +85,7 @@ def test_residuals_tell_the_law_of_the_loss(tmp_path: Path) -> None:
     ball = thud.Ball(youngs_modulus=1.75e6)
     options = {"loss_factor": 0.18}
     laws = {law: thud.ModalBall(damping_law=law, **options) for law in ("rising", "constant")}
-    write(tmp_path / "ball.wav", thud.solve_case(thud.Case(ball=ball, model=laws["rising"])))
+    write(tmp_path / "ball.wav", thud.solve(thud.Case(ball=ball, model=laws["rising"])))
     recording = read_recording(tmp_path / "ball.wav")
     names = ["youngs_modulus", "loss_factor"]
     found = thud.fit(recording, names, thud.Case(model=laws["rising"]))

@@ -138,7 +138,7 @@ def test_tapping_machine_refuses_what_is_no_concrete_plate() -> None:
 
 def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparison) -> None:
     thin, thick = found.predictions.values()
-    expected = thud.predict_level(thud.solve_case(CASES["thin"]))
+    expected = thud.predict_level(thud.solve(CASES["thin"]))
     assert thin.level == pytest.approx(expected.level)
     rows = {row[0]: row[1:] for row in found.rows()}
     assert rows[""] == ("thin", "thick")

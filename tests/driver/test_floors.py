@@ -89,7 +89,7 @@ def test_results_on_a_floor_are_read_back(
     found = thud.read_results(folder)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", thud.PlausibilityWarning)
-        expected = thud.solve_case(found.case)
+        expected = thud.solve(found.case)
     moved, wanted = found.on_floor, expected.on_floor
     assert moved is not None
     assert wanted is not None

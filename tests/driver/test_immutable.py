@@ -168,7 +168,7 @@ def test_case_says_the_modes_that_were_computed() -> None:
     impact = thud.solve(model=model)
     frequency *= 1.1
     assert impact.case.model == thud.MeasuredModes(frequency=[60.0, 110.0], **others)
-    assert thud.solve_case(impact.case) == impact
+    assert thud.solve(impact.case) == impact
     assert hash(model) == hash(thud.MeasuredModes(frequency=(60, 110), **others))
 
 

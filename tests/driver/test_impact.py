@@ -137,7 +137,7 @@ def test_each_question_is_answered_for_the_force_that_is_asked() -> None:
         model=thud.HollowSphere(), levels=thud.Levels(force="elastic", method="fft"),
         limits=thud.Limits("tyre"), ball=thud.Ball(mass=2.4), drop=thud.Drop(0.9),
     )  # fmt: skip
-    impact = replace(thud.solve_case(case), peak_elastic_force=1.0, peak_force=2.0)
+    impact = replace(thud.solve(case), peak_elastic_force=1.0, peak_force=2.0)
     rate = impact.sample_rate
     peaks = {"elastic": 1.0, "floor": 2.0}
     forces = {"elastic": impact.elastic_force, "floor": impact.floor_force}
@@ -166,11 +166,14 @@ def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
     assert default.case == thud.Case(model=thud.HollowSphere())
     # Free modes and compression of a case have functions of their own.
     more = replace(default.case, modes=thud.Modes(), compression=thud.Compression())
-    found = thud.solve_case(more)
+    found = thud.solve(more)
     assert found.case == more
     assert (found.floor_force == default.floor_force).all()
     with pytest.raises(thud.InputError, match=naming("&model")):
-        thud.solve_case(replace(more, model=None))
+        thud.solve(replace(more, model=None))
+    for given in ({"drop": drop}, {"model": "two_mass"}, {"duration": 0.04}, {"rings": 9}):
+        with pytest.raises(thud.InputError, match=naming("solve(case)")):
+            thud.solve(more, **given)  # type: ignore[call-overload]
 
 
 def test_measured_contact_time_is_that_of_the_record_around_the_contact() -> None:

@@ -211,7 +211,7 @@ except KeyboardInterrupt:
 
 @pytest.mark.parametrize(
     ("work", "forks"),
-    [("thud.solve_case(case)", 60), ("check_case(case)", 300)],
+    [("thud.solve(case)", 60), ("check_case(case)", 300)],
     ids=["solve", "check"],
 )
 def test_processes_forked_beside_short_calls_have_no_locked_libraries(

@@ -31,7 +31,7 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     case = thud.read_case(path)
-    impact = thud.solve_case(case)
+    impact = thud.solve(case)
     levels, conformity = impact.levels(), impact.conformity()
 
     assert cli.main(["run", "-q", "--no-figures", str(path)]) == 0
@@ -73,15 +73,15 @@ def test_every_command_has_the_same_peak_levels_and_verdict(
 @pytest.mark.parametrize("force", ["elastic", "floor"])
 def test_fit_to_its_own_levels_finds_the_ball_again(force: LevelsForce) -> None:
     case = thud.Case(levels=thud.Levels(force=force))
-    target = thud.LevelTarget(thud.solve_case(case).levels())
+    target = thud.LevelTarget(thud.solve(case).levels())
     found = thud.fit(target, {"youngs_modulus": {"start": 1.5e6}}, case)
     assert found.case.ball.youngs_modulus == pytest.approx(1.6e6, rel=1e-6)
-    impact = thud.solve_case(found.case)
+    impact = thud.solve(found.case)
     assert found.impact.peak() == impact.peak()
     assert found.impact.levels().tolist() == impact.levels().tolist()
 
 
 def test_fit_to_an_impact_compares_the_force_that_it_judges() -> None:
     case = thud.Case(levels=thud.Levels(force="elastic"))
-    found = thud.fit(thud.solve_case(case), {"youngs_modulus": {"start": 1.5e6}}, case)
+    found = thud.fit(thud.solve(case), {"youngs_modulus": {"start": 1.5e6}}, case)
     assert found.case.ball.youngs_modulus == pytest.approx(1.6e6, rel=1e-6)

@@ -42,7 +42,7 @@ SPEED = np.sqrt(2 * 9.81)
 def finite_elements() -> thud.Impact:
     """Return a drop of the ball by finite elements: 1.6 kN, 19.3 ms."""
     case = thud.read_case("inputs/rubber_ball_fe_viscous.nml")
-    return thud.solve_case(case)
+    return thud.solve(case)
 
 
 def pulse(impact: thud.Impact) -> np.ndarray:
@@ -609,7 +609,7 @@ def test_coloured_noise_has_its_deviation() -> None:
 def test_releases_of_hertz_were_late() -> None:
     """A force that fades as t**1.5 was continued by a line: 0.3 to 0.5 ms too late at 50 dB."""
     case = thud.read_case("inputs/tyre_one_mass.nml")
-    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.03)))
+    impact = thud.solve(replace(case, sampling=thud.Sampling(FINE, 0.03)))
     truth = impact.measured_contact_time
     for seed in range(3):
         force, _ = make_recording(pulse(impact), FINE, rate=48e3, noise_db=50, seed=seed)
@@ -632,7 +632,7 @@ def test_contact_span_is_that_of_closed_forms() -> None:
 def test_positive_foot_of_fractional_elements() -> None:
     """A release 1 ms late was explained by a line whose force is negative before it."""
     case = thud.read_case("inputs/rubber_ball_fe.nml")
-    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.03)))
+    impact = thud.solve(replace(case, sampling=thud.Sampling(FINE, 0.03)))
     for seed, rate in enumerate((8e3, 48e3, 96e3)):
         force, _ = make_recording(pulse(impact), FINE, rate=rate, noise_db=50, seed=seed)
         (drop,) = drops(force, rate)

@@ -42,7 +42,7 @@ def test_doubtful_input_is_remarked_by_every_command(
     monkeypatch.chdir(tmp_path)
     path = case_file(DOUBTFUL[words])
     with pytest.warns(thud.PlausibilityWarning) as caught:
-        impact = thud.solve_case(thud.read_case(path))
+        impact = thud.solve(thud.read_case(path))
     assert [bool(re.search(words, remark)) for remark in impact.remarks].count(True) == 1
     assert [str(warning.message) for warning in caught] == list(impact.remarks)
     assert {warning.filename for warning in caught} == {__file__}
@@ -71,7 +71,7 @@ def test_doubtful_input_is_remarked_by_every_command(
 def test_plausible_input_earns_no_remark(text: str, case_file: Callable[..., Path]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert thud.solve_case(thud.read_case(case_file(text))).remarks == ()
+        assert thud.solve(thud.read_case(case_file(text))).remarks == ()
 
 
 OUTSIDE = {
@@ -114,7 +114,7 @@ OUTSIDE = {
 def test_answer_outside_the_theory_is_remarked(words: str, case_file: Callable[..., Path]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        remarks = thud.solve_case(thud.read_case(case_file(OUTSIDE[words]))).remarks
+        remarks = thud.solve(thud.read_case(case_file(OUTSIDE[words]))).remarks
     assert [bool(re.search(words, remark)) for remark in remarks].count(True) == 1, remarks
 
 

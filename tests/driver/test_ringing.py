@@ -29,7 +29,7 @@ QUIET = int(0.1 * RATE)
 def force() -> np.ndarray:
     """Return the force of the ball of finite elements, N, without its zeros."""
     case = thud.read_case(REPOSITORY / "inputs/rubber_ball_fe.nml")
-    impact = thud.solve_case(replace(case, sampling=thud.Sampling(RATE, 0.03)))
+    impact = thud.solve(replace(case, sampling=thud.Sampling(RATE, 0.03)))
     return impact.floor_force
 
 

@@ -246,7 +246,7 @@ def test_every_model_has_sets(run: Run, case: Path, tmp_path: Path, model: str) 
     rows = rows_of(tmp_path / "1/sets.csv")
     base = thud.Case.from_text(text)
     for row, value in zip(rows, values, strict=True):
-        impact = thud.solve_case(put(base, {key: value}))
+        impact = thud.solve(put(base, {key: value}))
         assert float(row["contact_time_s"]) == impact.contact_time
         assert float(row["peak_force_N"]) == impact.peak_force
         level = float(row["floor_octave_125_Hz_dB"])
@@ -279,7 +279,7 @@ def test_verdict_is_on_the_force_and_source_of_each_set(
     base = thud.Case.from_text(case.read_text())
     expected = []
     for row in rows:
-        impact = thud.solve_case(base)
+        impact = thud.solve(base)
         verdict = impact.conformity(row["source"], row["force"])
         expected.append(verdict.conforms)
         assert (float(row["margin_dB"]) >= 0) == verdict.conforms

@@ -73,7 +73,9 @@ def c_uses(root: Path, texts: dict[Path, str]) -> dict[str, set[str]]:
     variable.
     """
     sources = {path: path.read_text(encoding="utf-8") for path in sorted(root.rglob("*.c"))}
-    defined = re.compile(r"^(?!extern)[\w ]+?[ *](thud_\w+)(?: = |\()[^;{]*(?:;|\n\{)", re.MULTILINE)
+    defined = re.compile(
+        r"^(?!extern)[\w ]+?[ *](thud_\w+)(?: = |\()[^;{]*(?:;|\n\{)", re.MULTILINE
+    )
     places = {
         name: path.relative_to(root).as_posix()
         for path, text in sources.items()

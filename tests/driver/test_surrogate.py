@@ -420,7 +420,7 @@ def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
     case = replace(
         trained.case, ball=replace(trained.case.ball, **truth), drop=thud.Drop(height=1.0)
     )
-    impact = thud.solve_case(case)
+    impact = thud.solve(case)
     target = thud.LevelTarget(
         impact.levels().tolist(), 0.05, contact_time=(impact.exact_contact_time, 2e-5)
     )
@@ -432,7 +432,7 @@ def test_fits_by_a_surrogate_find_the_truth(trained: thud.Surrogate) -> None:
         # The target is exact: only the surrogate errs, whose share of the variances is small.
         assert abs(found.values[name] - value) < found.standard_errors[name]
     # The impact is that of the model.
-    np.testing.assert_array_equal(found.impact.floor_force, thud.solve_case(found.case).floor_force)
+    np.testing.assert_array_equal(found.impact.floor_force, thud.solve(found.case).floor_force)
     # Errors of the surrogate add to the uncertainties.
     variance = 0.05**2 + trained.mean_square("floor_level")
     np.testing.assert_allclose(found.misfit.deviation[:5] ** 2, variance)
@@ -442,7 +442,7 @@ def test_fits_refuse_what_a_surrogate_does_not_know(trained: thud.Surrogate) -> 
     case = trained.case
     levels = thud.LevelTarget([39, 31, 23, 17, 12.5], 0.5)
     with pytest.raises(thud.InputError, match=naming("surrogate", "force")):
-        thud.fit(thud.solve_case(case), {"height": 1.0}, case, surrogate=trained)
+        thud.fit(thud.solve(case), {"height": 1.0}, case, surrogate=trained)
     with pytest.raises(thud.InputError, match=naming("mass", "surrogate")):
         thud.fit(levels, {"mass": 2.5}, case, surrogate=trained)
     with pytest.raises(thud.InputError, match=naming("height", "start", 0.9, 0.98)):

@@ -332,7 +332,7 @@ def test_sets_give_what_single_drops_give(fixed: dict[str, str]) -> None:
     names = list(found.coords)[1:]
     for place in np.ndindex(*(found.sizes[name] for name in names)):
         one = found.isel(dict(zip(names, place, strict=True)))
-        impact = thud.solve_case(put(study.case, {name: one[name].item() for name in names}))
+        impact = thud.solve(put(study.case, {name: one[name].item() for name in names}))
         # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
         for name in ("contact_time", "peak_force", "peak_elastic_force", "impulse"):
             assert float(one[name]) == pytest.approx(getattr(impact, name), rel=1e-9)

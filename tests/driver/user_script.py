@@ -26,7 +26,7 @@ case = thud.Case("mine", ball, sampling=thud.Sampling(duration=0.04), levels=lev
 thud.write_case(case, folder / "mine.nml")
 subprocess.run([sys.executable, "-m", "thud", "run", "mine.nml"], cwd=folder, check=True)
 again = (
-    thud.solve_case(thud.read_case(folder / "mine.nml")),
+    thud.solve(thud.read_case(folder / "mine.nml")),
     thud.read_results(folder / "outputs/mine"),
 )
 verdict: thud.Conformity = thud.judge([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")

@@ -32,7 +32,7 @@ def _finer_steps(impact: thud.Impact, _: random.Random) -> str:
     case = impact.case
     if isinstance(case.model, thud.FiniteElement | thud.ModalBall):
         return ""
-    finer = thud.solve_case(_sampled(case, substeps=2 * case.sampling.substeps))
+    finer = thud.solve(_sampled(case, substeps=2 * case.sampling.substeps))
     for one, other in _pairs(impact, finer):
         changes = (one.contact_time / other.contact_time - 1, one.restitution - other.restitution)
         if max(map(abs, changes)) > STEP_CHANGE:
@@ -45,7 +45,7 @@ def is_of_step(impact: thud.Impact) -> bool:
     excess = impact.restitution - 1
     if not any("gives energy to the source" in one for one in impact.remarks):
         return False
-    finer = thud.solve_case(_sampled(impact.case, substeps=4 * impact.case.sampling.substeps))
+    finer = thud.solve(_sampled(impact.case, substeps=4 * impact.case.sampling.substeps))
     return abs(finer.restitution - 1) < excess / 4
 
 
@@ -59,7 +59,7 @@ def _more_samples(impact: thud.Impact, _: random.Random) -> str:
         or case.sampling.sample_rate > 2.5e6
     ):
         return ""
-    finer = thud.solve_case(_sampled(case, sample_rate=4 * case.sampling.sample_rate))
+    finer = thud.solve(_sampled(case, sample_rate=4 * case.sampling.sample_rate))
     change = np.abs(impact.levels() - finer.levels()).max()
     return f"four times the samples change a level by {change} dB" if change > RATE_CHANGE else ""
 
@@ -78,7 +78,7 @@ def _other_units(impact: thud.Impact, chance: random.Random) -> str:
     ):
         return ""
     try:
-        scaled = thud.solve_case(_scaled(case, scales))
+        scaled = thud.solve(_scaled(case, scales))
     except thud.InputError:
         return ""  # a key is outside its range
     unit = _unit(scales, (1, 1, -2))
@@ -163,7 +163,7 @@ def _hard_floor(impact: thud.Impact, _: random.Random) -> str:
 
 def _force_change(case: thud.Case) -> float | None:
     """Return how much the force differs from that on a rigid floor, as part of its peak."""
-    stopped = thud.solve_case(case)
+    stopped = thud.solve(case)
     if stopped.on_floor is None:
         return None
     return (

@@ -67,7 +67,7 @@ def _many(cases: list[thud.Case]) -> Iterable[Finding]:
         )
         if right and many.restitution[i] <= 1 + BALANCE:
             yield Finding("computed")
-        elif right and is_of_step(thud.solve_case(case)):
+        elif right and is_of_step(thud.solve(case)):
             yield Finding("remarked")
         else:
             yield Finding("wrong", f"{many.restitution[i]}; {case_text(case).decode().split()}")
@@ -78,7 +78,7 @@ def _try(model: str, chance: random.Random) -> Finding:
         warnings.simplefilter("ignore")
         try:
             case = draw_case(model, chance)
-            impact = thud.solve_case(case)
+            impact = thud.solve(case)
             wrong = get_fault(impact)
             if wrong == "rigid: restitution" and is_of_step(impact):
                 wrong = ""

@@ -52,7 +52,7 @@ def fast_calls(folder: Path) -> Calls:
         "lumped": lambda: (
             thud.solve(model=thud.HuntCrossley(contact_time=0.02, restitution=0.8)).floor_force
         ),
-        "solve_case": lambda: thud.solve_case(case).elastic_force,
+        "solve of a case": lambda: thud.solve(case).elastic_force,
         "on a floor": lambda: thud.solve(floor=thud.Oscillator()).on_floor.floor_velocity,  # type: ignore[union-attr]
         "solve_many": lambda: thud.solve_many({"height": [0.5, 1.0, 1.5]}, threads=2).floor_octaves,
         "levels": lambda: impact.levels("third"),
@@ -162,7 +162,7 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
         return thud.force_exposure_levels(force, chance.uniform(8e3, 64e3), bands, method)
 
     def recording(chance: random.Random) -> object:
-        impact = thud.solve_case(replace(case(chance), floor=None))
+        impact = thud.solve(replace(case(chance), floor=None))
         force = np.pad(impact.floor_force, chance.randint(4000, 8000))
         force += np.random.default_rng(chance.getrandbits(32)).normal(scale=0.5, size=force.size)
         return Recording.from_array(force, impact.sample_rate, height=1.0, mass=2.5).levels()
@@ -177,7 +177,7 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
 
     impact = thud.solve()
     return {
-        "case": lambda chance: thud.solve_case(case(chance)),
+        "case": lambda chance: thud.solve(case(chance)),
         "read_case": read_case,
         "levels": levels,
         "recording": recording,

@@ -66,7 +66,7 @@ def pulse(shape: str) -> tuple[np.ndarray, float]:
         time = np.arange(int(0.02 * FINE) + 1) / FINE
         return 1500 * np.sin(np.pi * time / 0.02), 0.02
     case = thud.read_case(Path(__file__).parents[2] / "inputs" / f"rubber_ball_{file}.nml")
-    impact = thud.solve_case(replace(case, sampling=thud.Sampling(FINE, 0.05)))
+    impact = thud.solve(replace(case, sampling=thud.Sampling(FINE, 0.05)))
     last = int(np.ceil(impact.exact_contact_time * FINE)) + 1
     return impact.floor_force[:last], impact.exact_contact_time
 

@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from thud.base.bridge import api, call, text
 from thud.base.checks import require_kind
-from thud.base.errors import InputError, PlausibilityWarning
+from thud.base.errors import InputError
 from thud.case.case import Case, case_text
 from thud.impact.floor_impact import new_floor_impact
 from thud.impact.impact import Impact, history
 
 if TYPE_CHECKING:
     from thud.base.bridge import Bundle
-
-
-def solve_case(case: Case) -> Impact:
-    """Compute the impact of a case; see `solve`."""
-    impact = compute(case)
-    for remark in impact.remarks:
-        warnings.warn(remark, PlausibilityWarning, stacklevel=3)
-    return impact
 
 
 def compute(case: Case) -> Impact:

@@ -53,7 +53,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
     Returns
     -------
     Impact
-        The same as `solve_case` gives.
+        The same as `solve` gives.
 
     Raises
     ------

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Drop, Sampling
+from thud.base.checks import refuse
+from thud.base.errors import PlausibilityWarning
 from thud.case.case import Case, new_model
-from thud.impact.compute import solve_case
+from thud.impact.compute import compute
 
 if TYPE_CHECKING:
     from thud.base._schema import FloorOptions, ModelName, ModelOptions
@@ -14,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
-    ball: Ball | None = None,
+    ball: Ball | Case | None = None,
     drop: Drop | None = None,
     model: ModelName | ModelOptions = "hollow_sphere",
     *,
@@ -29,7 +32,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Parameters
     ----------
     ball, drop
-        By default the rubber ball of the paper, from 1 m.
+        By default the rubber ball of the paper, from 1 m. Or a `Case`, which holds all the rest.
     model
         ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
         one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``;
@@ -65,11 +68,20 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     PlausibilityWarning
         As `Impact.remarks`.
     """
-    case = Case(
-        ball=Ball() if ball is None else ball,
-        drop=Drop() if drop is None else drop,
-        model=new_model(model, options),
-        sampling=Sampling(sample_rate, duration, substeps),
-        floor=floor,
-    )
-    return solve_case(case)
+    sampling = Sampling(sample_rate, duration, substeps)
+    if isinstance(ball, Case):
+        if drop or floor or options or (model, sampling) != ("hollow_sphere", Sampling()):
+            refuse("solve() takes a case or the parts of one, not both", "solve(case)")
+        case = ball
+    else:
+        case = Case(
+            ball=Ball() if ball is None else ball,
+            drop=Drop() if drop is None else drop,
+            model=new_model(model, options),
+            sampling=sampling,
+            floor=floor,
+        )
+    impact = compute(case)
+    for remark in impact.remarks:
+        warnings.warn(remark, PlausibilityWarning, stacklevel=2)
+    return impact

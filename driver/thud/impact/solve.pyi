@@ -18,6 +18,7 @@ from thud.base._schema import (
     ModelName,
     ModelOptions,
 )
+from thud.case.case import Case
 from thud.impact.impact import Impact
 
 class SamplingOptions(TypedDict, total=False):
@@ -85,6 +86,10 @@ class TwoMassOptions(SamplingOptions, total=False):
     contact_damping: float
     belt_frequency: float
     belt_damping: float
+
+@overload
+def solve(ball: Case) -> Impact:
+    """Compute the impact of a case."""
 
 @overload
 def solve(
