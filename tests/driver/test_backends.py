@@ -61,6 +61,7 @@ def cluster() -> Iterator[LocalCluster]:
         yield running
 
 
+@pytest.mark.slow
 def test_every_backend_gives_the_same(cluster: LocalCluster) -> None:
     one = thud.sweep(STUDY, workers=1)
     assert set(one["status"].values) == {0, 1, 2}
@@ -90,6 +91,7 @@ def modal_blocks() -> list[Block]:
     ]
 
 
+@pytest.mark.slow
 def test_killed_worker_of_dask_loses_nothing(cluster: LocalCluster) -> None:
     blocks = modal_blocks()
     with Client(cluster) as client:
@@ -109,6 +111,7 @@ def test_killed_worker_of_dask_loses_nothing(cluster: LocalCluster) -> None:
             np.testing.assert_array_equal(found[name], values)
 
 
+@pytest.mark.slow
 def test_stopped_worker_of_dask_does_not_hold_the_study(
     cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -133,6 +136,7 @@ def test_stopped_worker_of_dask_does_not_hold_the_study(
 
 
 @pytest.mark.parametrize("written", ["netcdf", "zarr"])
+@pytest.mark.slow
 def test_dask_writes_the_same(written: str, cluster: LocalCluster, tmp_path: Path) -> None:
     expected = thud.sweep(STUDY)
     study = {**STUDY, "format": written}
@@ -140,6 +144,7 @@ def test_dask_writes_the_same(written: str, cluster: LocalCluster, tmp_path: Pat
     assert found.drop_attrs(deep=False).identical(expected.drop_attrs(deep=False))
 
 
+@pytest.mark.slow
 def test_killed_worker_of_dask_leaves_no_gap_on_disk(
     cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -160,6 +165,7 @@ def test_killed_worker_of_dask_leaves_no_gap_on_disk(
 
 
 @pytest.mark.parametrize("rest", [{"backend": "processes", "workers": 2}, {"scheduler": True}])
+@pytest.mark.slow
 def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     rest: dict[str, Any], cluster: LocalCluster, tmp_path: Path
 ) -> None:

@@ -48,6 +48,7 @@ def in_checkout(checkout: Path, script: str, **env: str) -> subprocess.Completed
 
 @pytest.mark.skipif(not shutil.which("cmake"), reason="there is no CMake")
 @pytest.mark.parametrize("name", [PLAIN, ODD])
+@pytest.mark.slow
 def test_extension_is_built_in_any_checkout(name: str, tmp_path: Path) -> None:
     checkout = tmp_path / name / "thud"
     shutil.copytree(REPOSITORY / "cmake", checkout / "cmake")

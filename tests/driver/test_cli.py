@@ -65,6 +65,7 @@ def test_run_agrees_with_the_executable(
         assert path.read_bytes() == (tmp_path / "driver" / path.name).read_bytes()
 
 
+@pytest.mark.slow
 def test_several_cases_have_their_own_directories(tmp_path: Path) -> None:
     paths = list(map(str, INPUTS))
     assert cli.main(["run", "--no-figures", "-q", "-o", "all", *paths]) == 0
@@ -113,6 +114,7 @@ def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().out.strip() == f"thud {thud.__version__}"
 
 
+@pytest.mark.slow
 def test_figures_of_the_paper(tmp_path: Path) -> None:
     assert cli.main(["figures", "-q", "-o", "drawn"]) == 0
     names = (
@@ -199,6 +201,7 @@ def test_full_screen_is_told_in_one_sentence(
 @pytest.mark.parametrize("screen", [">&-", "| true", "| head -n 1"])
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 @pytest.mark.parametrize("arguments", SPEAKING)
+@pytest.mark.slow
 def test_screen_that_nobody_reads_is_no_failure(
     arguments: str, unbuffered: str, screen: str, case_file: CaseFile, tmp_path: Path
 ) -> None:
@@ -211,6 +214,7 @@ def test_screen_that_nobody_reads_is_no_failure(
 
 
 @pytest.mark.parametrize("command", ["thud", "thud-driver"])
+@pytest.mark.slow
 def test_measurement_and_run_that_nobody_reads_have_their_results(
     command: str, case_file: CaseFile, executable: str, tmp_path: Path
 ) -> None:

@@ -130,6 +130,7 @@ def start(study: str, folder: Path, *more: str) -> subprocess.Popen[str]:
 
 
 @pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.slow
 def test_ended_study_goes_on_where_it_stopped(
     end: signal.Signals, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,6 +168,7 @@ def test_ended_study_goes_on_where_it_stopped(
     assert sum(computed) == 1000 - finished.sizes["set"]
 
 
+@pytest.mark.slow
 def test_full_disk_is_reported_and_loses_nothing(
     whole: xr.Dataset, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,6 +197,7 @@ def test_full_disk_is_reported_and_loses_nothing(
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path)).identical(values(whole))
 
 
+@pytest.mark.slow
 def test_disk_that_is_full_for_zarr_is_reported_and_loses_nothing(
     whole: xr.Dataset,
     tmp_path: Path,

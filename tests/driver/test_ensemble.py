@@ -295,6 +295,7 @@ def test_any_input_gives_numbers_or_a_clear_error(parameters: dict[str, object])
     assert np.isnan(ensemble.contact_time[ensemble.status != 0]).all()
 
 
+@pytest.mark.slow
 def test_a_streamed_run_keeps_its_memory() -> None:
     # Twelve chunks take no more than two: nothing is left behind.
     code = """

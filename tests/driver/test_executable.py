@@ -35,6 +35,7 @@ IMPACTS = [path for path in INPUTS if "&model" in path.read_text()]
 
 
 @pytest.mark.parametrize("path", IMPACTS, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_every_input_runs_and_agrees_with_the_driver(run: Run, tmp_path: Path, path: Path) -> None:
     result = run(path)
     assert result.returncode == 0, result.stderr

@@ -120,6 +120,7 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
     assert max(answer["force"]["value"]) == pytest.approx(impact.floor_force.max(), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_slow_case_reports_and_answers(client: TestClient) -> None:
     values = {
         "model": {"name": "finite_element"},
@@ -149,6 +150,7 @@ def test_slow_case_reports_and_answers(client: TestClient) -> None:
     ],
     ids=["steps", "modal steps", "steps of a floor", "modes of a floor"],
 )
+@pytest.mark.slow
 def test_many_steps_and_modes_are_slow(client: TestClient, values: dict[str, Any]) -> None:
     assert client.post("/solve", json=values).text.startswith('{"done": 0.0}\n')
 

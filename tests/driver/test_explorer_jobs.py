@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import anyio
 import psutil
+import pytest
 
 from thud.explorer import jobs as module
 from thud.explorer.jobs import Jobs
@@ -118,6 +119,7 @@ def test_reports_are_ended_by_another_task() -> None:
     anyio.run(end_elsewhere, Jobs(1, LONGEST))
 
 
+@pytest.mark.slow
 def test_kept_process_works_again_until_it_is_late() -> None:
     async def work(jobs: Jobs) -> None:
         await reports_of(jobs)

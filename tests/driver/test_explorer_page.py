@@ -25,7 +25,10 @@ axe = pytest.importorskip("axe_playwright_python.sync_playwright")
 # Machines that test may be busy.
 sync_api.expect.set_options(timeout=30_000)
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="needs Debian's chromium"),
+]
 RECORDING = REPOSITORY / "inputs/recordings/drop_1.wav"
 
 

@@ -51,6 +51,7 @@ def await_end(processes: set[psutil.Process]) -> None:
         time.sleep(0.05)
 
 
+@pytest.mark.slow
 def test_ten_users_drag_without_an_error(server: Served) -> None:
     assert len(drag(server[0], users=10, steps=30)) == 300
 
@@ -117,6 +118,7 @@ def abandon(server: Served, values: object, count: int) -> None:
 MODAL = {"model": {"name": "modal_ball"}, "sampling": {"substeps": 8}}
 
 
+@pytest.mark.slow
 def test_abandoned_works_hinder_neither_a_user_nor_the_end(server: Served) -> None:
     host, port, token = place_of(server[0])
     for values in (SLOW, MODAL, SHELL):
@@ -135,6 +137,7 @@ HANGING = "import asyncio, uvicorn; uvicorn.Server.shutdown = lambda *_, **__: a
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.slow
 def test_second_signal_ends_a_server_that_hangs(number: signal.Signals, tmp_path: Path) -> None:
     before = f"import tempfile; tempfile.tempdir = {str(tmp_path)!r}; {HANGING}"
     with serve(before=before) as server:
@@ -153,6 +156,7 @@ def test_second_signal_ends_a_server_that_hangs(number: signal.Signals, tmp_path
 
 
 @pytest.mark.parametrize("files", [200, 1000])
+@pytest.mark.slow
 def test_unfinished_heads_hinder_nobody_and_fill_no_log(files: int, tmp_path: Path) -> None:
     limit = f"import resource; resource.setrlimit(resource.RLIMIT_NOFILE, ({files}, {files}))"
     kinds = (b"", b"POST /so", b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX: ")
@@ -186,6 +190,7 @@ def test_heads_have_a_time() -> None:
                 assert sent < 99
 
 
+@pytest.mark.slow
 def test_answers_have_to_be_read() -> None:
     before = "from thud.explorer import connections; connections.HEAD_TIME = 0.5"
     count = 20_000

@@ -80,6 +80,7 @@ def assert_clean(figure: Figure) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(plot.documentation_figures()))
+@pytest.mark.slow
 def test_nothing_crosses_a_legend_of_the_documentation(name: str) -> None:
     figure = plot.documentation_figures()[name]()
     assert figure.get_figwidth() == pytest.approx(3.5)
@@ -182,6 +183,7 @@ def test_recording_is_drawn_from_first_touch_to_last_release(shell: thud.Impact)
     assert 20 < high < 22
 
 
+@pytest.mark.slow
 def test_arrows_have_a_key_and_end_above_the_floor() -> None:
     impact = thud.solve(model="finite_element", flight_before=2e-3)
     figure = plot.motion(impact)
@@ -307,6 +309,7 @@ RESPONSE = "frequency,real,imaginary\n10,1e-5,1e-5\n20,2e-5,0\n40,1e-5,-1e-5\n80
     ],
     ids=lambda value: value[0] if value else "none",
 )  # fmt: skip
+@pytest.mark.slow
 def test_figure_that_fails_is_a_warning(
     arguments: list[str],
     results: list[str],

@@ -143,6 +143,7 @@ def test_sections_keep_their_attenuation_without_decimation(rate: float) -> None
 
 @pytest.mark.parametrize("bands", BANDWIDTHS)
 @pytest.mark.parametrize("rate", [1500, 2000, 2500, 3000, 8000, 96000])
+@pytest.mark.slow
 def test_ringing_is_padded_and_low_rates_are_interpolated(bands: str, rate: int) -> None:
     """Time domain against frequency domain: integral of abs(H F)**2."""
     force, edges = half_sine(rate), thud.get_bands(bands)

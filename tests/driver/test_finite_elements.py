@@ -51,6 +51,7 @@ def same(one: object, other: object) -> bool:
 
 
 @pytest.mark.parametrize("name", ["rubber_ball_fe", "rubber_ball_100cm"])
+@pytest.mark.slow
 def test_results_are_read_back_to_the_last_bit(run: Callable[..., object], name: str) -> None:
     run(REPOSITORY / f"inputs/{name}.nml")
     found = thud.read_results(f"outputs/{name}")
@@ -131,6 +132,7 @@ def test_modes_and_impact_come_from_one_file(case_file: CaseFile, tmp_path: Path
         dataclasses.replace(case, modes=thud.Modes()).to_namelist()
 
 
+@pytest.mark.slow
 def test_a_shorter_run_leaves_nothing_of_a_longer_one(case_file: CaseFile, tmp_path: Path) -> None:
     folder = tmp_path / "outputs/case"
     assert cli.main(["run", "-q", str(case_file(IMPACT)), "--animation"]) == 0
@@ -175,6 +177,7 @@ def test_record_goes_on_as_free_flight(impact: thud.Impact) -> None:
     assert long.velocity[-1] == pytest.approx(speed, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_flight_ends_before_a_contact_that_is_not_asked_for() -> None:
     short = thud.solve(model="finite_element", **COARSE)
     long = thud.solve(
@@ -194,6 +197,7 @@ def test_peak_is_that_of_the_recorded_band() -> None:
     np.testing.assert_allclose(peaks, peaks[0], rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_pressure_is_even_at_the_pole() -> None:
     missing = []
     for elements in (64, 128):

@@ -79,6 +79,7 @@ def test_confidence_below_rounding_has_intervals_without_width() -> None:
     ],
     ids=["modal_ball", "finite_element", "hunt_crossley", "two_mass", "measured_modes"],
 )
+@pytest.mark.slow
 def test_every_model_can_be_fitted(
     case: thud.Case, truth: dict[str, float], starts: dict[str, float]
 ) -> None:
@@ -88,6 +89,7 @@ def test_every_model_can_be_fitted(
     assert not fit.warnings
 
 
+@pytest.mark.slow
 def test_finite_element_loss_factor_from_noisy_force() -> None:
     case = thud.Case(model=COARSE)
     truth = {"youngs_modulus": 2.08e6, "loss_factor": 0.25}
@@ -123,6 +125,7 @@ def test_other_sampling_rates_are_no_hindrance() -> None:
 @pytest.mark.parametrize(
     ("noise", "count"), [(5.0, 100), (None, 100)], ids=["given noise", "noise from the residuals"]
 )
+@pytest.mark.slow
 def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, count: int) -> None:
     # 90 % of the intervals are to hold the truth: the number of those that do is binomial, and
     # leaves these quantiles once in 10 000 times.
@@ -331,6 +334,7 @@ def test_modulus_and_wall_are_hardly_identifiable_from_low_octaves() -> None:
 
 
 @pytest.mark.parametrize("bands", ["octave", "third"])
+@pytest.mark.slow
 def test_levels_and_what_else_is_known(bands: str) -> None:
     truth = {"youngs_modulus": 1.75e6, "loss_factor": 0.18}
     impact = thud.solve(with_values(MODAL, truth))
@@ -437,6 +441,7 @@ def test_model_that_fails_around_the_best_place(monkeypatch: pytest.MonkeyPatch)
         thud.fit(thud.solve(TRUTH), {"youngs_modulus": 2e6})
 
 
+@pytest.mark.slow
 def test_best_of_several_starts_counts() -> None:
     case = thud.Case(model=COARSE)
     names = {"youngs_modulus": thud.Parameter(5e6, 1e6, 6e6), "loss_factor": None}

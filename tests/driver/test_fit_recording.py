@@ -66,6 +66,7 @@ def record(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, float]:
     return read_recording(path), noise
 
 
+@pytest.mark.slow
 def test_finite_elements_find_modulus_and_loss_of_a_recording(
     record: tuple[Recording, float],
 ) -> None:
@@ -81,6 +82,7 @@ def test_finite_elements_find_modulus_and_loss_of_a_recording(
     assert not found.warnings
 
 
+@pytest.mark.slow
 def test_residuals_tell_the_law_of_the_loss(tmp_path: Path) -> None:
     ball = thud.Ball(youngs_modulus=1.75e6)
     options = {"loss_factor": 0.18}

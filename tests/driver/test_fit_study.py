@@ -40,6 +40,7 @@ def in_directory_with_record(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize("name", ["fit_force", "fit_levels"])
+@pytest.mark.slow
 def test_studies_of_the_repository(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -156,6 +156,7 @@ def names_written(out: Path) -> list[str]:
     return names
 
 
+@pytest.mark.slow
 def test_files_of_the_user_and_inputs_are_never_replaced(
     name: str, command: Callable[..., int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -194,6 +195,7 @@ def test_files_of_the_user_and_inputs_are_never_replaced(
         assert (out / "notes.txt").read_bytes() == MINE
 
 
+@pytest.mark.slow
 def test_nothing_but_regular_files_is_opened(
     name: str, command: Callable[..., int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -77,6 +77,7 @@ def expected() -> str:
     return "\n".join(lines) + "\n"
 
 
+@pytest.mark.slow
 def test_the_sources_are_part_of_another_project(embedded: Path) -> None:
     assert run(embedded / "drop") == expected()
 

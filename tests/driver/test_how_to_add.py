@@ -109,6 +109,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+@pytest.mark.slow
 def test_executable_knows_what_was_added(copy: Path, tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(CASE)
     (tmp_path / "table.csv").write_text("stiffness;height\n62000,0;1,0\n31000;1\n")

@@ -85,6 +85,7 @@ def has_array(value: object) -> bool:
     return any(isinstance(part, kinds) for _, part in walk(value, "", {}))
 
 
+@pytest.mark.slow
 def test_no_array_of_a_public_object_is_writeable(held: dict[str, object]) -> None:
     arrays = {place: one for place, one in held.items() if isinstance(one, np.ndarray)}
     assert len(arrays) > 100

@@ -214,6 +214,7 @@ except KeyboardInterrupt:
     [("thud.solve(case)", 60), ("check_case(case)", 300)],
     ids=["solve", "check"],
 )
+@pytest.mark.slow
 def test_processes_forked_beside_short_calls_have_no_locked_libraries(
     work: str, forks: int
 ) -> None:
@@ -352,6 +353,7 @@ def test_interrupted_cases_keep_those_that_are_done(number: int, tmp_path: Path)
 
 
 @pytest.mark.parametrize("backend", ["threads", "processes"])
+@pytest.mark.slow
 def test_interrupted_study_waits_for_no_block(backend: str, tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text(
         "parameters.height = {low = 0.9, high = 1.1}\ndesign = {kind = 'random', size = 40}\n"

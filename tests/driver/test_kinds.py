@@ -29,6 +29,7 @@ def test_unknown_kind_is_reported() -> None:
         thud.read_study({}, "cube")
 
 
+@pytest.mark.slow
 def test_kind_is_added_by_one_file_and_one_line(tmp_path: Path) -> None:
     page = (REPOSITORY / "docs/how_to_add.md").read_text()
     text = page.partition("## A kind of study")[2].partition("## A figure")[0]

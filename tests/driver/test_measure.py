@@ -46,6 +46,7 @@ TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
 DROPS = [drop for drop in TRUTH["drop"] if drop["file"].startswith("drop_")]
 
 
+@pytest.mark.slow
 def test_examples_are_measured_as_they_were_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -224,6 +225,7 @@ def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str)
 
 @pytest.mark.parametrize("name", ["rubber_ball_fe", "rubber_ball_fe_elastic"])
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+@pytest.mark.slow
 def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str) -> None:
     impact = thud.solve(thud.read_case(REPOSITORY / f"inputs/{name}.nml"))
     truth = impact.measured_contact_time
@@ -328,6 +330,7 @@ def test_drops_without_a_restitution_are_told() -> None:
     assert any(re.search(naming("restitution", 3, 4), one) for one in recording.remarks)
 
 
+@pytest.mark.slow
 def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "thud", "measure", str(FOLDER / DROPS[0]["file"])]
     with open("/dev/full", "w") as full:  # noqa: PTH123 - a device

@@ -23,6 +23,7 @@ BATCH = 1e-9
 
 
 @pytest.mark.parametrize("path", WITH_IMPACT, ids=lambda path: path.stem)
+@pytest.mark.slow
 def test_every_command_has_the_same_peak_levels_and_verdict(
     path: Path,
     tmp_path: Path,

@@ -6,6 +6,7 @@ import runpy
 import sys
 from typing import TYPE_CHECKING
 
+import pytest
 from conftest import REPOSITORY
 
 if TYPE_CHECKING:
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     import pytest
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scripts = REPOSITORY / "docs/pictures"
     monkeypatch.setattr(sys, "path", [str(scripts), *sys.path])

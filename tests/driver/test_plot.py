@@ -188,6 +188,7 @@ def test_case_has_the_figures_of_its_results(deformed: thud.Impact) -> None:
     assert set(thud.plot.case_figures(still)) == {"force", "levels"}
 
 
+@pytest.mark.slow
 def test_figure_costs_one_file(tmp_path: Path) -> None:
     """The example of docs/how_to_add.md, on a copy of the package."""
     page = (REPOSITORY / "docs/how_to_add.md").read_text().partition("## A figure")[2]

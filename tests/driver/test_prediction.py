@@ -225,6 +225,7 @@ def test_walls_ceiling_octaves_and_history_are_written(
     assert f"{found.spread[0]:.1f} to" in found.remarks[0]
 
 
+@pytest.mark.slow
 def test_run_draws_the_chain(tmp_path: Path) -> None:
     case = tmp_path / "case.nml"
     case.write_text(ROOM_CASE, encoding="utf-8")

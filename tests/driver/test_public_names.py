@@ -83,6 +83,7 @@ def test_calls_of_each_model_are_those_of_solve() -> None:
     assert given == {*(f"Literal['{name}']" for name in MODELS), "ModelName | ModelOptions"}
 
 
+@pytest.mark.slow
 def test_users_script_touches_every_name_and_runs(tmp_path: Path) -> None:
     nodes = ast.walk(ast.parse(SCRIPT.read_text()))
     used = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
@@ -128,6 +129,7 @@ def checked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
     return said
 
 
+@pytest.mark.slow
 def test_users_script_is_typed(checked: dict[str, list[str]]) -> None:
     assert checked["script"] == []
 

@@ -6,6 +6,7 @@ import contextlib
 import io
 import re
 
+import pytest
 from conftest import REPOSITORY
 
 import thud
@@ -21,6 +22,7 @@ def shown_after(marker: str) -> str:
     return BLOCKS[places[0]][1]
 
 
+@pytest.mark.slow
 def test_first_result_is_that_of_the_commands() -> None:
     cases = re.search(r"^first=\((.*)\)$", (REPOSITORY / "bootstrap").read_text(), re.MULTILINE)
     assert cases is not None
@@ -32,6 +34,7 @@ def test_first_result_is_that_of_the_commands() -> None:
     assert timed == [line for line in expected if line[:2] != ["computed", "in,"]]
 
 
+@pytest.mark.slow
 def test_python_example_prints_what_is_shown() -> None:
     (code,) = (text for kind, text in BLOCKS if kind == "python")
     place = [text for _, text in BLOCKS].index(code)

@@ -146,6 +146,7 @@ RATES = [2.5e3, 5e3, 8e3, 11025.0, 16e3, 44.1e3, 51.2e3, 96e3]
 
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("shift", [0.0, 0.37, 0.81])
+@pytest.mark.slow
 def test_sampled_half_sine_has_its_levels_at_every_rate(rate: float, shift: float) -> None:
     start = 0.1 + shift / rate
     (drop,) = drops(half_sine(rate, start, int(0.25 * rate)) + 20.0, rate)
@@ -629,6 +630,7 @@ def test_contact_span_is_that_of_closed_forms() -> None:
     assert contact_span(ramp, 1e6)[0] == pytest.approx(np.sqrt(4e-8 - 1e-8 / 12), abs=1e-8)
 
 
+@pytest.mark.slow
 def test_positive_foot_of_fractional_elements() -> None:
     """A release 1 ms late was explained by a line whose force is negative before it."""
     case = thud.read_case("inputs/rubber_ball_fe.nml")

@@ -423,6 +423,7 @@ def through_plate(
 @pytest.mark.parametrize(
     "plate", [Plate(1600, 30), Plate(1050, 5), Plate(2500, 80, mass=10, added_mass=4)]
 )
+@pytest.mark.slow
 def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
     time, measured = through_plate(half_sine, rate, plate)
     corrected, sentence = correct_plate(measured, rate, plate), plate.correction(rate)
@@ -717,6 +718,7 @@ def test_probability_of_conformity_counts_both_limits() -> None:
 
 
 @pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])
+@pytest.mark.slow
 def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
     scatter: float, calibration: float
 ) -> None:

@@ -95,6 +95,7 @@ def read_all(path: Path, **given: Any) -> tuple[Signal, NDArray[np.float64]]:  #
 
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("name", WITH_UNIT)
+@pytest.mark.slow
 def test_half_sine_is_read_in_every_unit(name: str, rate: float, tmp_path: Path) -> None:
     exact = half_sine(rate)
     for unit, (per_newton, given) in UNITS.items():

@@ -32,6 +32,7 @@ DOUBTFUL = {
 
 
 @pytest.mark.parametrize("words", DOUBTFUL)
+@pytest.mark.slow
 def test_doubtful_input_is_remarked_by_every_command(
     words: str,
     case_file: Callable[..., Path],
@@ -111,6 +112,7 @@ OUTSIDE = {
 
 
 @pytest.mark.parametrize("words", OUTSIDE)
+@pytest.mark.slow
 def test_answer_outside_the_theory_is_remarked(words: str, case_file: Callable[..., Path]) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -192,6 +192,7 @@ def numbers(recording: Recording) -> list[list[str]]:
     return rows
 
 
+@pytest.mark.slow
 def test_page_is_one_and_holds_the_numbers_of_the_table(written: tuple[Recording, Path]) -> None:
     recording, folder = written
     page = (folder / "report.html").read_text()
@@ -214,6 +215,7 @@ def test_page_is_one_and_holds_the_numbers_of_the_table(written: tuple[Recording
         assert words in printed
 
 
+@pytest.mark.slow
 def test_browser_prints_the_same_page(written: tuple[Recording, Path]) -> None:
     _, folder = written
     words = [

@@ -41,6 +41,7 @@ def said(force: np.ndarray, colour: str = "white", deviation: float = 2.0) -> tu
 
 
 @pytest.mark.parametrize("colour", ["white", "pink", "brown"])
+@pytest.mark.slow
 def test_clean_record_does_not_ring(force: np.ndarray, colour: str) -> None:
     assert not said(np.pad(force, QUIET), colour)
 

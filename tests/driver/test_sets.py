@@ -114,6 +114,7 @@ def test_conforming_sets_are_counted(run: Run, case: Path, tmp_path: Path) -> No
     assert rows_of(tmp_path / "here/sets.csv")[0]["floor_conforms"] == "yes"
 
 
+@pytest.mark.slow
 def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
     heights = np.linspace(0.5, 1.5, 20_000)
     (tmp_path / "table.csv").write_text("height\n" + "\n".join(map(str, heights)))
@@ -382,6 +383,7 @@ def at_work(executable: str, case: Path, tmp_path: Path) -> Iterator[subprocess.
         yield process
 
 
+@pytest.mark.slow
 def test_runs_in_one_directory_wait_for_each_other(
     at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
 ) -> None:

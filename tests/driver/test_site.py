@@ -16,6 +16,8 @@ import thud
 if TYPE_CHECKING:
     from pathlib import Path
 
+pytestmark = pytest.mark.slow
+
 THEORY = (
     *("hollow_sphere", "lumped_models", "modal_ball", "finite_elements", "compression"),
     *("ball_impedance", "floors", "rooms", "levels", "recordings_theory"),

@@ -63,6 +63,7 @@ def direct() -> thud.Uncertainty:
     return thud.uncertainty(TOLERANCES)
 
 
+@pytest.mark.slow
 def test_held_out_drops_lie_within_the_stated_error(
     trained: thud.Surrogate, direct: thud.Uncertainty
 ) -> None:

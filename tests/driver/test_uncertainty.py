@@ -52,6 +52,7 @@ def test_small_tolerances_propagate_linearly() -> None:
     assert np.all(np.abs(result.levels.mean(axis=0) - thud.solve().levels()) < 4 * error)
 
 
+@pytest.mark.slow
 def test_probability_of_a_criterion_that_is_known() -> None:
     # This ball has 0.2 dB to spare; the height conforms from 0.99 to 1.01 m.
     result = thud.uncertainty(

@@ -16,7 +16,10 @@ from run import parts
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-pytestmark = pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not can_inject(), reason="there is no C compiler"),
+]
 
 
 @pytest.mark.parametrize("name", [name for name, part in parts().items() if part.small])

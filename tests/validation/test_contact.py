@@ -92,6 +92,7 @@ def test_friction_stays_in_its_cone_and_costs_energy() -> None:
     assert impact.energy_residual < 5e-4
 
 
+@pytest.mark.slow
 def test_stiff_layer_is_the_hard_floor() -> None:
     hard = solve().levels()
     change = [abs(solve(layer_stiffness=k).levels() - hard).max() for k in (1e9, 1e10)]
@@ -105,6 +106,7 @@ def test_layer_does_not_depend_on_the_mesh() -> None:
     np.testing.assert_allclose(coarse, solve(layer_stiffness=1e9).levels(), atol=0.1)
 
 
+@pytest.mark.slow
 def test_thin_ball_without_losses_stays_stable() -> None:
     # It went unstable at 27 ms, as the number of steps fell before the fastest motion was known.
     ball = thud.Ball(wall_thickness=0.01939, youngs_modulus=2.5737e6)

@@ -54,6 +54,7 @@ def test_flagship_has_the_spectrum_of_the_standard(
         ({"layer_stiffness": 1e11}, 0.02, 0.04),
     ],
 )
+@pytest.mark.slow
 def test_flagship_is_converged(options: dict[str, object], low: float, high: float) -> None:
     change = abs(solve(**options).levels() - solve().levels())
     assert change[:4].max() < low

@@ -16,6 +16,7 @@ SEEDS = 12
 
 
 @pytest.mark.parametrize("name", ["pink noise", "hum of 60 Hz, 3 N"])
+@pytest.mark.slow
 def test_intervals_hold_the_truth(name: str) -> None:
     found = tally(name, SEEDS)
     assert found.honest, found
