@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import AsyncGenerator
     from multiprocessing.connection import Connection
 
-    import pytest
 
 LONG = {
     "model": {"name": "finite_element"},

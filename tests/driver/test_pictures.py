@@ -12,8 +12,6 @@ from conftest import REPOSITORY
 if TYPE_CHECKING:
     from pathlib import Path
 
-    import pytest
-
 
 @pytest.mark.slow
 def test_pictures_are_drawn_and_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
