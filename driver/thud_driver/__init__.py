@@ -87,7 +87,7 @@ class _Interrupt:
     def __call__(self, number: int, frame: FrameType | None) -> None:
         if not self.number:
             self.number, self.time = number, time.monotonic()
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(number)
         if time.monotonic() > self.time + _COPIES:
             _end(number, frame)
 
