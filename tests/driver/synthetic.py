@@ -152,7 +152,7 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
         contact_time=release,
         restitution=Estimate.unknown(),
         restitution_shared={},
-        restitution_by="",
+        restitution_method="",
         restitutions={},
         peak_force=Estimate(1500, 0),
         impulse=Estimate.unknown(),

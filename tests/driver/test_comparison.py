@@ -14,7 +14,7 @@ from conftest import MINIMAL, REPOSITORY, naming, recorded
 import thud
 from thud import cli
 from thud.base.errors import PlausibilityWarning
-from thud.comparison.comparison import _cell, _digits
+from thud.comparison.comparison import _cell, _digits, read_all
 from thud.level.criteria import Criterion
 from thud.recordings.config import Config
 
@@ -34,7 +34,7 @@ def write_recording(path: Path, impact: thud.Impact, header: str = "time_s,force
 
 
 def test_paper_s_argument_from_end_to_end() -> None:
-    comparison = thud.compare(thud.read_all(STEPS))
+    comparison = thud.compare(read_all(STEPS))
     levels = {name: impact.levels(force="floor") for name, impact in comparison.impacts.items()}
     lower = np.array([38, 29.5, 21.5, 15, 10.5])
     upper = np.array([40, 32.5, 24.5, 19, 14.5])
@@ -194,7 +194,7 @@ def test_nothing_and_different_drops_are_told(
     (tmp_path / "other").mkdir()
     paths = [case_file(MINIMAL), case_file(MINIMAL, "other/case.nml")]
     with pytest.raises(thud.InputError, match=naming(paths[1], "'case'")):
-        thud.read_all(paths)
+        read_all(paths)
 
 
 def test_command_writes_the_page(

@@ -399,7 +399,7 @@ def test_drops_that_cannot_be_kept_at_an_interrupt_are_told(
     monkeypatch.setattr(kept, "replace_file", fail)
 
     def measure() -> None:
-        with kept.KeptDrops(tmp_path) as drops:
+        with kept.Checkpoint(tmp_path) as drops:
             drops.open(signal, Config())
             drops.add(0, drop)
             raise KeyboardInterrupt
@@ -465,7 +465,7 @@ def test_drops_that_held_more_than_their_force() -> None:
 
 def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
-    monkeypatch.setattr(measurement, "WORTH", 1)
+    monkeypatch.setattr(measurement, "MIN_FOR_POOL", 1)
     one, two = (thud.read_recording(file, config=config, workers=n) for n in (1, 2))
     assert [drop.name for drop in two.drops] == [drop.name for drop in one.drops]
     np.testing.assert_allclose(two.levels(), one.levels(), rtol=0, atol=1e-9)

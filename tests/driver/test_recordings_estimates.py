@@ -23,7 +23,7 @@ from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
 from thud.recordings.recorded_levels import measure_levels
-from thud.recordings.restitution import GRAVITY, Fall
+from thud.recordings.restitution import GRAVITY, DropConditions
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
@@ -226,7 +226,7 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
         return measure_drop(window, **{"height": 1.0, "mass": 2.5, **known})
 
     for key, unit, name in (("mass", 2.5, "mass"), ("height", 1.0, "drop height")):
-        fall = Fall(1.0, 2.5, **{f"{key}_uncertainty": step * unit})
+        fall = DropConditions(1.0, 2.5, **{f"{key}_uncertainty": step * unit})
         shared = fall.shared(at().restitutions, impulse)
         low, high = (at(**{key: unit * (1 + sign * step)}) for sign in (-1, 1))
         for way, parts in shared.items():
@@ -259,7 +259,7 @@ def propagated(function: Callable[..., float], *estimates: Estimate) -> Estimate
 
 IMPULSE, CONTACT = Estimate(22.0, 0.05), Estimate(0.02, 2e-4)
 FLIGHTS = Estimate(0.7, 2e-3), Estimate(0.5, 1e-3)
-FALL = Fall(1.2, 2.4, 0.01, 0.02, 0.003)
+FALL = DropConditions(1.2, 2.4, 0.01, 0.02, 0.003)
 LANDING = np.sqrt(2 * GRAVITY * 1.2)
 
 
@@ -302,8 +302,8 @@ def test_restitution_by_impulse_and_flight_has_the_uncertainty_of_both() -> None
         )
     slope = 0.003 * (by_flight(0.7, 1.2 + 1e-6) - by_flight(0.7, 1.2 - 1e-6)) / 2e-6
     assert shared["bounces"] == {"drop height": pytest.approx(slope)}
-    assert Fall(None, 2.4).restitutions(IMPULSE, CONTACT, FLIGHTS[:1]) == ({}, ())
-    ways, (told,) = Fall().restitutions(IMPULSE, CONTACT, FLIGHTS)
+    assert DropConditions(None, 2.4).restitutions(IMPULSE, CONTACT, FLIGHTS[:1]) == ({}, ())
+    ways, (told,) = DropConditions().restitutions(IMPULSE, CONTACT, FLIGHTS)
     assert not ways
     assert f"{0.5 / 0.7:.3f}" in told
 
@@ -429,7 +429,7 @@ def test_noise_behind_a_drop_was_taken_for_its_bounce() -> None:
         HALF_SINE, FINE, rate=24e3, noise_db=60, drops=((0.0, 1.0), (0.06, 0.3)), after=0.3
     )
     (drop,) = drops(force, 24e3)
-    assert drop.restitution_by == "impulse"
+    assert drop.restitution_method == "impulse"
     assert any(re.search(naming("bounce", "1 m"), remark) for remark in drop.remarks)
 
 
@@ -466,7 +466,7 @@ def test_restitution_and_mass_follow_from_the_impulse() -> None:
     assert drop.restitutions["impulse"].value == pytest.approx(expected, abs=1e-3)
     mass = impulse / (SPEED * 1.75 + 9.81 * 0.02)
     assert drop.effective_mass.value == pytest.approx(mass, rel=1e-3)
-    assert drop.restitution_by == "impulse and bounces"
+    assert drop.restitution_method == "impulse and bounces"
     assert drop.peak_force.value == pytest.approx(1500, abs=5)
 
 

@@ -113,7 +113,7 @@ def crowded(one: Recording) -> Recording:
 
 def unknown(one: Recording) -> Recording:
     """Return a recording of which nothing is known but the force."""
-    drop = replace(one.drops[0], restitution=UNKNOWN, restitution_by="", restitutions={})
+    drop = replace(one.drops[0], restitution=UNKNOWN, restitution_method="", restitutions={})
     return Recording("unknown", (drop,), one.origins)
 
 

@@ -110,8 +110,8 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
         found.measured + 10 * np.log10(1 - 10 ** (-np.maximum(near, 6) / 10)),
     )  # fmt: skip
     assert found.level == pytest.approx(expected)
-    assert found.is_maximum.tolist() == (near < 6).tolist()
-    assert found.is_maximum.any()
+    assert found.is_upper_bound.tolist() == (near < 6).tolist()
+    assert found.is_upper_bound.any()
     # The A-weighted energy of each position, and the standard error of their mean.
     energy = np.array([10 ** (thud.rating(one).a_weighted / 10) for one in levels])
     error = energy.std(ddof=1) / np.sqrt(6) / energy.mean() * 10 / np.log(10)
@@ -261,7 +261,7 @@ def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:
     one = replace(GOOD, positions=GOOD.positions[:1], background=None)
     assert (one.spread, one.position_uncertainty) == (None, None)
     assert one.level.tolist() == one.measured.tolist()
-    assert not one.is_maximum.any()
+    assert not one.is_upper_bound.any()
     assert replace(one, volume=None).standardised_rating is None
     assert replace(one, reverberation_time=None).standardised is None
 

@@ -240,7 +240,7 @@ def _log_work() -> None:
         setattr(kind, name, log)
 
     logged(blocks.Blocks, "keep")
-    logged(kept.KeptDrops, "add")
+    logged(kept.Checkpoint, "add")
 
 
 def _serve() -> None:

@@ -98,7 +98,7 @@ def scaled(value: float, power: int) -> float:
     return float(Decimal(repr(float(value))).scaleb(power))
 
 
-def handy_unit(unit: str, value: float) -> tuple[str, float]:
+def display_unit(unit: str, value: float) -> tuple[str, float]:
     """Return a unit in which a value is at least 1, and its size in SI units."""
     known = {name: scaled(1.0, MULTIPLES[unit][name]) for name in HANDY.get(unit, ())}
     small = [(name, factor) for name, factor in known.items() if factor <= abs(value)]

@@ -115,10 +115,10 @@ def put(case: Case, values: Mapping[str, object]) -> Case:
     return dataclasses.replace(case, **changed)
 
 
-def plain_words(name: str) -> str:
+def humanize(name: str) -> str:
     """Return the name of a key, a model or a choice in words.
 
-    >>> plain_words("youngs_modulus")
+    >>> humanize("youngs_modulus")
     "Young's modulus"
     """
     for plain, proper in _PROPER.items():

@@ -89,7 +89,7 @@ QUIET = argument("-q", "--quiet", action="store_true", help="show only errors an
 NO_FIGURES = argument("--no-figures", action="store_true", help="results only")
 
 
-def tell(remarks: Iterable[object]) -> None:
+def print_notes(remarks: Iterable[object]) -> None:
     """Print remarks; a progress bar stays below them."""
     for remark in remarks:
         tqdm.write(f"thud-driver: {remark}", file=sys.stderr)
@@ -103,7 +103,7 @@ def shown_at_once() -> Iterator[None]:
 
     def show(warning: Any, kind: type[Warning], *place: Any) -> None:  # noqa: ANN401 - of any warning
         if issubclass(kind, kinds):
-            tell([warning])
+            print_notes([warning])
         else:
             usual(warning, kind, *place)
 
@@ -114,7 +114,7 @@ def shown_at_once() -> Iterator[None]:
         yield
 
 
-def conclude(  # noqa: PLR0913, PLR0917 - each of them differs
+def save_result(  # noqa: PLR0913, PLR0917 - each of them differs
     options: argparse.Namespace,
     source: str,
     found: MobilityFit | RoomLevels,
@@ -136,7 +136,7 @@ def conclude(  # noqa: PLR0913, PLR0917 - each of them differs
     results.write(contents)
     if not options.quiet:
         print(shown)
-    tell(found.remarks)
+    print_notes(found.remarks)
     if not options.quiet:
         print(f"Results: {results.folder}")
     return 0

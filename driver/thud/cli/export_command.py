@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.case.case import read_case
-from thud.cli.command import QUIET, Command, argument, output, results_of, tell
+from thud.cli.command import QUIET, Command, argument, output, print_notes, results_of
 from thud.impact.compute import compute
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def run_export(options: argparse.Namespace) -> int:
     if not chosen:
         refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read(options.source, options.config)
-    tell(source.remarks)
+    print_notes(source.remarks)
     force = export_force.blocked_force(source, drop=options.drop, rate=options.rate)
     contents: dict[str, bytes] = {}
     for kind in chosen:

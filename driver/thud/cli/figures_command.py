@@ -11,7 +11,7 @@ from tqdm import tqdm
 from thud.base.display import draw_all
 from thud.base.errors import PlausibilityWarning
 from thud.base.tables import format_rows
-from thud.cli.command import PAGE, results_of, tell
+from thud.cli.command import PAGE, print_notes, results_of
 
 if TYPE_CHECKING:
     import argparse
@@ -32,7 +32,7 @@ def compare_cases(options: argparse.Namespace) -> int:
             options.source,
             progress=not options.quiet and sys.stderr.isatty(),
         )
-    tell(page.remarks)
+    print_notes(page.remarks)
     paths = results.write(page.files())
     if not options.quiet:
         print(format_rows(page.table()))

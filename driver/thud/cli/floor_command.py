@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from thud.base.errors import InputError, PlausibilityWarning
 from thud.base.tables import format_rows
 from thud.case.case import read_case
-from thud.cli.command import PAGE, QUIET, Command, argument, output, results_of, tell
+from thud.cli.command import PAGE, QUIET, Command, argument, output, print_notes, results_of
 
 if TYPE_CHECKING:
     import argparse
@@ -33,7 +33,7 @@ def compare(options: argparse.Namespace) -> int:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PlausibilityWarning)
         found = compare_floors(cases, progress=not options.quiet and sys.stderr.isatty())
-    tell(found.remarks)
+    print_notes(found.remarks)
     paths = results.write(found.files())
     if not options.quiet:
         print(format_rows(found.rows()))

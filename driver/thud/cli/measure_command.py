@@ -14,8 +14,8 @@ from thud.cli.command import (
     Command,
     argument,
     output,
+    print_notes,
     results_of,
-    tell,
 )
 from thud.level.levels import SOURCES
 from thud.recordings.channel import channel_of
@@ -30,7 +30,7 @@ SHOWN = 50
 
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings.checkpoint import KeptDrops
+    from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.read_recording import read_recording
     from thud.report import recording_files as results
 
@@ -39,7 +39,7 @@ def measure(options: argparse.Namespace) -> int:
     files.require(results.file_names(figures=figures))
     folder = files.folder
     # Drops stay until the results are written.
-    with KeptDrops(folder) as kept:
+    with Checkpoint(folder) as kept:
         recording = read_recording(
             options.drops,
             height=options.height,
@@ -73,7 +73,7 @@ def measure(options: argparse.Namespace) -> int:
             print(f"  {step}")
         print(f"  {results.verdict_sentence(recording)}")
     told = results.sentences(recording, "remarks")
-    tell((*recording.doubts, *recording.outliers, *told))
+    print_notes((*recording.doubts, *recording.outliers, *told))
     if not options.quiet:
         print(f"Results: {folder}")
     return NOT_CONFORMING if options.check and not verdict else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from thud.base.tables import format_rows
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, save_result
 
 if TYPE_CHECKING:
     import argparse
@@ -18,7 +18,7 @@ def fit(options: argparse.Namespace) -> int:
     found = fit_mobility(options.table, quantity=options.quantity, order=options.order)
     shown = f"{repr(found)[1:-1]}\n{format_rows(found.rows())}"
     file = "measured_mobility.nml", found.namelist().encode()
-    return conclude(options, options.table, found, shown, file, "mobility_fit")
+    return save_result(options, options.table, found, shown, file, "mobility_fit")
 
 
 MOBILITY = Command(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from thud.base.tables import format_rows
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, conclude, output
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, save_result
 
 if TYPE_CHECKING:
     import argparse
@@ -20,7 +20,7 @@ def rate(options: argparse.Namespace) -> int:
     if (scatter := found.position_uncertainty) is not None:
         shown += f"\n\n  Standard uncertainty by the scatter of positions: {scatter:.1f} dB"
     file = "room_levels.csv", levels_csv(found)
-    return conclude(options, options.levels, found, shown, file, "room_levels")
+    return save_result(options, options.levels, found, shown, file, "room_levels")
 
 
 RATE = Command(

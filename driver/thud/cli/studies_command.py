@@ -10,13 +10,13 @@ from tqdm import tqdm
 
 from thud.base.display import left_out
 from thud.base.errors import NumericalError, ThudError
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, tell
+from thud.cli.command import NO_FIGURES, QUIET, Command, argument, output, print_notes
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
     import argparse
 
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
 
 _STUDY = argument("study", metavar="STUDY.toml", help="study file")
 _SETS = (
@@ -58,7 +58,7 @@ def run_study(options: argparse.Namespace) -> int:
     """Run a study, print its results, save files and figures; return the exit code."""
     kind = get_kind(options.name)
     study = kind.read_study(options.study)
-    how: How = {"progress": not options.quiet, "replace": options.replace}
+    how: RunOptions = {"progress": not options.quiet, "replace": options.replace}
     if KINDS[options.name].has_sets:
         how |= {
             "backend": options.backend,
@@ -79,7 +79,7 @@ def run_study(options: argparse.Namespace) -> int:
             raise type(error)(message) from error
         if not options.quiet:
             tqdm.write(kind.table(result, study))
-        tell(f"{options.study}: {remark}" for remark in kind.remarks(result))
+        print_notes(f"{options.study}: {remark}" for remark in kind.remarks(result))
         contents = kind.files(result, study)
         if drawn:
             with left_out("the figure of the study"):

@@ -28,14 +28,14 @@ from thud.plot.levels_figure import common_source
 from thud.plot.style import page_files
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
-from thud.recordings.restitution import Fall
+from thud.recordings.restitution import DropConditions
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
     from thud.level.criteria import Criterion
-    from thud.recordings.verdict import Decision
+    from thud.recordings.verdict import CriterionResult
 
 # Endings of namelist files; all others are recordings.
 NAMELISTS = (".nml", ".namelist", "")
@@ -149,7 +149,7 @@ def _digits(force: float) -> str:
     return f"{force:.1f}" if force >= 1 else f"{force:.3g}"
 
 
-def _cell(criterion: Criterion | Decision, unit: float, decimals: int) -> str:
+def _cell(criterion: Criterion | CriterionResult, unit: float, decimals: int) -> str:
     """Return the value of a criterion, and how it misses its limits."""
     if np.isnan(criterion.value):
         return "not known"
@@ -242,7 +242,9 @@ def compare(
 def _require_same_drop(impacts: Mapping[str, Impact | Recording]) -> None:
     """Raise InputError where drops differ; measured heights differ within their tolerance."""
     computed = {n: i.impact_velocity for n, i in impacts.items() if isinstance(i, Impact)}
-    falls = {n: Fall(i.config.height) for n, i in impacts.items() if isinstance(i, Recording)}
+    falls = {
+        n: DropConditions(i.config.height) for n, i in impacts.items() if isinstance(i, Recording)
+    }
     speeds = computed | {n: fall.speed for n, fall in falls.items() if fall.height}
     if not speeds:
         return

@@ -11,7 +11,7 @@ import numpy as np
 from thud.base.checks import refuse, shown
 from thud.base.errors import ThudError
 from thud.case.case import tables_case
-from thud.case.keys import plain_words
+from thud.case.keys import humanize
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.ensemble import get_cost
@@ -20,7 +20,7 @@ from thud.level.levels import get_bands
 from thud.plot.force_history_figure import contact_force
 from thud.plot.style import FORCE_WORDS
 from thud.recordings.read_recording import read_recording
-from thud.recordings.verdict import Decision
+from thud.recordings.verdict import CriterionResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -141,16 +141,16 @@ def _answer(
     }
 
 
-def _criterion(one: Criterion | Decision) -> Answer:
+def _criterion(one: Criterion | CriterionResult) -> Answer:
     """Return a criterion; times are in ms, as on the screen."""
     scale, unit = (1e3, "ms") if one.unit == "s" else (1.0, one.unit)
     name, band = one.name.rpartition("octave_")[1:]
-    if isinstance(one, Decision):
+    if isinstance(one, CriterionResult):
         verdict, uncertainty = one.verdict, scale * one.quantity.expanded or None
     else:
         verdict, uncertainty = ("conforms" if one.conforms else "does not conform"), None
     return {
-        "name": f"{band.replace('_', '.')} Hz" if name else plain_words(band),
+        "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
         "band": bool(name),
         "unit": unit,
         "value": None if np.isnan(one.value) else round(scale * one.value, 6),
@@ -198,7 +198,7 @@ def _floor(impact: Impact, moving: FloorImpact) -> Answer:
     contact = contact_force(moving, "floor")
     head, *rows = moving.rows()
     return {
-        "name": plain_words(moving.floor.name),
+        "name": humanize(moving.floor.name),
         "force": _curve(contact[0], 1e3 * contact[1]),
         "velocity": _curve(times[shown], 1e3 * moving.floor_velocity[shown]),
         "numbers": [

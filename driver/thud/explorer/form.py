@@ -8,9 +8,9 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS
-from thud.base.units import handy_unit, power_of, scaled
+from thud.base.units import display_unit, power_of, scaled
 from thud.case.case import OPTIONAL
-from thud.case.keys import plain_words
+from thud.case.keys import humanize
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -62,21 +62,21 @@ def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str
 
 def _field(key: Key, default: object) -> dict[str, Any]:
     """Return the field of a key."""
-    label, meaning = _title(key.name), _begun(plain_words(key.meaning))
+    label, meaning = _title(key.name), _begun(humanize(key.meaning))
     field = {
         "group": key.group,
         "name": key.name,
         "label": label,
         "kind": key.kind,
         "help": meaning,
-        "choices": {choice: plain_words(choice) for choice in key.choices},
+        "choices": {choice: humanize(choice) for choice in key.choices},
         "default": list(default) if isinstance(default, tuple) else default,
         "unit": _typeset(key.unit),
         "power": 0,
     }
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
         # Times stay in seconds: a reverberation time of 500 ms is none that anybody knows.
-        unit = key.unit if key.unit == "s" else handy_unit(key.unit, default)[0]
+        unit = key.unit if key.unit == "s" else display_unit(key.unit, default)[0]
         power = power_of(unit or "1", key.unit, key.name)
         after = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
         allowed = f"allowed: {_end(key.lower, power)} to {_end(key.upper, power)}{after}"
@@ -93,7 +93,7 @@ def _field(key: Key, default: object) -> dict[str, Any]:
 
 
 def _title(name: str) -> str:
-    return _begun(plain_words(name))
+    return _begun(humanize(name))
 
 
 def _begun(words: str) -> str:
@@ -114,7 +114,7 @@ def _shown(value: float | str, power: int) -> float | None:
 def _end(end: float | str, power: int) -> str:
     """Return the end of a range in words."""
     if isinstance(end, str):
-        return plain_words(end)
+        return humanize(end)
     number = f"{scaled(end, -power):g}"
     return re.sub(r"1e\+0?(\d+)", lambda found: "10" + found[1].translate(_RAISED), number)
 

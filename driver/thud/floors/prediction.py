@@ -54,7 +54,7 @@ class RoomPrediction(Displayed):
         Expected number of modes in each third.
     few_modes : float
         Number of modes below which the statistical answer of a third is doubtful.
-    surface_mass : float
+    mass_per_area : float
         Mass of the radiating plate over its area, kg/m2.
     spread : ndarray, shape (12,)
         Expected standard deviation of the level for one position of the source and one of the
@@ -93,7 +93,7 @@ class RoomPrediction(Displayed):
     room_modes: NDArray[np.float64]
     conductance: NDArray[np.float64]
     few_modes: float
-    surface_mass: float
+    mass_per_area: float
     spread: NDArray[np.float64]
     octave_level: NDArray[np.float64]
     octave_time: NDArray[np.float64]
@@ -114,7 +114,7 @@ class RoomPrediction(Displayed):
         """Share of the floor's losses that it radiates into the room, shape (12,)."""
         air = self.room.air_density * self.room.sound_speed
         omega = 2 * np.pi * self.frequency
-        radiated = air * self.radiation_factor / (self.surface_mass * omega)
+        radiated = air * self.radiation_factor / (self.mass_per_area * omega)
         # The floor loses at least what it dissipates and radiates to both sides.
         internal = getattr(self.floor, "loss_factor", 0.0)
         return radiated / np.maximum(self.loss_factor, internal + 2 * radiated)
@@ -254,7 +254,7 @@ def predict_level(
         floor_remarks=tuple(map(text, found.get("remarks", {}).values())),
         time_of_maximum=bands.pop("time"),
         few_modes=found["few_modes"],
-        surface_mass=found["surface_mass"],
+        mass_per_area=found["surface_mass"],
         octave_level=found["octaves"]["level"],
         octave_time=found["octaves"]["time"],
         history_time=found["history"]["time"],

@@ -102,7 +102,7 @@ class RoomLevels(Displayed):
         return self._corrected()[0]
 
     @property
-    def is_maximum(self) -> NDArray[np.bool_]:
+    def is_upper_bound(self) -> NDArray[np.bool_]:
         """Whether a level is a maximum only: less than 6 dB above the background."""
         return self._corrected()[1]
 
@@ -161,8 +161,8 @@ class RoomLevels(Displayed):
             )
         if self.background is None:
             found.append("the background is not known: levels are not corrected for it")
-        elif self.is_maximum.any():
-            bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_maximum])
+        elif self.is_upper_bound.any():
+            bands = ", ".join(f"{f:g}" for f in self.frequency[self.is_upper_bound])
             found.append(
                 f"less than 6 dB above the background at {bands} Hz: levels there are maxima, and "
                 "so is what is made of them"
@@ -199,7 +199,7 @@ class RoomLevels(Displayed):
             if title in {"L_i,Fmax, dB", "standardised, dB"}:
                 column[:] = [
                     f"< {text}" if low else text
-                    for text, low in zip(column, self.is_maximum, strict=True)
+                    for text, low in zip(column, self.is_upper_bound, strict=True)
                 ]
         return [tuple(titles), *zip((f"{f:g}" for f in self.frequency), *cells, strict=True)]
 
@@ -228,8 +228,8 @@ class RoomLevels(Displayed):
     def _corrected(self) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         if self.background is None:
             return self.measured, np.zeros(len(self.frequency), dtype=bool)
-        level, is_maximum = level_api.remove_background(self.measured, self.background)
-        return level, is_maximum.astype(bool)
+        level, is_upper_bound = level_api.remove_background(self.measured, self.background)
+        return level, is_upper_bound.astype(bool)
 
 
 def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) -> RoomLevels:
@@ -298,7 +298,7 @@ def levels_csv(found: RoomLevels) -> bytes:
     columns = {
         "nominal_Hz": found.frequency, "mean_dB": found.measured, "spread_dB": found.spread,
         "background_dB": found.background, "level_dB": found.level,
-        "is_maximum": found.is_maximum.astype(int),
+        "is_maximum": found.is_upper_bound.astype(int),
         "reverberation_time_s": found.reverberation_time, "standardised_dB": found.standardised,
     }  # fmt: skip
     known = {title: values for title, values in columns.items() if values is not None}

@@ -58,13 +58,13 @@ from thud.plot.style import (
     SIZE as SIZE,
     WIDTH as WIDTH,
     add_curves as add_curves,
-    dress as dress,
     empty_axes as empty_axes,
     legend_above as legend_above,
     octave_axis as octave_axis,
     picture_files as picture_files,
     save as save,
     save_all as save_all,
+    style_axes as style_axes,
 )
 from thud.plot.surrogate_figure import draw_surrogate as draw_surrogate
 from thud.plot.sweep_figure import draw_sweep as draw_sweep

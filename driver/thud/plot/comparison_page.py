@@ -13,12 +13,12 @@ from thud.plot.levels_figure import draw_levels
 from thud.plot.style import (
     SIZE,
     WIDTH,
-    dress,
+    escape_label,
     legend_above,
     level_label,
-    literal,
     new_figure,
     own_style,
+    style_axes,
 )
 from thud.recordings.recording import Recording
 
@@ -50,7 +50,7 @@ def comparison_page(
     width = max(2 * WIDTH, 0.8 + _LETTER * sum(letters))
     figure = new_figure(5.8 + below, width)
     rows = figure.add_gridspec(3, 2, height_ratios=[2.7, 2.7, below])
-    draw_forces(dress(figure.add_subplot(rows[0, :])), impacts, force)
+    draw_forces(style_axes(figure.add_subplot(rows[0, :])), impacts, force)
     octaves = figure.add_subplot(rows[1, 0])
     thirds = figure.add_subplot(rows[1, 1], sharey=octaves)
     draw_levels({"octave": octaves, "third": thirds}, impacts, force, source)
@@ -59,7 +59,7 @@ def comparison_page(
     axes = figure.add_subplot(rows[2, :])
     axes.set_axis_off()
     cells = axes.table(
-        [[literal(cell) for cell in row] for row in (names, *body)],
+        [[escape_label(cell) for cell in row] for row in (names, *body)],
         colWidths=[length / sum(letters) for length in letters],
         bbox=Bbox.unit(),
         edges="horizontal",

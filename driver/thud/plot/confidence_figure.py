@@ -7,8 +7,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from thud.case.keys import plain_words
-from thud.plot.style import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure, own_style
+from thud.case.keys import humanize
+from thud.plot.style import (
+    COLOURS,
+    GREY,
+    SIZE,
+    WIDTH,
+    legend_above,
+    new_figure,
+    own_style,
+    style_axes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -45,7 +54,7 @@ def confidence(fit: Fit, units: Mapping[str, tuple[str, float]]) -> Figure:
             if column >= row:
                 axes.remove()
                 continue
-            dress(axes)
+            style_axes(axes)
             _draw_pair(fit, axes, (column, row), units)
     letters = LINE / (count - 1)
     for row in range(1, count):
@@ -139,7 +148,7 @@ def _draw_correlation(fit: Fit) -> Figure:
 def _label(name: str, units: Mapping[str, tuple[str, float]], letters: float) -> str:
     """Return a parameter with its unit, on two lines where it does not fit on one."""
     unit = units[name][0]
-    text = plain_words(name).capitalize()
+    text = humanize(name).capitalize()
     if not unit:
         return text
     line = f"{text}, {unit}"

@@ -15,10 +15,10 @@ from thud.plot.style import (
     GREY,
     LEVEL,
     SIZE,
-    dress,
     legend_above,
     new_figure,
     own_style,
+    style_axes,
 )
 from thud.studies.fitting.misfit import SHIFT
 
@@ -63,8 +63,8 @@ def target_and_fit(fit: Fit, number: int = 1) -> Figure:
     deviation = fit.deviation_of(target)
     figure = new_figure(3.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
-    dress(above)
-    dress(below)
+    style_axes(above)
+    style_axes(below)
     below.axhline(0, color="0.45", linewidth=0.8)
     if target.misfit.deviation_unit == "N":
         _draw_force(target, deviation, above, below)

@@ -14,11 +14,11 @@ from thud.plot.style import (
     COLOURS,
     SIZE,
     band_axis,
-    dress,
     legend_above,
     line_style,
     new_figure,
     own_style,
+    style_axes,
 )
 
 if TYPE_CHECKING:
@@ -40,13 +40,13 @@ def draw_floor(impact: FloorImpact) -> Figure:
     """Draw force and floor velocity, the change of the levels, the energy, and the mobility."""
     figure = new_figure(6.4)
     history, motion, change, energy, mobility = figure.subplots(5, 1)
-    _draw_histories(dress(history), dress(motion), impact)
+    _draw_histories(style_axes(history), style_axes(motion), impact)
     place = np.arange(len(get_bands(THIRDS).nominal))
-    dress(change).bar(place, impact.difference(THIRDS), color=COLOURS[0], width=0.7)
+    style_axes(change).bar(place, impact.difference(THIRDS), color=COLOURS[0], width=0.7)
     change.axhline(0, color="black", linewidth=0.6)
     change.set_ylabel("Contact less\nblocked, dB", fontsize=SIZE)
     found = impact.injected_energy(THIRDS)
-    dress(energy).set_yscale("log")
+    style_axes(energy).set_yscale("log")
     energy.plot(place, 1e3 * found.by_mobility, label="energy by the mobility", **line_style(0))
     energy.plot(
         place, 1e3 * found.by_motion, label="energy by the velocity", color=COLOURS[1], marker="o",
@@ -56,7 +56,7 @@ def draw_floor(impact: FloorImpact) -> Figure:
     energy.sharex(change)
     change.tick_params(labelbottom=False)
     band_axis(energy, found.frequency, THIRDS)
-    _draw_mobility(dress(mobility), impact)
+    _draw_mobility(style_axes(mobility), impact)
     # One legend for all.
     for axes in (motion, energy, mobility):
         for line in axes.get_lines():

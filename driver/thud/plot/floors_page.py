@@ -16,13 +16,13 @@ from thud.plot.style import (
     SIZE,
     WIDTH,
     band_axis,
-    dress,
+    escape_label,
     legend_above,
     line_style,
-    literal,
     marker_style,
     new_figure,
     own_style,
+    style_axes,
 )
 
 if TYPE_CHECKING:
@@ -56,11 +56,11 @@ def draw_floors(found: FloorComparison) -> Figure:
     letters = [max(map(len, column)) + _GAP for column in zip(*table, strict=True)]
     figure = new_figure(7.2 + below, max(2 * WIDTH, _LETTER * sum(letters)))
     rows = figure.add_gridspec(4, 2, height_ratios=[2.4, 2.4, 2.4, below])
-    panels = [dress(figure.add_subplot(rows[i, j])) for i in range(2) for j in range(2)]
+    panels = [style_axes(figure.add_subplot(rows[i, j])) for i in range(2) for j in range(2)]
     for number, (name, one) in enumerate(found.predictions.items()):
         for axes, values in zip(panels, _chain(one), strict=True):
             axes.plot(
-                np.arange(len(values)), values, label=literal(name), **line_style(number),
+                np.arange(len(values)), values, label=escape_label(name), **line_style(number),
                 **marker_style(number, 3.5),
             )  # fmt: skip
     nominal = next(iter(found.predictions.values())).frequency
@@ -69,13 +69,15 @@ def draw_floors(found: FloorComparison) -> Figure:
         axes.set_ylabel(label, fontsize=SIZE)
         if logarithmic:
             axes.set_yscale("log")
-    _draw_classes(dress(figure.add_subplot(rows[2, :])), found)
+    _draw_classes(style_axes(figure.add_subplot(rows[2, :])), found)
     axes = figure.add_subplot(rows[3, :])
     axes.set_axis_off()
     cells = axes.table(
-        [[literal(cell) for cell in row] for row in table], bbox=Bbox.unit(), edges="horizontal",
-        colWidths=[count / sum(letters) for count in letters],
-    )  # fmt: skip
+        [[escape_label(cell) for cell in row] for row in table],
+        bbox=Bbox.unit(),
+        edges="horizontal",
+        colWidths=letters,
+    )
     cells.auto_set_font_size(value=False)
     cells.set_fontsize(SIZE - 1)
     for (_, column), cell in cells.get_celld().items():
@@ -138,7 +140,7 @@ def _draw_classes(axes: Axes, found: FloorComparison) -> None:
             f"class {number}", (1, limit), xycoords=("axes fraction", "data"), ha="left",
             va="center", fontsize=SIZE - 2, color=COLOURS[1],
         )  # fmt: skip
-    names = [literal(name) for name in found.predictions]
+    names = [escape_label(name) for name in found.predictions]
     axes.set_xticks(place, names)
     width = axes.bbox.width / axes.figure.dpi
     if max(map(len, names)) * len(names) > _LETTERS * width:

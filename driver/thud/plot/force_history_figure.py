@@ -16,11 +16,11 @@ from thud.plot.style import (
     SIZE,
     Curve,
     empty_axes,
+    escape_label,
     force_words,
     iterate_curves,
     legend_above,
     line_style,
-    literal,
     named,
     own_style,
 )
@@ -57,7 +57,7 @@ def force_history(impacts: Mapping[str, Impact], force: LevelsForce | None = Non
 def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | None) -> None:
     """Draw forces against time."""
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
-        axes.plot(*contact_force(impact, kind), label=literal(name), **line_style(i))
+        axes.plot(*contact_force(impact, kind), label=escape_label(name), **line_style(i))
     axes.margins(x=0)
     axes.set_xlabel(TIME_LABEL, fontsize=SIZE)
     axes.set_ylabel(force_label(impacts, force), fontsize=SIZE)

@@ -11,11 +11,11 @@ from thud.impact.solve import solve
 from thud.plot.style import (
     SIZE,
     empty_axes,
+    escape_label,
     iterate_curves,
     legend_above,
     level_label,
     line_style,
-    literal,
     marker_style,
     octave_axis,
     own_style,
@@ -47,7 +47,11 @@ def level_changes(
     for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
         change = impact.levels(force=kind) - reference.levels(force=kind)
         axes.plot(
-            np.arange(len(change)), change, label=literal(name), **line_style(i), **marker_style(i)
+            np.arange(len(change)),
+            change,
+            label=escape_label(name),
+            **line_style(i),
+            **marker_style(i),
         )
     octave_axis(axes)
     axes.set_ylabel(level_label(impacts, force, "Change of the level, dB"), fontsize=SIZE)

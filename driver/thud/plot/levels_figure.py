@@ -25,18 +25,18 @@ from thud.level.levels import octave_limits
 from thud.plot.style import (
     SIZE,
     Curve,
-    dress,
+    escape_label,
     iterate_curves,
     legend_above,
     level_label,
     line_style,
-    literal,
     marker_style,
     named,
     new_figure,
     octave_axis,
     octave_boxes,
     own_style,
+    style_axes,
 )
 from thud.recordings.config import Config
 from thud.recordings.recording import Recording
@@ -93,11 +93,11 @@ def draw_levels(
     # Side by side, equal levels can be distinguished.
     step = min(0.1, 0.6 / len(impacts))
     for bands, axes in panels.items():
-        dress(axes)
+        style_axes(axes)
         for i, (name, impact, kind) in enumerate(iterate_curves(impacts, force)):
             values = impact.levels(bands, method, kind)
             place = np.arange(len(values)) + step * (i - (len(impacts) - 1) / 2)
-            axes.plot(place, values, label=literal(name), **line_style(i), **marker_style(i))
+            axes.plot(place, values, label=escape_label(name), **line_style(i), **marker_style(i))
         octave_axis(axes, bands)
 
 

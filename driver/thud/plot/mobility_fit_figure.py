@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.plot.style import COLOURS, SIZE, dress, legend_above, new_figure, own_style
+from thud.plot.style import COLOURS, SIZE, legend_above, new_figure, own_style, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def mobility_fit(found: MobilityFit) -> Figure:
     """Draw magnitude and phase of measurement and fit against frequency."""
     figure = new_figure(3.6)
-    upper, lower = (dress(axes) for axes in figure.subplots(2, sharex=True))
+    upper, lower = (style_axes(axes) for axes in figure.subplots(2, sharex=True))
     lines = np.geomspace(found.frequency[0], found.frequency[-1], 2000)
     fitted = found.mobility(lines)
     upper.loglog(

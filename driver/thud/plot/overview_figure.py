@@ -6,7 +6,7 @@ from thud.base._schema import LimitsSource
 from thud.impact.impact import Impact
 from thud.plot.force_history_figure import draw_forces
 from thud.plot.levels_figure import draw_levels
-from thud.plot.style import SIZE, dress, legend_above, level_label, new_figure, own_style
+from thud.plot.style import SIZE, legend_above, level_label, new_figure, own_style, style_axes
 from thud.recordings.recording import Recording
 
 
@@ -23,7 +23,7 @@ def overview(impact: Impact | Recording, source: LimitsSource = "rubber_ball") -
     named = {name: impact}
     figure = new_figure(5)
     history, octaves = figure.subplots(2, 1)
-    draw_forces(dress(history), named, None)
+    draw_forces(style_axes(history), named, None)
     draw_levels({"octave": octaves}, named, None, source)
     octaves.set_ylabel(level_label(named, None), fontsize=SIZE)
     legend_above(octaves)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from matplotlib.ticker import FormatStrFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from thud.base.units import handy_unit
-from thud.case.keys import plain_words
+from thud.base.units import display_unit
+from thud.case.keys import humanize
 from thud.plot.style import SIZE
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def show_parameter(axes: Axes, which: Which, parameter: xr.DataArray) -> float:
     values = parameter.values
     maximum = float(np.abs(values).max())
     if unit == parameter.attrs["units"] and not _PLAIN[0] <= maximum < _PLAIN[1]:
-        unit, size = handy_unit(unit, maximum)
+        unit, size = display_unit(unit, maximum)
         factor = 1 / size
     shown = unit.replace("degC", "°C")
     label = words(parameter) if unit == "1" else f"{words(parameter)}, {shown}"
@@ -63,4 +63,4 @@ def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
 
 def words(parameter: xr.DataArray) -> str:
     """Return the name of a parameter in words, as a label begins."""
-    return plain_words(str(parameter.name)).capitalize()
+    return humanize(str(parameter.name)).capitalize()

@@ -12,12 +12,12 @@ from thud.plot.style import (
     SIZE,
     WIDTH,
     band_axis,
-    dress,
     empty_axes,
     legend_above,
     line_style,
     new_figure,
     own_style,
+    style_axes,
 )
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
     above, middle, below = figure.subplots(3, 1, sharex=True, height_ratios=(1, 1, 1.6))
     place = np.arange(len(found.frequency))
     few = found.has_few_modes
-    dress(above).semilogy(place, 1e3 * found.energy, color="black", marker=".", linewidth=1)
+    style_axes(above).semilogy(place, 1e3 * found.energy, color="black", marker=".", linewidth=1)
     above.set_ylabel("Energy into\nthe floor, mJ", fontsize=SIZE)
-    dress(middle).plot(
+    style_axes(middle).plot(
         place, found.radiation_factor, color=COLOURS[2], marker="^", markersize=3, linewidth=1,
         label="radiation factor",
     )  # fmt: skip
@@ -54,7 +54,7 @@ def draw_prediction(found: RoomPrediction, measured: RoomLevels | None = None) -
     )  # fmt: skip
     middle.set_ylim(bottom=0)
     middle.set_ylabel("Floor", fontsize=SIZE)
-    dress(below)
+    style_axes(below)
     low, high = found.level - found.spread, found.level + found.spread
     below.fill_between(place, low, high, color=GREY, linewidth=0, label="± expected spread")
     below.plot(place, found.level, color=COLOURS[0], linewidth=1.2)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.case.keys import plain_words
+from thud.case.keys import humanize
 from thud.plot.style import COLOURS, FORCE_WORDS, HATCHES, SIZE, empty_axes, legend_above, own_style
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
         axes.barh(
             at, row["total"], 0.9 * thickness, color=COLOURS[i % len(COLOURS)],
             hatch=HATCHES[i % len(HATCHES)], edgecolor="white", linewidth=0,
-            label=plain_words(name),
+            label=humanize(name),
         )  # fmt: skip
         look: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.6}
         axes.errorbar(

@@ -69,10 +69,10 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
 def empty_axes(height: float) -> tuple[Figure, Axes]:
     """Return an empty figure of column width and its axes."""
     figure = new_figure(height)
-    return figure, dress(figure.add_subplot())
+    return figure, style_axes(figure.add_subplot())
 
 
-def dress(axes: Axes) -> Axes:
+def style_axes(axes: Axes) -> Axes:
     """Give axes the look of all figures."""
     axes.tick_params(labelsize=SIZE)
     axes.grid(visible=True, linewidth=0.4, alpha=0.5)
@@ -109,7 +109,7 @@ def legend_above(axes: Axes, title: str = "") -> Legend:
         legend.remove()
 
 
-def literal(label: str) -> str:
+def escape_label(label: str) -> str:
     """Return a label that matplotlib neither takes for a formula nor hides."""
     return label.lstrip("_").replace("$", r"\$")
 
@@ -138,7 +138,7 @@ def add_curves(
 ) -> None:
     """Draw curves of x and y by their names, each in its colour and line style."""
     for i, (name, (x, y)) in enumerate(curves.items()):
-        axes.plot(x, y, label=literal(name), **line_style(i))
+        axes.plot(x, y, label=escape_label(name), **line_style(i))
 
 
 def named(impact: Impact) -> dict[str, Impact]:

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from thud.case.keys import plain_words
+from thud.case.keys import humanize
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands, octave_limits
 from thud.plot.parameter_axis import show_parameter, words
 from thud.plot.style import (
     COLOURS,
     FORCE_WORDS,
     SIZE,
-    dress,
     legend_above,
     line_style,
     marker_style,
     new_figure,
     own_style,
+    style_axes,
 )
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def draw_sweep(dataset: xr.Dataset) -> Figure:
     figure = new_figure(1.1 + (1.9 if across == 1 else 1.6) * down)
     panels = figure.subplots(down, across, sharex=True, sharey=True, squeeze=False).ravel()
     for i, (axes, (title, panel)) in enumerate(zip(panels, parts.items(), strict=False)):
-        _draw_tolerance(dress(axes), judged.tolerance)
+        _draw_tolerance(style_axes(axes), judged.tolerance)
         levels = np.where(panel[:, np.newaxis], judged.excess, np.nan)
         _draw_octaves(axes, dataset[name], columns[name], levels, _MAX_MARKS // across)
         axes.set_title(title.replace("_", " "), fontsize=SIZE - 1)
@@ -170,8 +170,8 @@ def _meaning(judged: _Judged, split: str | None, others: list[str]) -> str:
     minimum, maximum = judged.tolerance
     lines = [f"Grey: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB"]
     if others:
-        over = plain_words(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
+        over = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.insert(0, f"Lines: median over {over}; shades: range")
     if split:
-        lines.insert(0, f"Panels: {plain_words(split)}")
+        lines.insert(0, f"Panels: {humanize(split)}")
     return "\n".join(lines)

@@ -10,7 +10,7 @@ import numpy as np
 from thud.level.levels import RECORDED_BAND, peak_count
 from thud.recordings.contact import Estimate
 from thud.recordings.outliers import SIGNIFICANCE, find_outliers
-from thud.recordings.restitution import BOUNCES, IMPULSE, Fall
+from thud.recordings.restitution import BOUNCES, IMPULSE, DropConditions
 from thud.recordings.verdict import Contribution, Quantity, average_estimates
 
 if TYPE_CHECKING:
@@ -56,9 +56,9 @@ def drop_quantities(
     }
 
 
-def known_fall(config: Config, calibration: float | None) -> Fall:
+def known_fall(config: Config, calibration: float | None) -> DropConditions:
     """Return what a laboratory says of its drops; what is not known counts as exact."""
-    return Fall(
+    return DropConditions(
         config.height,
         config.mass,
         calibration or 0.0,
@@ -84,7 +84,7 @@ def told_restitution(
     return (told,)
 
 
-def average_restitution(drops: Sequence[Drop], fall: Fall) -> tuple[Quantity, Quantity]:
+def average_restitution(drops: Sequence[Drop], fall: DropConditions) -> tuple[Quantity, Quantity]:
     """Return the restitution, and impulse minus bounces, with their budgets; NaN where not known.
 
     Where the ways differ by more than the expanded uncertainty of the difference, one of them is
@@ -105,7 +105,7 @@ def average_restitution(drops: Sequence[Drop], fall: Fall) -> tuple[Quantity, Qu
     return average_estimates([drop.restitution for drop in known], *shared), difference
 
 
-def _difference(drops: Sequence[Drop], fall: Fall) -> Quantity:
+def _difference(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
     """Return restitution by impulse minus that by bounces."""
     differences = []
     parts: dict[str, list[float]] = {}
@@ -120,7 +120,7 @@ def _difference(drops: Sequence[Drop], fall: Fall) -> Quantity:
     return average_estimates(differences, *shared)
 
 
-def average_mass(drops: Sequence[Drop], fall: Fall) -> Quantity:
+def average_mass(drops: Sequence[Drop], fall: DropConditions) -> Quantity:
     """Return the effective mass with its budget, kg; NaN where bounces or height are not known."""
     known = [drop for drop in drops if math.isfinite(drop.effective_mass.value)]
     if not known or not fall.height:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 # Maximum size of files that are read as a whole, bytes.
-WHOLE = 2**27
+MAX_IN_MEMORY = 2**27
 # Maximum number of bytes that a library may ask for at once.
 AT_ONCE = 2**26
 # Maximum number of characters of a library's message that are shown.
@@ -112,7 +112,7 @@ def library(name: str, kind: str) -> Any:  # noqa: ANN401 - a module
         )
 
 
-def require_small(path: Path, kind: str, most: int = WHOLE) -> None:
+def require_small(path: Path, kind: str, most: int = MAX_IN_MEMORY) -> None:
     """Raise InputError where a file that is read as a whole is too large."""
     size = path.stat().st_size
     if size > most:

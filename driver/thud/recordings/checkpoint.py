@@ -32,7 +32,7 @@ PREFIX, SUFFIX = ".measured-", ".part"
 NUMPY = {"_reconstruct", "_frombuffer", "scalar", "ndarray", "dtype"}
 
 
-class KeptDrops:
+class Checkpoint:
     """Drops of signals, kept in a directory while others are measured; a context manager.
 
     Each file holds drops of one signal and one configuration, named by their digest. At the end

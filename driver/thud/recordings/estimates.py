@@ -18,7 +18,7 @@ from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
-from thud.recordings.restitution import GRAVITY, Fall
+from thud.recordings.restitution import GRAVITY, DropConditions
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class Drop(Immutable):
     restitution_shared : dict of str to float
         Standard uncertainties that calibration, mass and drop height make of the restitution of
         all drops alike, beside that stated; signed.
-    restitution_by : str
+    restitution_method : str
         ``"impulse"``, ``"bounces"``, ``"impulse and bounces"`` or ``""``.
     restitutions : dict of str to Estimate
         The restitution by each way.
@@ -92,7 +92,7 @@ class Drop(Immutable):
     contact_time: Estimate
     restitution: Estimate
     restitution_shared: dict[str, float]
-    restitution_by: str
+    restitution_method: str
     restitutions: dict[str, Estimate]
     peak_force: Estimate
     impulse: Estimate
@@ -168,7 +168,9 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
             f"an uncertainty up to 1/{MOST_DOUBT:g} of it",
         )
     impulse = _impulse(contact)
-    fall = Fall(height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty)
+    fall = DropConditions(
+        height, mass, calibration_uncertainty, mass_uncertainty, height_uncertainty
+    )
     if height and landings:
         flight = _between(contact.end, landings[0][0]).value
         peak = _peak_of(window.bounces[0]) / contact.peak
@@ -197,7 +199,7 @@ def measure_drop(  # noqa: PLR0913 - what a laboratory knows
         contact_time=contact_time,
         restitution=restitution,
         restitution_shared=shared,
-        restitution_by=" and ".join(ways),
+        restitution_method=" and ".join(ways),
         restitutions=ways,
         peak_force=_peak(contact),
         impulse=impulse,

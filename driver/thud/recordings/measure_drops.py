@@ -15,11 +15,11 @@ from thud.base.checks import refuse
 from thud.base.errors import NumericalError
 from thud.base.processes import no_interrupt_in_processes, process_pool
 from thud.base.threads import limit_threads, one_thread
-from thud.recordings.checkpoint import KeptDrops
+from thud.recordings.checkpoint import Checkpoint
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import measure_drop
 from thud.recordings.plate_correction import correct_window
-from thud.recordings.ringing import tell_ringing
+from thud.recordings.ringing import check_ringing
 
 if TYPE_CHECKING:
     import os
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from thud.recordings.signal import Signal
 
 # Drops, and seconds of a signal, that are worth processes, which take a second to start.
-WORTH = 40
+MIN_FOR_POOL = 40
 LONG = 600.0
 
 
@@ -84,7 +84,7 @@ def measure_signals(
     *,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | KeptDrops | None = None,
+    keep: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> tuple[tuple[Drop, ...], tuple[Origin, ...], float | None]:
     """Return the drops of signals, their origins, and the relative uncertainty of the force.
 
@@ -100,7 +100,7 @@ def measure_signals(
     origins: list[Origin] = []
     uncertainties: list[float | None] = []
     # Its many small products are slower by threads.
-    keeping = nullcontext(keep) if isinstance(keep, KeptDrops) else KeptDrops(keep)
+    keeping = nullcontext(keep) if isinstance(keep, Checkpoint) else Checkpoint(keep)
     with one_thread(), keeping as kept, _Processes(workers) as processes:
         for given in signals:
             signal = given
@@ -122,7 +122,7 @@ def measure_signals(
 def _measure(
     windows: Sequence[Window],
     config: Config,
-    kept: KeptDrops,
+    kept: Checkpoint,
     processes: _Processes,
     *,
     progress: bool,
@@ -132,7 +132,7 @@ def _measure(
     found = kept.open(signal, config)
     left = [window for window in windows if window.start not in found]
     # An array would go to the processes with each of its windows.
-    processes.start(worth=signal.path and len(left) >= WORTH)
+    processes.start(worth=signal.path and len(left) >= MIN_FOR_POOL)
     call = partial(measure_window, config=config)
     results = processes.map(call, left) if signal.path else map(call, left)
     with tqdm(
@@ -200,7 +200,7 @@ def measure_window(window: Window, config: Config) -> Drop:
     )
     # Factors that the background has cached serve the fit alone, and are larger than all else.
     contact = replace(drop.contact, background=replace(drop.contact.background))
-    ringing = tell_ringing(contact, plate)
+    ringing = check_ringing(contact, plate)
     drop = replace(drop, contact=contact, remarks=(*drop.remarks, *ringing))
     if plate is None:
         return drop

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.base._schema import LimitsSource
-    from thud.recordings.checkpoint import KeptDrops
+    from thud.recordings.checkpoint import Checkpoint
 
 
 def read_recording(  # noqa: PLR0913 - the keys of the configuration
@@ -37,7 +37,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     config: Config | str | os.PathLike[str] | None = None,
     progress: bool = False,
     workers: int = 1,
-    keep: str | os.PathLike[str] | KeptDrops | None = None,
+    keep: str | os.PathLike[str] | Checkpoint | None = None,
 ) -> Recording:
     """Read recorded drops of one source, from any number of files with one or many drops each.
 
@@ -69,7 +69,7 @@ def read_recording(  # noqa: PLR0913 - the keys of the configuration
     keep
         Directory in which measured drops are kept while others are measured. After an interrupt
         the same call measures only what is left; files or a configuration that have changed begin
-        again. At the end nothing of them is left; a `KeptDrops` has them until it is closed.
+        again. At the end nothing of them is left; a `Checkpoint` has them until it is closed.
 
     Returns
     -------

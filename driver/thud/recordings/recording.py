@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LimitsSource
-    from thud.recordings.checkpoint import KeptDrops
+    from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.estimates import Drop
     from thud.recordings.measure_drops import Origin
     from thud.recordings.outliers import Outlier
@@ -124,7 +124,7 @@ class Recording(Displayed):
         *,
         progress: bool = False,
         workers: int = 1,
-        keep: str | os.PathLike[str] | KeptDrops | None = None,
+        keep: str | os.PathLike[str] | Checkpoint | None = None,
     ) -> Recording:
         """Measure the drops of signals; the other arguments are those of `read_recording`.
 

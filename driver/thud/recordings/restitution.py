@@ -18,7 +18,7 @@ IMPULSE, BOUNCES = "impulse", "bounces"
 
 
 @dataclass(frozen=True)
-class Fall:
+class DropConditions:
     """What is known of a drop.
 
     Attributes

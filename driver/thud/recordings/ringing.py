@@ -31,7 +31,7 @@ NOTABLE = (3e-4, 1e-3)
 OSCILLATIONS = 3.0
 
 
-def tell_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
+def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
     """Return a sentence where the force rings on after the contact, or nothing.
 
     A free oscillation A exp(-t/d) cos(2 pi f t + p) is looked for by its matched filter, for some

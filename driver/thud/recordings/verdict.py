@@ -96,7 +96,7 @@ class Quantity(Immutable):
 
 
 @dataclass(frozen=True, eq=False)
-class Decision(Immutable):
+class CriterionResult(Immutable):
     """Verdict on one criterion.
 
     Attributes
@@ -158,10 +158,10 @@ class Verdict(Displayed):
     """
 
     source: LimitsSource
-    decisions: tuple[Decision, ...]
+    decisions: tuple[CriterionResult, ...]
 
     @property
-    def criteria(self) -> tuple[Decision, ...]:
+    def criteria(self) -> tuple[CriterionResult, ...]:
         """The decisions, as `thud.Conformity` names them."""
         return self.decisions
 
@@ -230,7 +230,7 @@ def decide(  # noqa: PLR0913 - each is one criterion of the standards
     return Verdict(
         source,
         tuple(
-            Decision(c.name, c.unit, value, *span, _verdict(value, *span))
+            CriterionResult(c.name, c.unit, value, *span, _verdict(value, *span))
             for c, value, span in zip(criteria, values, spans, strict=True)
         ),
     )

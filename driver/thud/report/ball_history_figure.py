@@ -9,7 +9,16 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.style import COLOURS, GREY, SIZE, WIDTH, dress, legend_above, new_figure, own_style
+from thud.plot.style import (
+    COLOURS,
+    GREY,
+    SIZE,
+    WIDTH,
+    legend_above,
+    new_figure,
+    own_style,
+    style_axes,
+)
 from thud.report.rows import NOT_KNOWN, limits_of, style_of
 
 if TYPE_CHECKING:
@@ -40,7 +49,7 @@ def draw_history(history: History) -> Figure:
     figure = new_figure(0.5 + 1.15 * rows, 2 * WIDTH)
     panels = figure.subplots(rows, 2, sharex=True, squeeze=False).T.ravel()
     for axes, entries, trend in zip(panels, criteria, trends, strict=False):
-        _draw_criterion(dress(axes), history, entries, trend)
+        _draw_criterion(style_axes(axes), history, entries, trend)
     for axes in panels[len(criteria) :]:
         axes.remove()
     figure.align_ylabels()

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from thud.base._schema import BandSet, LimitsSource
     from thud.recordings.estimates import Drop, Estimate
     from thud.recordings.recording import Recording
-    from thud.recordings.verdict import Decision
+    from thud.recordings.verdict import CriterionResult
 
 FORMAT = "thud calibration report 1"
 DATE_FORMATS = ("%d.%m.%Y", "%Y/%m/%d", "%Y:%m:%d", "%d-%b-%y", "%d-%b-%Y", "%d %b %Y")
@@ -117,7 +117,7 @@ def _dates(texts: Iterable[str]) -> str:
 
 
 def _criteria(
-    recording: Recording, source: LimitsSource, decisions: tuple[Decision, ...]
+    recording: Recording, source: LimitsSource, decisions: tuple[CriterionResult, ...]
 ) -> list[dict[str, Any]]:
     """Return the criteria with their budgets."""
     average = recording.average()
@@ -177,7 +177,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "name": drop.name,
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in estimates},
-        "restitution_by": drop.restitution_by,
+        "restitution_by": drop.restitution_method,
         "restitutions": {way: _estimate(one) for way, one in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
     import xarray as xr
 
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.sets import Columns, SetStudy
 
 
-def compute_sets(study: SetStudy, folder: Path | None, how: How) -> xr.Dataset:
+def compute_sets(study: SetStudy, folder: Path | None, how: RunOptions) -> xr.Dataset:
     """Compute or continue a study; without a folder its results are not written.
 
     Raises InputError where they cannot fit in memory, and NumericalError where the backend loses

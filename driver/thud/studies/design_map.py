@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.sets import SetStudy
     from thud.studies.study import Source, Study
@@ -114,7 +114,7 @@ KIND = DesignMapKind()
 
 
 def design_map(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
 ) -> DesignMap:
     """Compute which geometry and material conform to the standards.
 

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from thud.recordings.recording import Recording
     from thud.studies.fitting.misfit import Misfit
     from thud.studies.fitting.ranges import Range
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
 
 # Options of a search, and their defaults.
@@ -113,9 +113,8 @@ def fit(  # noqa: PLR0913 - options of a search
 
     Examples
     --------
-    >>> from thud.case.case import Ball
-    >>> from thud.impact.impact import solve
-    >>> truth = solve(Ball(youngs_modulus=1.8e6))
+    >>> import thud
+    >>> truth = thud.solve(thud.Ball(youngs_modulus=1.8e6))
     >>> round(fit(truth, ["youngs_modulus"]).values["youngs_modulus"])
     1800000
     """
@@ -295,7 +294,7 @@ class FitKind(Kind[FitStudy, Fit]):
         _answered(study.pairs(), trained, study.parameters)
         return replace(study, surrogate=trained)
 
-    def compute(self, study: FitStudy, results: Results | None, **how: Unpack[How]) -> Fit:  # noqa: ARG002
+    def compute(self, study: FitStudy, results: Results | None, **how: Unpack[RunOptions]) -> Fit:  # noqa: ARG002
         """Return the fit."""
         return _search(
             study.pairs(),

@@ -29,7 +29,7 @@ S = TypeVar("S", bound=Study)
 R = TypeVar("R")
 
 
-class How(TypedDict, total=False):
+class RunOptions(TypedDict, total=False):
     """How a study is computed.
 
     Attributes
@@ -81,10 +81,13 @@ class Kind(ABC, Generic[S, R]):
             return self.complete(common, given, folder)
 
     def run(
-        self, source: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+        self,
+        source: Source,
+        output: str | os.PathLike[str] | None = None,
+        **how: Unpack[RunOptions],
     ) -> R:
         """Return the result of a study, also written to an output directory."""
-        require_words("keywords", how, How.__annotations__)
+        require_words("keywords", how, RunOptions.__annotations__)
         study = self.read_study(source)
         if (surrogate := how.get("surrogate")) is not None:
             study = self.with_surrogate(study, surrogate)
@@ -124,7 +127,7 @@ class Kind(ABC, Generic[S, R]):
         """Return a study whose drops a surrogate answers."""
         refuse(f"surrogate is not allowed for a {self.name} study", "studies of sets of drops")
 
-    def require(self, study: S, **how: Unpack[How]) -> None:
+    def require(self, study: S, **how: Unpack[RunOptions]) -> None:
         """Raise InputError where a study cannot be computed this way."""
 
     def describe(self, study: S) -> str:
@@ -132,7 +135,7 @@ class Kind(ABC, Generic[S, R]):
         return f"{study.name}: {', '.join(p.name for p in study.parameters)} of {study.model}"
 
     @abstractmethod
-    def compute(self, study: S, results: Results | None, **how: Unpack[How]) -> R:
+    def compute(self, study: S, results: Results | None, **how: Unpack[RunOptions]) -> R:
         """Return the result, kept in a directory if given."""
 
     @abstractmethod

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from thud.studies.study import Source, Study
 
 
-class Entry(NamedTuple):
+class KindInfo(NamedTuple):
     """One kind of study.
 
     Attributes
@@ -35,12 +35,12 @@ class Entry(NamedTuple):
 
 # By the name of the command.
 KINDS = {
-    "sweep": Entry("sweep", "drops over a grid, a list or a random design of parameters"),
-    "sensitivity": Entry("sensitivity", "Sobol indices: which parameter matters for what"),
-    "design": Entry("design_map", "which geometry and material conform to the standards"),
-    "uncertainty": Entry("uncertainty", "how tolerances spread levels and conformity"),
-    "surrogate": Entry("surrogate", "what other studies ask instead of a slow model"),
-    "fit": Entry("fit", "parameters of a model from a force or from levels", has_sets=False),
+    "sweep": KindInfo("sweep", "drops over a grid, a list or a random design of parameters"),
+    "sensitivity": KindInfo("sensitivity", "Sobol indices: which parameter matters for what"),
+    "design": KindInfo("design_map", "which geometry and material conform to the standards"),
+    "uncertainty": KindInfo("uncertainty", "how tolerances spread levels and conformity"),
+    "surrogate": KindInfo("surrogate", "what other studies ask instead of a slow model"),
+    "fit": KindInfo("fit", "parameters of a model from a force or from levels", has_sets=False),
 }
 
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.sets import SetStudy
     from thud.studies.study import Source
 
@@ -118,7 +118,7 @@ KIND = SensitivityKind()
 
 
 def sensitivity(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
 ) -> Sensitivity:
     """Compute Sobol indices of the octave levels, the contact time and the peak of the force.
 

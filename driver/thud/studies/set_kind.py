@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.case.case import Case
     from thud.case.keys import Value
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.study import Study
 
@@ -101,7 +101,7 @@ class DropsKind(Kind[SetStudy, R]):
         surrogate.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
         return replace(study, plan=None, surrogate=surrogate)
 
-    def require(self, study: SetStudy, **how: Unpack[How]) -> None:
+    def require(self, study: SetStudy, **how: Unpack[RunOptions]) -> None:
         """Raise InputError where there are too many sets, or no such backend."""
         if study.count > MAX_SETS and not how.get("yes"):
             refuse(self.describe(study), f"up to {MAX_SETS} sets, more with yes=True (--yes)")
@@ -139,7 +139,7 @@ class SetKind(DropsKind[R]):
             by = f" by a surrogate of {len(study.surrogate.points)} drops"
         return f"{study.name}: {study.count} sets of {study.model}{by}, about {amount} on disk"
 
-    def compute(self, study: SetStudy, results: Results | None, **how: Unpack[How]) -> R:
+    def compute(self, study: SetStudy, results: Results | None, **how: Unpack[RunOptions]) -> R:
         """Return the result of all sets, computed or continued."""
         try:
             if study.plan:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from thud.base.files import Results
     from thud.case.case import Case
     from thud.case.keys import Value
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.sets import SetStudy
     from thud.studies.study import Source, Study
 
@@ -50,7 +50,9 @@ class SurrogateKind(DropsKind[Surrogate]):
             refuse("[surrogate] file is not allowed in its own training", "error, size and seed")
         return found
 
-    def compute(self, study: SetStudy, results: Results | None, **how: Unpack[How]) -> Surrogate:
+    def compute(
+        self, study: SetStudy, results: Results | None, **how: Unpack[RunOptions]
+    ) -> Surrogate:
         """Return the surrogate, trained or read."""
         return train(study, results, how)
 
@@ -87,7 +89,7 @@ KIND = SurrogateKind()
 
 
 def surrogate(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
 ) -> Surrogate:
     """Train a surrogate: what studies may ask instead of the model.
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.sets import SetStudy
     from thud.studies.study import Source
 
@@ -56,7 +56,7 @@ KIND = Sweep()
 
 
 def sweep(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
 ) -> xr.Dataset:
     """Compute every set of a study.
 

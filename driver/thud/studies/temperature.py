@@ -80,10 +80,10 @@ class Temperature:
         if self.c1 is not None:
             order = _ORDERS.get(_loss_law(case), values.get("fractional_order", 1.0))
             angle = np.pi / 2 * order
-            pot = values["loss_factor"] / np.sin(angle) * self.shift(temperature) ** order
-            storage = 1 - values["loss_factor"] / np.tan(angle) + pot * np.cos(angle)
+            springpot = values["loss_factor"] / np.sin(angle) * self.shift(temperature) ** order
+            storage = 1 - values["loss_factor"] / np.tan(angle) + springpot * np.cos(angle)
             modulus = modulus * storage
-            found["loss_factor"] = pot * np.sin(angle) / storage
+            found["loss_factor"] = springpot * np.sin(angle) / storage
         return {**found, "youngs_modulus": modulus}
 
 

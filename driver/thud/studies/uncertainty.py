@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
     from thud.case.case import Case
     from thud.case.keys import Value
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
     from thud.studies.sets import SetStudy
     from thud.studies.study import Source
@@ -165,7 +165,7 @@ KIND = UncertaintyKind()
 
 
 def uncertainty(
-    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[How]
+    study: Source, output: str | os.PathLike[str] | None = None, **how: Unpack[RunOptions]
 ) -> Uncertainty:
     """Compute how tolerances spread the levels, and the probability of conformity.
 

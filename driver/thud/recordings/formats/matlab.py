@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 import numpy as np
 
 from thud.base.checks import refuse
-from thud.recordings.channel import MIB, WHOLE, require_small, shown_path, shown_text
+from thud.recordings.channel import MAX_IN_MEMORY, MIB, require_small, shown_path, shown_text
 from thud.recordings.variables import channels_of_variables
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def read_channels(path: Path) -> list[Channel]:
 def _variables(file: BinaryIO, order: str, name: str) -> Iterator[_Element]:
     """Yield the arrays of a file, unpacked; raise InputError where one is cut off or too large."""
     size = file.seek(0, 2)
-    begin, left = HEADER, WHOLE
+    begin, left = HEADER, MAX_IN_MEMORY
     while begin < size:
         file.seek(begin)
         tag = file.read(8)
@@ -107,7 +107,7 @@ def _unpacked(file: BinaryIO, length: int, left: int, name: str) -> memoryview:
             packed = unpacker.unconsumed_tail
             if len(data) > left:
                 refuse(
-                    f"{name}: the variables unpack to more than {WHOLE // MIB} MiB",
+                    f"{name}: the variables unpack to more than {MAX_IN_MEMORY // MIB} MiB",
                     "longer recordings as WAV, RF64, FLAC, HDF5 or TDMS",
                 )
     if not unpacker.eof:

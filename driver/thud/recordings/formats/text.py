@@ -21,7 +21,7 @@ from thud.base.columns import (
     strip_comment,
     to_number,
 )
-from thud.recordings.channel import WHOLE, Channel, require_small, shown_path, shown_text
+from thud.recordings.channel import MAX_IN_MEMORY, Channel, require_small, shown_path, shown_text
 from thud.recordings.force_units import find_unit
 from thud.recordings.grid import even_grid
 from thud.recordings.header_aliases import (
@@ -98,7 +98,7 @@ class _Table:
 
 def read_channels(path: Path) -> list[Channel]:
     """Return the columns of numbers of a text file but that of the times."""
-    require_small(path, "text", WHOLE)
+    require_small(path, "text", MAX_IN_MEMORY)
     with path.open("rb") as file:
         mark = file.read(2)
     encoding = "utf-16" if mark in {b"\xff\xfe", b"\xfe\xff"} else "utf-8-sig"

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from thud.base.files import Results
     from thud.studies.emulation.plan import Plan
-    from thud.studies.kind import How
+    from thud.studies.kind import RunOptions
     from thud.studies.sets import Columns
 
     Values = NDArray[np.float64]
@@ -68,7 +68,7 @@ class TrainingStudy(SetStudy):
         return super().parameter_columns(self.first + start, self.first + stop)
 
 
-def train(study: SetStudy, results: Results | None, how: How) -> Surrogate:
+def train(study: SetStudy, results: Results | None, how: RunOptions) -> Surrogate:
     """Return the surrogate of all sets of a study, trained or read from its directory.
 
     Its drops are kept there, as sets of a study of their own. Raises InputError where a key cannot

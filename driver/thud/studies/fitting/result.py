@@ -15,7 +15,7 @@ from thud.base.files import Results
 from thud.base.immutable import Immutable
 from thud.base.key import check_keywords
 from thud.base.tables import format_rows
-from thud.base.units import handy_unit
+from thud.base.units import display_unit
 from thud.case.case import case_text
 from thud.studies.fitting.inference import coverage_factor
 from thud.studies.fitting.misfit import SHIFT
@@ -236,7 +236,7 @@ class Fit(Displayed):
     def shown_units(self, units: Units | None = None) -> dict[str, tuple[str, float]]:
         """Return name and SI factor of the unit of each parameter; `units` override the default."""
         handy = {
-            name: handy_unit(unit, value)
+            name: display_unit(unit, value)
             for (name, value), unit in zip(self.values.items(), self.units, strict=True)
         }
         return {**handy, **(units or {})}

@@ -11,7 +11,7 @@ from scipy.optimize import OptimizeResult, least_squares
 from tqdm import tqdm
 
 from thud.base.errors import InputError, NumericalError, ThudError
-from thud.base.units import handy_unit
+from thud.base.units import display_unit
 from thud.studies.fitting.inference import (
     INSEPARABLE,
     Inference,
@@ -222,7 +222,7 @@ def _doubts(
     ):
         if min(value - low, high - value) < AT_LIMIT:
             limit = (low if value - low < high - value else high) * entry.scale
-            unit, factor = handy_unit(entry.unit, limit)
+            unit, factor = display_unit(entry.unit, limit)
             found.append(
                 f"{entry.name} ended at its limit, {limit / factor:g} {unit}".rstrip()
                 + ": its interval is cut there, and all intervals hold inside the limits only"
