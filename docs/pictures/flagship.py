@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import thud
 from thud.plot.force_history_figure import draw_forces
 from thud.plot.levels_figure import draw_levels
-from thud.plot.style import LEVEL, SIZE, WIDTH, dress, legend_above, new_figure
+from thud.plot.style import LEVEL, SIZE, WIDTH, style_axes, legend_above, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def flagship() -> Figure:
     }
     figure = new_figure(2.4, 2 * WIDTH)
     history, octaves = figure.subplots(1, 2)
-    draw_forces(dress(history), impacts, None)
+    draw_forces(style_axes(history), impacts, None)
     draw_levels({"octave": octaves}, impacts, None, "rubber_ball")
     octaves.set_ylabel(LEVEL, fontsize=SIZE)
     legend_above(octaves)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from thud.plot import COLOURS, SIZE, dress, legend_above, save
+from thud.plot import COLOURS, SIZE, style_axes, legend_above, save
 from thud.plot.style import LEVEL, WIDTH, empty_axes, new_figure
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
     place = np.arange(len(octaves))
     for i, (case, by) in enumerate(cases.items()):
         (other,) = by.keys() - {"thud"}
-        dress(levels).plot(place, by["thud"], color=COLOURS[i], label=f"{case}: thud")
+        style_axes(levels).plot(place, by["thud"], color=COLOURS[i], label=f"{case}: thud")
         levels.plot(
             place,
             by[other],
@@ -114,7 +114,7 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
             markerfacecolor="none",
             label=f"{case}: {other}",
         )
-        dress(change).plot(place, by["thud"] - by[other], "os"[i], color=COLOURS[i], markersize=4)
+        style_axes(change).plot(place, by["thud"] - by[other], "os"[i], color=COLOURS[i], markersize=4)
     change.axhline(0, color="0.4", linewidth=0.8)
     change.set_xticks(place, [f"{octave:g}" for octave in octaves])
     change.set_xlabel("Octave band, Hz", fontsize=SIZE)
@@ -132,7 +132,7 @@ def draw_laws(curves: dict[str, Any]) -> Figure:
         for name, curve in curves.items():
             if name.startswith(octave):
                 thud = name.endswith("thud")
-                dress(axes).plot(
+                style_axes(axes).plot(
                     curve["x"], curve["y"], "-" if thud else "o", color=COLOURS[0 if thud else 1],
                     markerfacecolor="none", label=name.split(": ")[1],
                 )  # fmt: skip

@@ -34,7 +34,7 @@ contains
          real_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass of a suspended ceiling over its area; 0: none', &
          '[0, 200]'), &
          real_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air above the ceiling', '[0.01, 2]'), &
-         real_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of that air', '[0.001, 1]')]
+         real_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of the ceiling cavity', '[0.001, 1]')]
    end function get_ceiling_fields
 
    !> Mean in a band of the square of the ceiling's velocity over the floor's, which drives it through the air's stiffness

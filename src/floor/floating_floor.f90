@@ -52,8 +52,8 @@ contains
          real_field('layer_stiffness', options%layer_stiffness, 'N/m3', &
          'dynamic stiffness of the resilient layer over area (ISO 9052-1)', '[1e4, 1e12]'), &
          real_field('layer_loss_factor', options%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]'), &
-         real_field('source_x', options%source_x, '', 'place of the source along the length, over the length', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)'), &
+         real_field('source_x', options%source_x, '', 'relative source position along the length', '(0, 1)'), &
+         real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)'), &
          options%get_point_fields()]
    end function get_fields
 

@@ -75,10 +75,10 @@ contains
          'composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)', '[0, 1]'), &
          real_field('loss_factor', options%loss_factor, '', &
          'loss factor of the floor and its edges, without radiation', '(0, 1]'), &
-         real_field('source_x', options%source_x, '', 'place of the source along the joists, over the length', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'place of the source across the joists, over the width', '(0, 1)'), &
+         real_field('source_x', options%source_x, '', 'relative source position along the joists', '(0, 1)'), &
+         real_field('source_y', options%source_y, '', 'relative source position across the joists', '(0, 1)'), &
          choice_field('source_on', options%source_on, &
-         'what the source drops on: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
+         'impact location: sheathing between joists, or a joist', [character(len=9) :: 'sheathing', 'joist']), &
          options%get_point_fields()]
    end function get_fields
 

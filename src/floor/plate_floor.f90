@@ -36,8 +36,8 @@ contains
       type(field_type), allocatable :: fields(:)
 
       fields = [get_plate_fields(options%plate), &
-         real_field('source_x', options%source_x, '', 'place of the source along the length, over the length', '(0, 1)'), &
-         real_field('source_y', options%source_y, '', 'place of the source along the width, over the width', '(0, 1)'), &
+         real_field('source_x', options%source_x, '', 'relative source position along the length', '(0, 1)'), &
+         real_field('source_y', options%source_y, '', 'relative source position along the width', '(0, 1)'), &
          options%get_point_fields()]
    end function get_fields
 

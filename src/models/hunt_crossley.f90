@@ -65,7 +65,7 @@ contains
          real_field('stiffness', options%stiffness, '', &
          'stiffness, N/m^exponent; 0: from contact_time', '[0, 1e15]'), &
          real_field('contact_time', options%contact_time, 's', &
-         'wanted contact time; 0: from stiffness', '[0, 10]'), &
+         'target contact time; 0: derived from stiffness', '[0, 10]'), &
          real_field('exponent', options%exponent, '', 'exponent of the deflection', '[1, 5]'), &
          real_field('damping', options%damping, 's/m', 'damping alpha; 0: from restitution', '[0, 100]'), &
          real_field('restitution', options%restitution, '', &

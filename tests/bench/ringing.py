@@ -72,7 +72,7 @@ def told(force: np.ndarray, rate: float, rng: np.random.Generator) -> list[str]:
         after=float(np.exp(rng.uniform(np.log(0.005), 0))), seed=int(rng.integers(2**31)),
     )  # fmt: skip
     found = thud.Recording.from_array(record, rate, height=1.0, mass=2.5)
-    return [remark for remark in found.drops[0].remarks if "rings on" in remark]
+    return [remark for remark in found.drops[0].remarks if "keeps ringing" in remark]
 
 
 def is_due(force: np.ndarray, plate: np.ndarray) -> bool:

@@ -199,7 +199,7 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
 def test_files_are_downloaded(browser: Browser, server: Served, tmp_path: Path) -> None:
     page = new_page(browser, server[0])
     page.locator("button", has_text="Study").click()
-    sync_api.expect(page.locator("#message")).to_contain_text("no slider of the case was moved")
+    sync_api.expect(page.locator("#message")).to_contain_text("move a slider first")
     fill(page, "drop.height", "0.8")
     for name in ("case.nml", "force.csv", "report.html", "study.toml"):
         with page.expect_download() as found:

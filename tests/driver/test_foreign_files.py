@@ -18,7 +18,7 @@ from conftest import MINIMAL, REPOSITORY, naming
 import thud
 from thud import cli
 from thud.base.files import MANIFEST, PART
-from thud.plot import look
+from thud.plot import style as look
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator

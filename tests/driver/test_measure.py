@@ -240,7 +240,7 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             assert abs(found.value - truth) <= found.expanded
 
 
-NOT_COUNTED = "no uncertainty is given, and none counted, of: "
+NOT_COUNTED = "uncertainty not stated, and not included: "
 
 
 def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:

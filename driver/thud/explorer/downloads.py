@@ -68,7 +68,7 @@ def study(values: Values) -> bytes:
     names = {f"{key.group}.{key.name}": name for name, key in known_keys(users(case)).items()}
     ranges = {names[key]: ends for key, ends in moved.items() if key in names and ends[0] < ends[1]}
     if not ranges:
-        refuse("no slider of the case was moved", "a study of one or more")
+        refuse("move a slider first", "a study of one or more")
     lines = ["# A sweep over what was moved: thud-driver sweep <this file>"]
     for group, keys in case.to_namelist().items():
         if group in values:

@@ -44,7 +44,7 @@ TITLES = {
     "background": "background", "background level": "background", "noise": "background",
 }  # fmt: skip
 ALLOWED = (
-    "a line of titles, and for each band a line of frequency, Hz, levels, dB, of one or "
+    "a header row, and for each band a line of frequency, Hz, levels, dB, of one or "
     "more positions, and where they are known the columns background, dB, and "
     "reverberation_time, s"
 )
@@ -238,7 +238,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     Parameters
     ----------
     path
-        Columns with a line of titles: ``frequency``, Hz; ``background``, dB, and
+        Columns with a header row: ``frequency``, Hz; ``background``, dB, and
         ``reverberation_time``, s, where they are known; every other column holds the levels of a
         position, dB. The bands are the octaves or thirds that a rating needs, and more if wanted.
     volume

@@ -51,7 +51,7 @@ def recording_forces(recording: Recording) -> Figure:
     longest = max(longest, recording.contact_time, limits.upper if limits.upper < 1 else 0)
     time = longest * np.linspace(-MARGIN, 1 + MARGIN, POINTS)
     forces = 1e-3 * np.array([_recorded(drop, time) for drop in recording.drops])
-    allowed = f"allowed release, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
+    allowed = f"permitted contact time, {1e3 * limits.lower:g} to {1e3 * limits.upper:g} ms"
     axes.axvspan(1e3 * limits.lower, 1e3 * limits.upper, color=GREY, linewidth=0, label=allowed)
     _draw_drops(axes, 1e3 * time, forces, recording)
     if len(forces) > 1:

@@ -142,7 +142,7 @@ def newtons_per_unit(
     base, multiple = UNITS.get(unit, ("", 1.0))
     if calibration is None:
         if base != "N":
-            refuse(f"{place}: the values are in {unit} and no calibration is given", EXAMPLES)
+            refuse(f"{place}: the values are in {unit}: a calibration is needed", EXAMPLES)
         return multiple, f"values in {unit}", None
     if isinstance(calibration, int | float | np.number) and not isinstance(calibration, bool):
         if not SIZES[0] < abs(calibration) < SIZES[1]:

@@ -218,7 +218,7 @@ class Recording(Displayed):
         }
         if any(missing.values()):
             words = ", ".join(what for what in missing if missing[what])
-            found.append(f"no uncertainty is given, and none counted, of: {words}")
+            found.append(f"uncertainty not stated, and not included: {words}")
         return tuple(found)
 
     @property

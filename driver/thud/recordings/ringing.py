@@ -32,7 +32,7 @@ OSCILLATIONS = 3.0
 
 
 def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ...]:
-    """Return a sentence where the force rings on after the contact, or nothing.
+    """Return a warning if the plate keeps ringing after the contact, else an empty string.
 
     A free oscillation A exp(-t/d) cos(2 pi f t + p) is looked for by its matched filter, for some
     d and all f, in the quiet behind the gate. The density of the noise is that of the quiet, times
@@ -68,7 +68,7 @@ def check_ringing(contact: Contact, plate: Plate | None = None) -> tuple[str, ..
     found += (frequency[1] - frequency[0]) * (low - high) / (2 * (low - 2 * top + high))
     stated = "is not the one of [plate]" if plate else "is in levels, peaks and contact time"
     told = (
-        f"the force rings on after the contact, at {found:.0f} Hz with {amplitude:.2g} N: a "
+        f"the plate keeps ringing after the contact, at {found:.0f} Hz with {amplitude:.2g} N: a "
         f"resonance of the plate that {stated}; state it in [plate]"
     )
     return (told,)

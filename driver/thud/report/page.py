@@ -64,7 +64,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
         rule=_text(_rule(data)),
         figures="\n".join(_cells(figures)),
         results=_notes("Drops and methods", _results(data), RESULT_LINES),
-        done=_notes("Done to the signals", _told(data, "steps") or ["nothing"], STEP_LINES),
+        done=_notes("Signal processing", _told(data, "steps") or ["nothing"], STEP_LINES),
         remarks=_notes("Remarks", _told(data, "remarks") or ["none"], REMARK_LINES),
         files=_files(data["files"]),
         footer=_text(f"thud {data['thud']} · report.json: SHA-256 {checksum}"),

@@ -136,10 +136,20 @@ contains
       character(len=:), allocatable :: text
 
       text = '  '//padded(name, 22)//right(fixed(value, decimals), 10)//' '//padded(unit, 5)
-      if (present(criterion) .and. present(scale)) text = text//right(short(criterion%lower*scale), 7)//' to ' &
-         //padded(short(criterion%upper*scale), 7)//get_word(criterion)
+      if (present(criterion) .and. present(scale)) text = text//get_limits(criterion, scale)//get_word(criterion)
       text = trim(text)//newline
    end function row
+
+   !> Minimum and maximum conforming values in the shown unit; one number where they are the same.
+   pure function get_limits(criterion, scale) result(text)
+      type(criterion_type), intent(in) :: criterion
+      !> Shown unit over SI unit.
+      real(wp), intent(in) :: scale
+      character(len=18) :: text
+
+      text = right(short(criterion%lower*scale), 7)
+      if (criterion%upper > criterion%lower) text = text(:7)//' to '//short(criterion%upper*scale)
+   end function get_limits
 
    !> Minimum and maximum of a quantity, as a row.
    function get_span_row(name, span, decimals, unit) result(text)

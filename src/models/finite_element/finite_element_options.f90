@@ -33,7 +33,7 @@ module thud_finite_element_options
       real(wp) :: flight_before = 0.0_wp
       !> Free flight after the last contact, s.
       real(wp) :: flight_after = 0.0_wp
-      !> Part of the limit of stability that a step uses.
+      !> Time step over stability limit.
       real(wp) :: step_safety = 0.85_wp
       !> Time between snapshots of the deformed ball, s; 0 for none.
       real(wp) :: snapshot_interval = 1.0e-3_wp
@@ -60,7 +60,7 @@ contains
          real_field('flight_before', options%flight_before, 's', 'free flight before first touch', '[0, 1]'), &
          real_field('flight_after', options%flight_after, 's', 'free flight after the last contact', &
          '[0, 10]'), &
-         real_field('step_safety', options%step_safety, '', 'part of the limit of stability that a step uses', &
+         real_field('step_safety', options%step_safety, '', 'time step over stability limit', &
          '[0.01, 0.98]'), &
          in_group('mesh', get_mesh_fields(options%mesh)), &
          in_group('material', get_material_fields(options%material)), &

@@ -70,7 +70,7 @@ contains
          choice_field('law', options%law, 'law of elasticity', &
          [character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
          real_field('mooney_share', options%mooney_share, '', &
-         'part of the shear modulus with the second invariant, of mooney_rivlin', '[0, 1]'), &
+         'second-invariant fraction of the shear modulus, of mooney_rivlin', '[0, 1]'), &
          real_field('bulk_ratio', options%bulk_ratio, '', &
          "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", '[2, 100000]'), &
          choice_field('viscosity', options%viscosity, 'law of viscosity', &

@@ -122,7 +122,7 @@ contains
       shell = new_shell(ball, 0.0_wp, 0.0_wp)
       if (deflection(size(deflection)) >= shell%closing_deflection) then
          error = numerical_error('&compression: max_deflection = '//to_text(deflection(size(deflection))) &
-            //' m closes the shell; allowed: less than the height of the cavity, '//to_text(shell%closing_deflection)//' m')
+            //' m: the cavity collapses; allowed: less than the height of the cavity, '//to_text(shell%closing_deflection)//' m')
          return
       end if
       force = [(shell%stiffness*deflection(i)/2 + get_gas_force(shell, deflection(i)/2, caps=2), i=1, size(deflection))]
@@ -272,7 +272,7 @@ contains
       diverged = .not. abs(state(at_deflection)/shell%closing_deflection - 0.5_wp) < 0.52_wp
    end function is_diverged
 
-   !> Error of a drop that closes the shell.
+   !> Error of a drop in which the cavity collapses.
    function get_failure(self, drop, time, state) result(error)
       class(shell_type), intent(in) :: self
       type(drop_type), intent(in) :: drop
@@ -286,7 +286,7 @@ contains
          error = coarse_error('a step from first touch ends at a deflection of '//to_text(state(at_deflection))//' m')
          return
       end if
-      error = numerical_error('&drop: height = '//to_text(drop%height)//' m closes the shell: ' &
+      error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses, ' &
          //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*state(at_deflection), 2) &
          //' mm; allowed: less than the height of the cavity, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
    end function get_failure

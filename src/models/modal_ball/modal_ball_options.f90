@@ -38,7 +38,7 @@ module thud_modal_ball_options
       logical :: contact_gravity = .false.
       !> Friction of the floor: `none`, or `stick`, by which touching rings do not slide.
       character(len=name_length) :: floor_friction = 'none'
-      !> Harmonics that answer statically instead of oscillating.
+      !> Harmonics treated as quasi-static instead of oscillating.
       type(list_type) :: static_families
    contains
       procedure, pass(options) :: get_fields
@@ -71,9 +71,9 @@ contains
          'order of the derivative, of fractional; 1: rising', '(0, 1]'), &
          logical_field('cavity_gas', options%cavity_gas, 'the gas in the cavity resists changes of its volume'), &
          logical_field('contact_gravity', options%contact_gravity, 'gravity acts during the contact too'), &
-         choice_field('floor_friction', options%floor_friction, 'friction of the floor: none, or without end', &
+         choice_field('floor_friction', options%floor_friction, 'friction of the floor: none or infinite (sticking)', &
          [character(len=5) :: 'none', 'stick']), &
-         list_field('static_families', options%static_families, '', 'harmonics that answer statically', &
+         list_field('static_families', options%static_families, '', 'harmonics treated as quasi-static', &
          '[0, harmonics]', whole=.true.)]
    end function get_fields
 

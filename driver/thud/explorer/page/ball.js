@@ -55,7 +55,7 @@ function render() {
   byId("instant_words").textContent = time;
   byId("instant").setAttribute("aria-valuetext", time);
   const shape = motion.outer ? "Computed section." : "Shape that the model assumes: a sphere, flattened by its deflection.";
-  const moved = times > 1 ? ` The floor moves by up to ${rounded(Math.max(...motion.floor), "mm")}, drawn ${times} times as large.` : "";
+  const moved = times > 1 ? ` The floor moves by up to ${rounded(Math.max(...motion.floor), "mm")}, magnified ${times}×.` : "";
   byId("ball_words").textContent = shape + moved;
 }
 

@@ -91,7 +91,7 @@ export function build(changed) {
   byId("further_groups").replaceChildren(...shown(own().filter((group) => !["ball", "drop"].includes(group.name)), false));
   const options = (name) => part(name).map((group) => element("option", { value: group.name }, group.title));
   byId("model").replaceChildren(...options("model"));
-  byId("floor").replaceChildren(element("option", { value: "" }, "Rigid only"), ...options("floor").filter((one) => one.value !== "rigid"));
+  byId("floor").replaceChildren(element("option", { value: "" }, "Rigid test floor"), ...options("floor").filter((one) => one.value !== "rigid"));
   byId("model").value = state.model;
   byId("floor").value = state.floor;
   byId("has_room").checked = state.room;

@@ -16,7 +16,7 @@ export function show(variants, remove) {
   });
   const thin = first.answer.floor ? element("small", {}, ` thin: on the ${first.answer.floor.name}`) : "";
   byId("force_title").replaceChildren(begun(first.answer.force.words ?? "force"), thin);
-  plot(byId("force"), { curves: forces, x: { title: "Time", unit: "ms" }, y: { title: "Force below 1.25 kHz", unit: "N", zero: true } });
+  plot(byId("force"), { curves: forces, x: { title: "Time", unit: "ms" }, y: { title: "Force, low-passed at 1.25 kHz", unit: "N", zero: true } });
   const names = (levels) => levels.frequency.map(String);
   const bands = (one, i, levels) => curve(one, i, levels.frequency.map((_, k) => k), levels.level, { marks: true });
   plot(byId("levels"), {
@@ -57,7 +57,7 @@ function margin(one) {
 
 function away(one) {
   if (one.value === null) return "not known";
-  if (margin(one) >= 0) return one.verdict === "conforms" ? "" : "not certain";
+  if (margin(one) >= 0) return one.verdict === "conforms" ? "" : "undecided";
   return one.value < one.lower ? "low" : "high";
 }
 
@@ -112,7 +112,7 @@ function showFloors(variants, curve) {
   const floors = variants.filter((one) => one.answer.floor);
   byId("floor_section").hidden = !floors.length;
   if (!floors.length) return;
-  byId("floor_title").textContent = `Under the source: ${floors[0].answer.floor.name}`;
+  byId("floor_title").textContent = `Floor response: ${floors[0].answer.floor.name}`;
   plot(byId("velocity"), {
     curves: floors.map((one) => curve(one, variants.indexOf(one), one.answer.floor.velocity.time, one.answer.floor.velocity.value)),
     x: { title: "Time", unit: "ms" }, y: { title: "Velocity of the floor", unit: "mm/s", zero: true },
