@@ -464,7 +464,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
         recorded = record_force(drop.force, drop.sample_rate)
         assert np.max(drops[1].get_ydata()) == pytest.approx(1e-3 * recorded.max(), rel=1e-3)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels[0] == "allowed release, 18 to 22 ms"
+    assert labels[0] == "permitted contact time, 18 to 22 ms"
     assert ("average" in labels) == (count > 1)
     assert ("outlier" in labels) == ("range of 60 drops" in labels) == (count == 60)
     for bands in ("octave", "third"):

@@ -265,7 +265,7 @@ class Room(Group):
     ceiling_depth : float
         Depth of the air above the ceiling, m; 0.01 <= ceiling_depth <= 2.
     ceiling_loss_factor : float
-        Loss factor of that air; 0.001 <= ceiling_loss_factor <= 1.
+        Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
     """
 
     volume: float = 50.0
@@ -330,9 +330,9 @@ class ModalBall(Group):
     contact_gravity : bool
         Gravity acts during the contact too.
     floor_friction : str
-        Friction of the floor: none, or without end; "none", "stick".
+        Friction of the floor: none or infinite (sticking); "none", "stick".
     static_families : sequence of int
-        Harmonics that answer statically; 0 <= static_families <= harmonics.
+        Harmonics treated as quasi-static; 0 <= static_families <= harmonics.
     """
 
     name: ClassVar[ModelName] = "modal_ball"
@@ -363,7 +363,7 @@ class FiniteElement(Group):
     flight_after : float
         Free flight after the last contact, s; 0 <= flight_after <= 10.
     step_safety : float
-        Part of the limit of stability that a step uses; 0.01 <= step_safety <= 0.98.
+        Time step over stability limit; 0.01 <= step_safety <= 0.98.
     radial_elements : int
         Elements through the wall; 1 <= radial_elements <= 64; group ``&mesh``.
     polar_elements : int
@@ -371,8 +371,8 @@ class FiniteElement(Group):
     law : str
         Law of elasticity; "neo_hookean", "mooney_rivlin"; group ``&material``.
     mooney_share : float
-        Part of the shear modulus with the second invariant, of mooney_rivlin; 0 <= mooney_share <=
-        1; group ``&material``.
+        Second-invariant fraction of the shear modulus, of mooney_rivlin; 0 <= mooney_share <= 1;
+        group ``&material``.
     bulk_ratio : float
         Maximum bulk modulus over shear modulus; less where Poisson's ratio says so; 2 <=
         bulk_ratio <= 100000; group ``&material``.
@@ -455,7 +455,7 @@ class HuntCrossley(Group):
     stiffness : float
         Stiffness, N/m^exponent; 0: from contact_time; 0 <= stiffness <= 1e+15.
     contact_time : float
-        Wanted contact time; 0: from stiffness, s; 0 <= contact_time <= 10.
+        Target contact time; 0: derived from stiffness, s; 0 <= contact_time <= 10.
     exponent : float
         Exponent of the deflection; 1 <= exponent <= 5.
     damping : float
@@ -580,9 +580,9 @@ class Plate(Group):
         Sum of lengths times absorption coefficients of the edges, of absorption, m; 0 <=
         edge_absorption <= 1000.
     source_x : float
-        Place of the source along the length, over the length; 0 < source_x < 1.
+        Relative source position along the length; 0 < source_x < 1.
     source_y : float
-        Place of the source along the width, over the width; 0 < source_y < 1.
+        Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
         Places of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -649,9 +649,9 @@ class FloatingFloor(Group):
     layer_loss_factor : float
         Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
     source_x : float
-        Place of the source along the length, over the length; 0 < source_x < 1.
+        Relative source position along the length; 0 < source_x < 1.
     source_y : float
-        Place of the source along the width, over the width; 0 < source_y < 1.
+        Relative source position along the width; 0 < source_y < 1.
     point_x : sequence of float
         Places of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -713,11 +713,11 @@ class JoistFloor(Group):
     loss_factor : float
         Loss factor of the floor and its edges, without radiation; 0 < loss_factor <= 1.
     source_x : float
-        Place of the source along the joists, over the length; 0 < source_x < 1.
+        Relative source position along the joists; 0 < source_x < 1.
     source_y : float
-        Place of the source across the joists, over the width; 0 < source_y < 1.
+        Relative source position across the joists; 0 < source_y < 1.
     source_on : str
-        What the source drops on: sheathing between joists, or a joist; "sheathing", "joist".
+        Impact location: sheathing between joists, or a joist; "sheathing", "joist".
     point_x : sequence of float
         Places of further points along the length, m; 0 <= point_x <= 1000.
     point_y : sequence of float
@@ -868,16 +868,16 @@ KEYS = (
     Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, of fractional; 1: rising", (), 0.0, 1.0),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists changes of its volume"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts during the contact too"),
-    Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none, or without end", ('none', 'stick')),
-    Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics that answer statically", (), 0.0, "harmonics", True),
+    Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none or infinite (sticking)", ('none', 'stick')),
+    Key("modal_ball", "modal_ball", "static_families", "list", "", "harmonics treated as quasi-static", (), 0.0, "harmonics", True),
     Key("finite_element", "finite_element", "bounces", "whole", "", "contacts to be followed", (), 1.0, 100.0, True),
     Key("finite_element", "finite_element", "flight_before", "real", "s", "free flight before first touch", (), 0.0, 1.0),
     Key("finite_element", "finite_element", "flight_after", "real", "s", "free flight after the last contact", (), 0.0, 10.0),
-    Key("finite_element", "finite_element", "step_safety", "real", "", "part of the limit of stability that a step uses", (), 0.01, 0.98),
+    Key("finite_element", "finite_element", "step_safety", "real", "", "time step over stability limit", (), 0.01, 0.98),
     Key("finite_element", "mesh", "radial_elements", "whole", "", "elements through the wall", (), 1.0, 64.0, True),
     Key("finite_element", "mesh", "polar_elements", "whole", "", "elements from pole to pole", (), 8.0, 1024.0, True),
     Key("finite_element", "material", "law", "choice", "", "law of elasticity", ('neo_hookean', 'mooney_rivlin')),
-    Key("finite_element", "material", "mooney_share", "real", "", "part of the shear modulus with the second invariant, of mooney_rivlin", (), 0.0, 1.0),
+    Key("finite_element", "material", "mooney_share", "real", "", "second-invariant fraction of the shear modulus, of mooney_rivlin", (), 0.0, 1.0),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum bulk modulus over shear modulus; less where Poisson's ratio says so", (), 2.0, 100000.0),
     Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony')),
     Key("finite_element", "material", "loss_factor", "real", "", "loss factor at loss_frequency, of kelvin_voigt, fractional; over 10 to 1000 Hz, of constant_loss", (), 0.0, 1.0),
@@ -893,7 +893,7 @@ KEYS = (
     Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 1e-12, 1000000.0),
     Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball"),
     Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "stiffness, N/m^exponent; 0: from contact_time", (), 0.0, 1000000000000000.0),
-    Key("hunt_crossley", "hunt_crossley", "contact_time", "real", "s", "wanted contact time; 0: from stiffness", (), 0.0, 10.0),
+    Key("hunt_crossley", "hunt_crossley", "contact_time", "real", "s", "target contact time; 0: derived from stiffness", (), 0.0, 10.0),
     Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection", (), 1.0, 5.0),
     Key("hunt_crossley", "hunt_crossley", "damping", "real", "s/m", "damping alpha; 0: from restitution", (), 0.0, 100.0),
     Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "wanted coefficient of restitution; 0: from damping", (), 0.0, 1.0),
@@ -927,8 +927,8 @@ KEYS = (
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
     Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of lengths times absorption coefficients of the edges, of absorption", (), 0.0, 1000.0),
-    Key("plate", "plate", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
-    Key("plate", "plate", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("plate", "plate", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
+    Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("plate", "plate", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
     Key("plate", "plate", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
@@ -947,8 +947,8 @@ KEYS = (
     Key("floating_floor", "floating_floor", "screed_loss_factor", "real", "", "loss factor of the floating plate", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "layer_stiffness", "real", "N/m3", "dynamic stiffness of the resilient layer over area (ISO 9052-1)", (), 10000.0, 1000000000000.0),
     Key("floating_floor", "floating_floor", "layer_loss_factor", "real", "", "loss factor of the resilient layer", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "source_x", "real", "", "place of the source along the length, over the length", (), 0.0, 1.0),
-    Key("floating_floor", "floating_floor", "source_y", "real", "", "place of the source along the width, over the width", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "source_x", "real", "", "relative source position along the length", (), 0.0, 1.0),
+    Key("floating_floor", "floating_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
     Key("floating_floor", "floating_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
     Key("floating_floor", "floating_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "length", "real", "m", "span of the joists", (), 0.5, 100.0),
@@ -963,9 +963,9 @@ KEYS = (
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists, from 0, loose, to 1, glued (EN 1995-1-1 annex B)", (), 0.0, 1.0),
     Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor and its edges, without radiation", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_x", "real", "", "place of the source along the joists, over the length", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_y", "real", "", "place of the source across the joists, over the width", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_on", "choice", "", "what the source drops on: sheathing between joists, or a joist", ('sheathing', 'joist')),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the joists", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position across the joists", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: sheathing between joists, or a joist", ('sheathing', 'joist')),
     Key("joist_floor", "joist_floor", "point_x", "list", "m", "places of further points along the length", (), 0.0, 1000.0),
     Key("joist_floor", "joist_floor", "point_y", "list", "m", "their places along the width", (), 0.0, 1000.0),
     Key("measured_mobility", "measured_mobility", "direct", "real", "m/(N s)", "mobility at high frequencies", (), 0.0, 1000.0),
@@ -990,5 +990,5 @@ KEYS = (
     Key("room", "room", "junction_index", "real", "dB", "vibration reduction index from floor to wall, of the junction index", (), -10.0, 80.0),
     Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass of a suspended ceiling over its area; 0: none", (), 0.0, 200.0),
     Key("room", "room", "ceiling_depth", "real", "m", "depth of the air above the ceiling", (), 0.01, 2.0),
-    Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of that air", (), 0.001, 1.0),
+    Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),
 )
