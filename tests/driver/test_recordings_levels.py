@@ -487,7 +487,11 @@ def test_resonance_near_the_bands_is_refused() -> None:
     ("values", "words"),
     [
         ((0.0, 30.0), naming("plate", "frequency", 0.0)),
+        ((1600.0, 0.0), naming("plate", "quality", 0.0)),
         ((1600.0, -1.0), naming("plate", "quality", -1.0)),
+        ((1600.0, 30.0, 0.0), naming("plate", "mass", 0.0)),
+        ((1600.0, 30.0, None, 0.0, -0.01), naming("plate", "frequency_uncertainty", -0.01)),
+        ((1600.0, 30.0, None, 0.0, 1.0), naming("plate", "frequency_uncertainty", 1.0)),
         ((1600.0, 30.0, None, 1.0), naming("plate", "mass", None)),
         ((1600.0, 30.0, 5.0, -1.0), naming("plate", "added_mass", -1.0)),
         ((math.nan, 30.0), naming("plate", "frequency", "nan")),
@@ -496,6 +500,20 @@ def test_resonance_near_the_bands_is_refused() -> None:
 def test_impossible_plates_are_refused(values: tuple[Any, ...], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
         Plate(*values)
+
+
+@pytest.mark.parametrize(
+    ("values", "resonance"),
+    [
+        ((0.5, 30.0), 0.5),
+        ((1600.0, 0.5), 1600.0),
+        ((1600.0, 30.0, 0.5, 0.5), 1600 / math.sqrt(2)),
+        ((1600.0, 30.0, 5.0, 0.0), 1600.0),
+        ((1600.0, 30.0, None, 0.0, 0.99), 1600.0),
+    ],
+)
+def test_odd_plates_are_taken(values: tuple[Any, ...], resonance: float) -> None:
+    assert Plate(*values).resonance == pytest.approx(resonance)
 
 
 def test_plate_is_held_against_the_standard() -> None:
