@@ -109,6 +109,9 @@ def test_results_on_a_floor_are_read_back(
     }.items():  # fmt: skip
         assert [float(row[name]) for row in rows] == pytest.approx(values, rel=1e-9, abs=1e-12)
     assert f"{moved.peak_force:.1f} N" in done.stdout
+    # Five octaves are one set.
+    differ = abs(energy.by_motion - energy.by_mobility).max() / energy.by_mobility.sum()
+    assert f"differ by at most {100 * differ:.3f} %" in done.stdout
 
 
 def test_models_of_the_blocked_force_say_so() -> None:
