@@ -208,7 +208,7 @@ contains
       if (allocated(error)) return
       call get_half_waves(plate, far*mode_limit, m, n)
       omega = sqrt(get_modal_stiffness(plate, m, n)/get_surface_mass(plate))
-      smeared = n <= max(1, int(options%width/options%spacing))
+      smeared = n <= int(options%width/options%spacing)
       single = smeared .and. omega < 2*pi*mode_limit
       gain = 4/(get_surface_mass(plate)*plate%length*plate%width) &
          *get_shape(m, n, [options%source_x, options%source_y])*get_shape(m, n, point)

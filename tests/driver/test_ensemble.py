@@ -315,6 +315,20 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
     assert int(found.stdout) < 8 * 1024
 
 
+def test_threads_are_the_processors_of_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    compute, widths = ensemble._compute, []  # noqa: SLF001
+
+    def watched(*arguments: Any, **options: Any) -> dict[str, np.ndarray]:  # noqa: ANN401
+        widths.append(arguments[3])
+        return compute(*arguments, **options)
+
+    monkeypatch.setattr(ensemble, "_compute", watched)
+    # Of this process, 0, and of no other.
+    monkeypatch.setattr("os.sched_getaffinity", {0: {1, 4, 5}}.__getitem__)
+    thud.solve_many({"mass": [2.4, 2.5]})
+    assert widths == [3]
+
+
 @pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
 def test_processes_that_start_after_threads_go_on(method: str, tmp_path: Path) -> None:
     """A forked process has none of the threads that its parent had started."""

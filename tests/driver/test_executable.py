@@ -116,6 +116,27 @@ def test_verdict_is_on_the_force_asked_for(run: Run, case_file: CaseFile, tmp_pa
     assert verdict["value"][:5] == expected.tolist()
 
 
+# A ball so soft that the wall which comes to rest makes a force of its own, and a spring.
+@pytest.mark.parametrize(("model", "title"), [
+    ("&ball youngs_modulus = 1.6e5, ambient_pressure = 0 / &sampling duration = 0.3 / &model /",
+     ["elastic", "force"]),
+    ("&ball / &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /", []),
+])  # fmt: skip
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
+def test_other_force_is_shown_where_it_differs(
+    run: Run, case_file: CaseFile, model: str, title: list[str]
+) -> None:
+    path = case_file(f"&drop / &levels force = 'floor' / {model}")
+    table = run(path).stdout
+    header, *rows = table.splitlines()[2:8]
+    assert header.split()[7:] == title
+    impact = thud.solve_case(thud.read_case(path))
+    assert re.search(rf"peak force +{impact.peak_force:.1f} N", table)
+    levels = [impact.levels(force="floor"), impact.levels(force="elastic")][: 1 + len(title) // 2]
+    shown = [re.findall(r"(-?\d+\.\d\d) dB", row) for row in rows]
+    assert shown == [[f"{level:.2f}" for level in pair] for pair in zip(*levels, strict=True)]
+
+
 def test_check_tells_by_the_exit_code(run: Run, case_file: CaseFile) -> None:
     assert run(case_file(MINIMAL), "--check").returncode == 3
     assert run(case_file(MINIMAL)).returncode == 0

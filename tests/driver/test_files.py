@@ -129,6 +129,21 @@ def test_pipes_are_neither_opened_nor_replaced(tmp_path: Path) -> None:
         (tmp_path / name).unlink()
 
 
+def test_interrupt_behind_the_last_step_is_raised_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rename = Path.replace
+
+    def rename_and_stop(self: Path, target: Path) -> None:
+        rename(self, target)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", rename_and_stop)
+    with pytest.raises(KeyboardInterrupt):
+        replace_file(tmp_path / "file", b"new")
+    assert (tmp_path / "file").read_bytes() == b"new"
+
+
 @pytest.mark.parametrize("replace", [False, True])
 def test_directory_of_the_name_of_the_manifest_is_named_as_such(
     tmp_path: Path, *, replace: bool

@@ -403,6 +403,21 @@ def test_table_says_what_the_standard_deviations_are() -> None:
     assert re.search(r"standard deviation 0\.0\d+ dB, estimated", found)
 
 
+def test_estimated_deviation_of_levels_is_that_of_their_residuals() -> None:
+    levels = thud.solve(TRUTH).levels(force="floor") + 0.1 * np.eye(5)[0]
+    fit = quiet_fit(thud.LevelTarget(levels), ["youngs_modulus"])
+    rest = fit.targets[0].impact.levels(force="floor") - levels
+    # Five levels, less one parameter.
+    assert fit.noise == pytest.approx(np.sqrt(rest @ rest / 4))
+    modulus, step = fit.values["youngs_modulus"], 1e2
+    high, low = (
+        thud.solve(replace(TRUTH, youngs_modulus=modulus + change)).levels(force="floor")
+        for change in (step, -step)
+    )
+    slope = np.linalg.norm(high - low) / (2 * step)
+    assert fit.standard_errors["youngs_modulus"] == pytest.approx(fit.noise / slope, rel=1e-3)
+
+
 def test_impossible_places_are_stepped_away_from(monkeypatch: pytest.MonkeyPatch) -> None:
     solve = misfit.compute
 

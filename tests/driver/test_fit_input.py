@@ -96,6 +96,23 @@ def test_bad_input_is_reported(
         thud.fit(target, parameters, **options)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("cut", "whole"), [(0.0, True), (1e-4, True), (2e-4, False)])
+def test_record_whose_last_millisecond_is_below_a_tenth_is_whole(
+    cut: float, *, whole: bool
+) -> None:
+    """A half sine of 20 ms that is cut s before its end: sin(pi (s + 0.5 ms)/20 ms)."""
+    time = np.arange(0, 0.04 - cut, 1e-5)
+    force = np.where(time > 0.02, 1500 * np.sin(np.pi * (time - 0.02) / 0.02), 0)
+    last = np.sin(np.pi * (cut + 0.5e-3) / 0.02)
+    assert (last < 0.1) == whole
+    target = thud.ForceTarget((time, force), noise=1.0)
+    if whole:
+        assert target.misfit().time[-1] == pytest.approx(time[-1])
+    else:
+        with pytest.raises(thud.InputError, match=naming("target", "force", f"{last:.0%}")):
+            target.misfit()
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [

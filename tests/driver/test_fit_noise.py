@@ -8,7 +8,7 @@ import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -242,6 +242,35 @@ def test_hum_of_the_mains_has_its_own_standard_error() -> None:
     assert np.square(pulls).sum() < stats.chi2.ppf(1 - 1e-3, 6)
 
 
+def test_tones_are_looked_for_at_quarters_of_the_resolution(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    strongest, grids = record_noise._strongest, []  # noqa: SLF001
+
+    def watched(*arguments: Any) -> tuple[float, float]:  # noqa: ANN401
+        grids.append(arguments[-1])
+        return strongest(*arguments)
+
+    monkeypatch.setattr(record_noise, "_strongest", watched)
+    truth = [123.4, 217.3, 333.1, 411.9]
+    quiet = quiet_of(6)
+    time = np.arange(len(quiet.force)) / RATE
+    waves = np.sin(2 * np.pi * np.outer(truth, time)).sum(axis=0)
+    found = replace(quiet, force=quiet.force + 10 * waves).tones()
+    # 0.1 s on both sides of the 20 ms of the pulse.
+    resolution = 1 / 0.22
+    for grid in grids:
+        assert np.diff(grid).min() == pytest.approx(resolution / 4, rel=0.01)
+        assert grid.min() == 10
+        assert grid.max() == pytest.approx(0.95 * 500, abs=resolution / 4)
+        # Those of the mains are part of the noise.
+        for mains in (50, 60):
+            assert resolution / 2 < np.abs(grid - mains).min() < 0.75 * resolution
+    # Three at most; each is found to a tenth of the resolution.
+    assert len(set(found)) == 3
+    assert all(np.abs(np.array(truth) - tone).min() < resolution / 10 for tone in found)
+
+
 def test_strongest_tone_has_the_gain_of_its_likelihood() -> None:
     quiet = quiet_of(5, 333.0, 3.0)
     cells, mean = quiet._means  # noqa: SLF001
@@ -358,6 +387,13 @@ def test_what_lies_under_the_pulse_is_found(disturbance: str, name: str, size: f
     # That of an offset holds the unknown constant of coloured noise.
     assert error < 0.15 * size
     assert f"{name} {value:.3g} ± {error:.2g} N" in str(fit)
+
+
+def test_offset_of_a_record_without_noise_is_no_misfit() -> None:
+    time, force = pulse(QUIET)
+    fit = thud.fit(thud.ForceTarget((time, force + 20), offset=True), TRUTH, CASE)
+    assert fit.targets[0].nuisances["offset"][0] == pytest.approx(20, abs=1e-4 * force.max())
+    assert not fit.warnings
 
 
 def test_hum_of_a_given_frequency_is_removed() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import warnings
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
@@ -108,7 +109,22 @@ def test_results_on_a_floor_are_read_back(
         "energy_by_mobility_J": energy.by_mobility, "conductance_m_per_Ns": energy.conductance,
     }.items():  # fmt: skip
         assert [float(row[name]) for row in rows] == pytest.approx(values, rel=1e-9, abs=1e-12)
-    assert f"{moved.peak_force:.1f} N" in done.stdout
+    table = done.stdout.partition("on oscillator")[2].splitlines()
+    shown = {line[2:24].strip(): re.findall(r"-?\d+\.\d+", line[24:]) for line in table}
+    for name, scale, decimals in (
+        ("peak_force", 1, 1), ("contact_time", 1e3, 3), ("restitution", 1, 4), ("impulse", 1, 3),
+    ):  # fmt: skip
+        numbers = [f"{scale * getattr(drop, name):.{decimals}f}" for drop in (found, moved)]
+        assert shown[name.replace("_", " ")] == numbers
+    for name, value, decimals in (
+        ("velocity of the floor", abs(moved.floor_velocity).max(), 3),
+        ("its displacement", abs(moved.floor_displacement).max(), 4),
+        ("energy to the floor", moved.floor_work, 3),
+    ):
+        assert shown[name] == [f"{number:.{decimals}f}" for number in (0, 1e3 * value)]
+    # Five octaves are one set.
+    differ = abs(energy.by_motion - energy.by_mobility).max() / energy.by_mobility.sum()
+    assert f"differ by at most {100 * differ:.3f} %" in done.stdout
 
 
 def test_models_of_the_blocked_force_say_so() -> None:

@@ -53,11 +53,15 @@ def test_examples_are_measured_as_they_were_made(
     monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
+    monkeypatch.setattr("thud.cli.measure.SHOWN", 2)
     # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
     assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out
     assert "The source does not conform to the limits of the rubber ball at 95 %" in shown
     assert "hum of 50 Hz" in shown
+    rows = [line.split()[0] for line in shown.splitlines() if line.startswith("drop_")]
+    assert rows == [drop["file"] for drop in DROPS[:2]]
+    assert f"\nand {len(DROPS) - 2} more drops, in out/report.json\n" in shown
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {
         "levels.csv",
         "criteria.csv",

@@ -326,6 +326,27 @@ def test_edge_is_where_the_force_of_a_line_begins_and_passes_a_percent() -> None
     width = found.time[1] - found.time[0]
     variance = weight @ found.time**2 - mean**2 + width**2 / 12
     assert deviation == pytest.approx(np.sqrt(variance), rel=1e-6)
+    # The searches narrow to where the touch lies, from bounds of any width.
+    near = flanks.find_touch(one, shift - 4e-5, shift + 5e-5, 3)
+    near_mean, near_deviation = flanks._moments(near.time, near.weight.sum(axis=0))  # noqa: SLF001
+    assert mean == pytest.approx(near_mean, abs=0.1 * near_deviation)
+    assert deviation == pytest.approx(near_deviation, rel=0.1)
+
+
+def test_only_rough_flanks_fall() -> None:
+    """A force of 0.16 t - 0.035 t**2 falls by a tenth of the peak within 4 ms."""
+    kinds = np.array([0, flanks.N_SMOOTH])
+    assert not flanks.KINDS[0].rough
+    assert flanks.KINDS[kinds[1]].rough
+    # Shapes that are known to 1e-6 of their deviation.
+    n = flanks.SPREADS.shape[1]
+    factors = 1e6 * np.tile(np.eye(n + 1), (2, 2, 1, 1))
+    factors[:, :, -1, :-1] = 0
+    factors[:, :, -1, 6] = 1e6 * -0.07 / flanks.SPREADS[kinds, 6][:, None]
+    # The two kinds touch at different times.
+    found = flanks.Posterior(np.array([0.0, 1e-3]), kinds, 0.5 * np.eye(2), factors, release=False)
+    (touch, _), _ = found.edge()
+    assert touch == 1e-3
 
 
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:

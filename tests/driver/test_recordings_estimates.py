@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tracemalloc
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from thud.impact.contact_time import contact_span
 from thud.level.levels import record_force
 from thud.recordings.budgets import average_mass, average_restitution, drop_quantities
 from thud.recordings.config import Config
-from thud.recordings.contact import Estimate
+from thud.recordings.contact import Contact, Estimate, find_contact
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
@@ -564,6 +564,30 @@ def test_cut_pulse_is_refused(part: slice) -> None:
 def test_quiet_has_no_impact(force: np.ndarray) -> None:
     with pytest.raises(thud.InputError, match=naming("pulse", "40 ms")):
         find_windows(Signal.from_array(force, 48e3))
+
+
+@pytest.mark.parametrize("ratio", [3.9, 4.1])
+def test_contact_is_refused_from_a_quarter_of_uncertainty_on(
+    ratio: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def find(*arguments: Any) -> Contact:  # noqa: ANN401
+        found = find_contact(*arguments)
+        time = found.end.value - found.begin.value
+        # Of begin and end alike.
+        ends = {
+            name: replace(getattr(found, name), uncertainty=time / ratio / np.sqrt(2))
+            for name in ("begin", "end")
+        }
+        return replace(found, **ends)
+
+    monkeypatch.setattr("thud.recordings.estimates.find_contact", find)
+    force, _ = make_recording(HALF_SINE, FINE, rate=24e3, noise_db=50)
+    if ratio > 4:
+        (drop,) = drops(force, 24e3)
+        assert drop.contact_time.uncertainty == pytest.approx(drop.contact_time.value / ratio)
+    else:
+        with pytest.raises(thud.InputError, match=naming("contact", "noise", "ms", "1/4")):
+            drops(force, 24e3)
 
 
 def test_low_rate_is_refused() -> None:

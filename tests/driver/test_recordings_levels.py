@@ -144,7 +144,11 @@ def test_low_pass_does_nothing_to_the_bands() -> None:
             raw, low = (measure_levels([drop], bands, low_pass=one)[0] for one in (False, True))
             np.testing.assert_allclose(low.level, raw.level, rtol=0, atol=2e-3)
             assert "1.25 kHz" in low.steps[1]
-            assert low.contributions["filter"].max() < 0.003
+            # A rectangle between none of it and all at the upper edge, where it is largest.
+            taken = attenuation(thud.get_bands(bands).upper, rate)
+            np.testing.assert_allclose(low.contributions["filter"], taken / math.sqrt(3))
+            assert taken.max() < 0.005
+            assert not raw.contributions["filter"].any()
     sine = np.sin(2 * np.pi * RECORDED_BAND * np.arange(4000) / 25600)
     passed, _ = low_pass_force(sine, 25600.0)
     # Zero phase, half the energy, at the band edge; 19 dB at 1.6 kHz, the paper's force plate.
@@ -487,7 +491,11 @@ def test_resonance_near_the_bands_is_refused() -> None:
     ("values", "words"),
     [
         ((0.0, 30.0), naming("plate", "frequency", 0.0)),
+        ((1600.0, 0.0), naming("plate", "quality", 0.0)),
         ((1600.0, -1.0), naming("plate", "quality", -1.0)),
+        ((1600.0, 30.0, 0.0), naming("plate", "mass", 0.0)),
+        ((1600.0, 30.0, None, 0.0, -0.01), naming("plate", "frequency_uncertainty", -0.01)),
+        ((1600.0, 30.0, None, 0.0, 1.0), naming("plate", "frequency_uncertainty", 1.0)),
         ((1600.0, 30.0, None, 1.0), naming("plate", "mass", None)),
         ((1600.0, 30.0, 5.0, -1.0), naming("plate", "added_mass", -1.0)),
         ((math.nan, 30.0), naming("plate", "frequency", "nan")),
@@ -496,6 +504,20 @@ def test_resonance_near_the_bands_is_refused() -> None:
 def test_impossible_plates_are_refused(values: tuple[Any, ...], words: str) -> None:
     with pytest.raises(thud.InputError, match=words):
         Plate(*values)
+
+
+@pytest.mark.parametrize(
+    ("values", "resonance"),
+    [
+        ((0.5, 30.0), 0.5),
+        ((1600.0, 0.5), 1600.0),
+        ((1600.0, 30.0, 0.5, 0.5), 1600 / math.sqrt(2)),
+        ((1600.0, 30.0, 5.0, 0.0), 1600.0),
+        ((1600.0, 30.0, None, 0.0, 0.99), 1600.0),
+    ],
+)
+def test_odd_plates_are_taken(values: tuple[Any, ...], resonance: float) -> None:
+    assert Plate(*values).resonance == pytest.approx(resonance)
 
 
 def test_plate_is_held_against_the_standard() -> None:

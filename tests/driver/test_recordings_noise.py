@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise, product
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -230,6 +231,19 @@ def test_proposals_are_those_of_student() -> None:
     radius = (draws**2).sum(axis=1) / 3
     assert stats.kstest(radius, stats.f(3, module.FREEDOM).cdf).statistic < 0.1
     assert abs(np.mean(np.sign(draws))) < 0.1
+
+
+def test_draws_are_kept_as_often_as_they_weigh() -> None:
+    steps, logarithm = module._student(2)  # noqa: SLF001
+    # The first has no weight.
+    weight = np.arange(len(steps)) / np.arange(len(steps)).sum()
+    with np.errstate(divide="ignore"):
+        values = iter(logarithm + np.log(weight))
+    one = SimpleNamespace(logarithm=lambda _: next(values))
+    draws = module._Posterior.draw(one, np.zeros(2), np.eye(2))  # type: ignore[arg-type] # noqa: SLF001
+    count = (draws[:, None] == steps).all(axis=2).sum(axis=0)
+    assert count.sum() == module.N_KEPT
+    assert (abs(count - module.N_KEPT * weight) < 1).all()
 
 
 def test_draws_weighted_by_the_posterior_have_its_moments() -> None:

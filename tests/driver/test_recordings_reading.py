@@ -1015,6 +1015,40 @@ def test_useless_calibration_records(
         calibrate(Signal.from_array(values, 5000.0), **given)
 
 
+def stepped(*plateaus: tuple[float, int]) -> Signal:
+    """Return a record of levels, V, and their numbers of samples."""
+    levels, counts = zip(*plateaus, strict=True)
+    return Signal.from_array(np.repeat(levels, counts), 5000.0)
+
+
+def test_plateau_of_a_calibration_has_eight_means() -> None:
+    found = calibrate(stepped((0.0, 8), (0.1, 8)), force=500.0, unit="V")
+    assert float(found.chain.split()[0]) == pytest.approx(5000)
+    for counts in ((7, 8), (8, 7)):
+        with pytest.raises(InputError, match=naming("recording", "step")):
+            calibrate(stepped((0.0, counts[0]), (0.1, counts[1])), force=500.0, unit="V")
+
+
+def test_knock_on_a_loaded_plate_is_no_step() -> None:
+    # Two of a thousand means, three times as high as the step.
+    found = calibrate(stepped((0.0, 500), (1.0, 248), (4.0, 2), (1.0, 250)), force=500.0, unit="V")
+    assert found.origin.startswith("1 step of 500 N")
+    assert float(found.chain.split()[0]) == pytest.approx(500, rel=4 * found.uncertainty)
+
+
+@pytest.mark.parametrize("left", [0.21, 0.235])
+def test_steps_that_differ_by_a_fifth_are_no_calibration(left: float) -> None:
+    """Steps of 1 and 1 + d: the standard error of their mean, 1 + d/2, is d/2; a tenth is known."""
+    record = stepped((0.0, 100), (1.0, 100), (-left, 100))
+    error = left / 2 / (1 + left / 2)
+    if error < 0.1:
+        found = calibrate(record, force=500.0, unit="V", uncertainty=0.02)
+        assert found.uncertainty == pytest.approx(math.hypot(error, 0.02))
+    else:
+        with pytest.raises(InputError, match=naming("step", "10%")):
+            calibrate(record, force=500.0, unit="V")
+
+
 LAB = """
 laboratory = "Acoustics laboratory"
 ball = "rubber ball"

@@ -111,6 +111,15 @@ OUTSIDE = {
 }
 
 
+def test_values_at_the_limits_of_rubbers_are_not_remarked(case_file: Callable[..., Path]) -> None:
+    text = "&ball poisson_ratio = {}, youngs_modulus = 3e9 / &sampling sample_rate = 1e6 /"
+    for ratio, number in ((0.45, 0), (0.4499, 1)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            remarks = thud.solve_case(thud.read_case(case_file(text.format(ratio)))).remarks
+        assert sum("rubbers have" in remark for remark in remarks) == number, remarks
+
+
 @pytest.mark.parametrize("words", OUTSIDE)
 @pytest.mark.slow
 def test_answer_outside_the_theory_is_remarked(words: str, case_file: Callable[..., Path]) -> None:

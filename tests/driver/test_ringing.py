@@ -142,6 +142,17 @@ def test_ringing_begins_where_it_is_clear_large_and_long_enough() -> None:
         assert bool(check_ringing(replace(whole, force=whole.force[:behind]))) == expected
 
 
+def test_ringing_has_four_times_the_energy_of_the_quiet_before() -> None:
+    contact = rung(200.0, 1000.0, 0.008)
+    first, stop = contact.gate
+    # The same wave before the contact, in reversed time.
+    wave = contact.force[stop:][::-1][-first:]
+    for part, expected in ((0.45, True), (0.55, False)):
+        force = contact.force.copy()
+        force[first - len(wave) : first] += part * wave
+        assert bool(tell_ringing(replace(contact, force=force))) == expected
+
+
 @pytest.mark.parametrize("plate", [None, Plate(1600.0, 30.0)])
 def test_matched_energies_are_over_the_density_of_the_noise(plate: Plate | None) -> None:
     contact = rung(0.0, 1000.0, 0.008, np.array([[3e-5, 2e-3, 0.5, 0, 0], [5e-5, 4e-3, 1.5, 0, 0]]))

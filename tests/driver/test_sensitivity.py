@@ -94,6 +94,10 @@ def test_figure_shows_every_index(lumped: Sensitivity) -> None:
     widths = [bar.get_width() for bars in axes.containers[::3] for bar in bars]
     expected = lumped.indices["total"].transpose("parameter", "output").values.ravel()
     np.testing.assert_array_equal(widths, expected)
+    # No bar covers another, of its output or of the next one.
+    bars = sorted(axes.patches, key=lambda bar: bar.get_y())
+    ends = [bar.get_y() + bar.get_height() for bar in bars]
+    assert all(end < bar.get_y() for end, bar in zip(ends, bars[1:], strict=False))
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["mass", "height", "outer radius", "total index", "first order"]
     for place, name in ((1, "total"), (2, "first_order")):

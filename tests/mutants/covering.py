@@ -15,6 +15,7 @@ from subprocess import TimeoutExpired, run
 from typing import TYPE_CHECKING
 
 from coverage import CoverageData
+from coverage.exceptions import DataError
 from tree import ROOT, in_parallel
 
 if TYPE_CHECKING:
@@ -202,7 +203,10 @@ def _driver_lines(tree: Tree, room: Path, name: str) -> Iterator[tuple[str, int,
     """Yield file, line and test of the Python code that was run."""
     for part in room.glob("data.*"):
         data = CoverageData(str(part))
-        data.read()
+        try:
+            data.read()
+        except DataError:  # of a process that a test has killed
+            continue
         for file in data.measured_files():
             path = Path(file)
             bases = (tree.root / "driver", tree.installed)
