@@ -169,6 +169,9 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert max(answer["floor"]["velocity"]["value"]) == pytest.approx(
         1e3 * impact.floor_velocity.max(), rel=0.05
     )
+    numbers = {name: value for name, value, _ in answer["floor"]["numbers"]}
+    change = 20 * np.log10(impact.peak_force / thud.solve().peak_force)
+    assert numbers["peak of the force"] == pytest.approx(change)
     assert [row[0] for row in answer["floor"]["rows"]] == ["31.5", "63", "125", "250", "500"]
     assert len(answer["room"]["level"]) == 12
     # A model without a shape has no picture.

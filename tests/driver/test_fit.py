@@ -239,6 +239,10 @@ def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
     assert cut.start == pytest.approx(2.0 - 0.02)
     narrow = range_of(height=thud.Parameter(start=2.0, low=1.99, high=2.0))
     assert narrow.start == pytest.approx(2.0 - 0.01 / 4)
+    # A start at 0 has no scale of its own: a tenth of the range is one.
+    given = {"poisson_ratio": thud.Parameter(start=0.0, low=-0.2, high=0.3)}
+    (zero,) = get_ranges(thud.Case(), bound_parameters(thud.Case(), given))
+    assert zero.scale == pytest.approx(0.05)
 
 
 @pytest.mark.parametrize("at", [-0.002, 0.1, 0.14])
@@ -367,11 +371,12 @@ def test_model_that_cannot_follow_is_reported() -> None:
         thud.fit(thud.ForceTarget(record, noise=5.0, offset=False), ["youngs_modulus"])
 
 
-def test_limits_hold_and_are_reported() -> None:
-    limited = {"youngs_modulus": thud.Parameter(1.5e6, 1e6, 1.7e6)}
+@pytest.mark.parametrize(("low", "high", "limit"), [(1e6, 1.7e6, 1.7), (1.9e6, 3e6, 1.9)])
+def test_limits_hold_and_are_reported(low: float, high: float, limit: float) -> None:
+    limited = {"youngs_modulus": thud.Parameter((low + high) / 2, low, high)}
     fit = quiet_fit(thud.solve(TRUTH), limited)
-    assert re.search(naming("youngs_modulus", "1.7 MPa"), fit.warnings[0])
-    assert fit.values["youngs_modulus"] <= 1.7e6
+    assert re.search(naming("youngs_modulus", f"{limit} MPa"), fit.warnings[0])
+    assert low <= fit.values["youngs_modulus"] <= high
 
 
 def test_intervals_end_at_the_limits() -> None:
