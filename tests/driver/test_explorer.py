@@ -494,7 +494,7 @@ def test_recordings_wait_before_they_are_copied(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",), width=2)
+    application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",))
 
     def copies() -> int:
         return len(list(tmp_path.iterdir()))

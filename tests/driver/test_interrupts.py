@@ -415,6 +415,8 @@ try:
     Deaf()
     time.sleep(20)
 except KeyboardInterrupt:
+    # Nothing more is sent, which would end what is saved now.
+    time.sleep(thud_driver._COPIES + 0.2)
     print("heard")
 """
     done = subprocess.run(
