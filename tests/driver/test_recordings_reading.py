@@ -794,16 +794,22 @@ def test_matlab_files_of_both_byte_orders_are_read(order: str, tmp_path: Path) -
     columns = (
         (b"Force", 6, 9, (1e-3 * force).astype(f"{order}f8").tobytes()),
         (b"Fs", 6, 9, struct.pack(f"{order}d", 48000.0)),
+        (b"unit", 4, 4, unit),
     )
-    path.write_bytes(matlab_file(order, *columns, (b"unit", 4, 4, unit)))
+    path.write_bytes(matlab_file(order, *columns))
     (signal,) = open_signals(path)
     assert signal.sample_rate == 48000.0
     np.testing.assert_allclose(signal.read(0, signal.n_sample), force, rtol=1e-15)
     # Classes 6 to 15 are numbers; 5 is sparse, and 16 is a handle of a function.
     for group in range(1, 20):
         odd = (b"Odd", group, *columns[0][2:])
-        path.write_bytes(matlab_file(order, *columns, odd, (b"unit", 4, 4, unit)))
+        path.write_bytes(matlab_file(order, *columns, odd))
         assert len(open_signals(path)) == (2 if 6 <= group <= 15 else 1)
+    more = [(f"x{i}".encode(), 6, 9, struct.pack(f"{order}d", i)) for i in range(998)]
+    path.write_bytes(matlab_file(order, *columns, *more[1:]))
+    assert len(open_signals(path)) == 1
+    path.write_bytes(matlab_file(order, *columns, *more))
+    assert re.search(naming("variables", 1000), refusal(path))
 
 
 def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
