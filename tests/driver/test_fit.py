@@ -224,6 +224,9 @@ def test_parameters_are_lost_by_size_and_by_error_of_the_derivatives() -> None:
         error = factor * small / large / 3
         change = np.column_stack([none[:, 0], error * base[:, 1]])
         assert lost(near, change) == expected
+    # Without errors below a millionth of the largest one: the tangent of half the angle.
+    for angle, expected in ((2 * 0.99e-6, 1), (2 * 1.01e-6, 0)):
+        assert lost(np.column_stack([base[:, 0], base @ [1, angle]]), none) == expected
 
 
 def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
