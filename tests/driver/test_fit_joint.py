@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import json
 import re
+import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from conftest import REPOSITORY, naming
+from scipy import stats
 
 import thud
 from thud import cli
 from thud.studies.fit import KIND
 from thud.studies.fitting.inference import pair_sentences
+from thud.studies.fitting.residual_tests import UNLIKELY
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -132,6 +135,23 @@ def test_record_that_does_not_fit_the_others_is_named(
     free = [targets[0], replace(targets[1], gain=np.inf)]
     fit = thud.fit(free, list(TRUTH), CASE)
     assert abs(fit.values["gain(2)"] - 1.05) < FAR * fit.standard_errors["gain(2)"]
+
+
+def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
+    # Five levels twice, and one parameter: 4.5 degrees of freedom each.
+    levels = thud.solve_case(CASE).levels(force="floor") + np.array([1, -1, 1, -1, 1])
+
+    def fit(uncertainty: float) -> thud.Fit:
+        target = thud.LevelTarget(levels.tolist(), uncertainty, force="floor")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", thud.FitWarning)
+            return thud.fit([target, target], ["youngs_modulus"], CASE)
+
+    square = fit(1.0).residuals @ fit(1.0).residuals / 2
+    for factor, expected in ((0.99, 0), (1.01, 2)):
+        wanted = factor * stats.chi2.isf(UNLIKELY, 4.5)
+        told = fit(float(np.sqrt(square / wanted))).warnings
+        assert sum("given uncertainty" in one for one in told) == expected
 
 
 def test_heights_do_not_tell_modulus_from_wall(

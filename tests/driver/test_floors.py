@@ -194,6 +194,11 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
     assert len(moved.rows()) == 6
     assert "contact, dB" in moved._repr_html_()
     figure = moved.plot()
+    # The mobility is drawn over the bands.
+    bands = thud.get_bands("third")
+    for line in figure.axes[-1].get_lines():
+        drawn = np.asarray(line.get_xdata())
+        assert drawn[[0, -1]] == pytest.approx([bands.lower[0], bands.upper[-1]])
     assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
         "Force on the floor", "Velocity of", "Contact less", "Energy into", "Mobility Y,",
     ]  # fmt: skip

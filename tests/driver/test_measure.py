@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 import soundfile
 from conftest import REPOSITORY, naming, recorded
-from synthetic import make_recording
+from synthetic import half_sine, make_recording
 from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 
 import thud
@@ -162,6 +162,11 @@ def test_source_and_limits_are_checked_before_anything_is_measured(
         thud.Recording.from_signals([signal], config)
     with pytest.raises(thud.InputError, match=words):
         thud.read_recording(FOLDER / "drop_1.wav", config=config)
+
+
+def test_recording_has_the_name_of_its_first_signal() -> None:
+    signals = [Signal.from_array(half_sine(24e3, 0.1, 5280), 24e3, name) for name in ("a.b", "c")]
+    assert thud.Recording.from_signals(signals, Config()).name == "a"
 
 
 def test_limits_given_from_python_are_those_of_the_verdict() -> None:

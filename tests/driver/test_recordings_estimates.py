@@ -96,6 +96,10 @@ def test_two_impacts_in_a_file_are_two_drops(gap: float) -> None:
     for drop in found:
         assert drop.contact_time.value == pytest.approx(ABOVE, abs=1e-4)
         assert not drop.bounces
+    # No window reaches closer than 2 ms to the pulse of the other.
+    one, two = find_windows(Signal.from_array(force, 48e3, "file.wav"))
+    assert one.stop <= two.start + two.contact[0] - 96
+    assert two.start >= one.start + one.contact[1] + 96
 
 
 def test_two_impacts_that_meet_are_refused() -> None:
@@ -376,6 +380,12 @@ def test_mean_restitution_has_what_all_drops_share_and_what_differs_between_the_
     assert abs(apart.value) > apart.expanded
     parts = {part.name: part.uncertainty for part in wrong.contributions}
     assert parts["impulse against bounces"] == pytest.approx(abs(apart.value) / np.sqrt(3))
+    # The calibration moves only the drops that it is part of.
+    some = [found[0], replace(found[1], restitution_shared={})]
+    parts = {p.name: p.uncertainty for p in average_restitution(some, FALL)[0].contributions}
+    assert parts["calibration"] == pytest.approx(
+        abs(found[0].restitution_shared["calibration"]) / 2
+    )
 
 
 def test_mean_mass_has_calibration_and_height() -> None:

@@ -771,6 +771,48 @@ def test_matlab_structures_are_read(packed: bool, tmp_path: Path) -> None:  # no
     assert re.search(naming("structures", 8), refusal(path))
 
 
+def matlab_file(order: str, *arrays: tuple[bytes, int, int, bytes]) -> bytes:
+    """Return a MATLAB file of columns: name, class, type of their numbers, and the numbers."""
+
+    def element(kind: int, data: bytes) -> bytes:
+        return struct.pack(f"{order}II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+    size = {4: 2, 9: 8}
+    return b"MATLAB 5.0".ljust(124) + struct.pack(f"{order}HH", 0x100, 0x4D49) + b"".join(
+        element(14, b"".join([
+            element(6, struct.pack(f"{order}II", group, 0)),
+            element(5, struct.pack(f"{order}ii", len(data) // size[kind], 1)),
+            element(1, name), element(kind, data),
+        ]))
+        for name, group, kind, data in arrays
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+def test_matlab_files_of_both_byte_orders_are_read(order: str, tmp_path: Path) -> None:
+    force, path = half_sine(48000.0), tmp_path / "plate.mat"
+    unit = "kN".encode("utf-16-le" if order == "<" else "utf-16-be")
+    columns = (
+        (b"Force", 6, 9, (1e-3 * force).astype(f"{order}f8").tobytes()),
+        (b"Fs", 6, 9, struct.pack(f"{order}d", 48000.0)),
+        (b"unit", 4, 4, unit),
+    )
+    path.write_bytes(matlab_file(order, *columns))
+    (signal,) = open_signals(path)
+    assert signal.sample_rate == 48000.0
+    np.testing.assert_allclose(signal.read(0, signal.n_sample), force, rtol=1e-15)
+    # Classes 6 to 15 are numbers; 5 is sparse, and 16 is a handle of a function.
+    for group in range(1, 20):
+        odd = (b"Odd", group, *columns[0][2:])
+        path.write_bytes(matlab_file(order, *columns, odd))
+        assert len(open_signals(path)) == (2 if 6 <= group <= 15 else 1)
+    more = [(f"x{i}".encode(), 6, 9, struct.pack(f"{order}d", i)) for i in range(998)]
+    path.write_bytes(matlab_file(order, *columns, *more[1:]))
+    assert len(open_signals(path)) == 1
+    path.write_bytes(matlab_file(order, *columns, *more))
+    assert re.search(naming("variables", 1000), refusal(path))
+
+
 def test_packed_matlab_bombs_are_refused(tmp_path: Path) -> None:
     """A quarter of a gibibyte of zeros in a quarter of a mebibyte."""
     path = write_pulse(tmp_path, "packed.mat")

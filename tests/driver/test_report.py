@@ -33,6 +33,7 @@ from thud.recordings.recording import Recording
 from thud.report.contents import read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
+from thud.report.page import _range
 from thud.report.pdf import html_to_pdf
 from thud.report.write import write_report
 
@@ -519,3 +520,28 @@ def test_text_is_clipped_to_its_lines() -> None:
             assert short.endswith("…")
             assert count_lines(short, 7, 60) == lines
     assert clip("short", 7, 60) == "short"
+
+
+@pytest.mark.parametrize(
+    ("value", "expanded", "bar", "mark"),
+    [
+        # The limits lie at 25 and 75 of 100.
+        (15.0, 2.0, (40.0, 60.0), "50.00"),
+        (20.0, 6.0, (45.0, 99.0), "75.00"),
+        (12.0, None, None, "35.00"),
+        # Beyond the picture a triangle shows where the value lies.
+        (1.0, 1.0, None, "M0.50 5l3.0 "),
+        (30.0, 1.0, None, "M99.50 5l-3.0 "),
+    ],
+)
+def test_picture_of_a_criterion_has_value_and_uncertainty_between_the_limits(
+    value: float, expanded: float | None, bar: tuple[float, float] | None, mark: str
+) -> None:
+    picture = _range({
+        "value": value, "expanded_uncertainty": expanded, "lower": 10.0, "upper": 20.0
+    })  # fmt: skip
+    drawn = re.search(r"M([\d.]+) 5H([\d.]+)", picture)
+    assert (drawn and tuple(map(float, drawn.groups()))) == bar
+    if bar:
+        assert "".join(f"M{end:.2f} 2.5V7.5" for end in bar) in picture
+    assert (f'cx="{mark}"' if "M" not in mark else mark) in picture

@@ -372,6 +372,15 @@ def test_blocks_take_about_half_a_second() -> None:
     assert seconds(model="finite_element", polar_elements=256) > 0.5
 
 
+def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:
+    given = {"model": {"name": "modal_ball"}, "modal_ball": {"harmonics": 70}}
+    for model, harmonics in (("modal_ball", 70), ("hollow_sphere", None)):
+        study = thud.read_study({"case": given, "fixed": {"model": model}, **HEIGHTS})
+        assert study.case.model is not None
+        assert study.case.model.name == model
+        assert getattr(study.case.model, "harmonics", None) == harmonics
+
+
 def test_many_sets_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
@@ -391,6 +400,9 @@ def test_many_sets_need_a_word(tmp_path: Path) -> None:
         ("[parameters]\n[parameters]", naming("TOML")),
         ("sets = 3", naming("'sets'", "name", "case")),
         (f"{'12' * 50} = 3", naming("100 characters", "name", "case")),
+        # With its quotes 80 characters.
+        (f"{'12' * 39} = 3", naming(repr("12" * 39), "name", "case")),
+        (f"{'12' * 39}1 = 3", naming("79 characters", "name", "case")),
         (
             "parameters.temperature.values = [19]\ntemperature.c1 = 8\ntemperature.c2 = 120",
             naming("[temperature]", "reference", "coefficient"),

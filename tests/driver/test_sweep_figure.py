@@ -65,8 +65,11 @@ def test_lowest_panels_have_the_numbers_of_the_axis() -> None:
 
 
 def test_texts_alone_are_the_axis() -> None:
-    (axes,) = draw(parameters={"momentum_flux": {"values": ["none", "retarding"]}}).axes
-    assert [text.get_text() for text in axes.get_xticklabels()] == ["none", "retarding"]
+    fluxes = ["none", "retarding"]
+    (axes,) = draw(parameters={"momentum_flux": {"values": fluxes}}).axes
+    assert [text.get_text() for text in axes.get_xticklabels()] == fluxes
+    levels = [thud.solve(momentum_flux=flux).levels() - NOMINAL for flux in fluxes]
+    np.testing.assert_allclose(curves(axes), levels, atol=1e-6)
     assert axes.get_xlabel() == "Momentum flux"
 
 

@@ -78,7 +78,7 @@ class Temperature:
         above = temperature - self.reference
         modulus = values["youngs_modulus"] * (1 + (self.coefficient or 0.0) * above)
         if self.c1 is not None:
-            order = _ORDERS.get(_loss_law(case), values.get("fractional_order", 1.0))
+            order = _ORDERS.get(_loss_law(case), values["fractional_order"])
             angle = np.pi / 2 * order
             springpot = values["loss_factor"] / np.sin(angle) * self.shift(temperature) ** order
             storage = 1 - values["loss_factor"] / np.tan(angle) + springpot * np.cos(angle)
