@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import thud
 from thud.plot.force_history_figure import draw_forces
 from thud.plot.levels_figure import draw_levels
-from thud.plot.style import LEVEL, SIZE, WIDTH, style_axes, legend_above, new_figure
+from thud.plot.style import LEVEL, SIZE, WIDTH, legend_above, new_figure, style_axes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.ticker import NullLocator
 
-from thud.plot import COLOURS, SIZE, style_axes, legend_above, save
+from thud.plot import COLOURS, SIZE, legend_above, save, style_axes
 from thud.plot.style import LEVEL, WIDTH, empty_axes, new_figure
 
 if TYPE_CHECKING:
@@ -114,7 +114,8 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
             markerfacecolor="none",
             label=f"{case}: {other}",
         )
-        style_axes(change).plot(place, by["thud"] - by[other], "os"[i], color=COLOURS[i], markersize=4)
+        difference = by["thud"] - by[other]
+        style_axes(change).plot(place, difference, "os"[i], color=COLOURS[i], markersize=4)
     change.axhline(0, color="0.4", linewidth=0.8)
     change.set_xticks(place, [f"{octave:g}" for octave in octaves])
     change.set_xlabel("Octave band, Hz", fontsize=SIZE)

@@ -130,7 +130,7 @@ def test_other_force_is_shown_where_it_differs(
     table = run(path).stdout
     header, *rows = table.splitlines()[2:8]
     assert header.split()[7:] == title
-    impact = thud.solve_case(thud.read_case(path))
+    impact = thud.solve(thud.read_case(path))
     assert re.search(rf"peak force +{impact.peak_force:.1f} N", table)
     levels = [impact.levels(force="floor"), impact.levels(force="elastic")][: 1 + len(title) // 2]
     shown = [re.findall(r"(-?\d+\.\d\d) dB", row) for row in rows]

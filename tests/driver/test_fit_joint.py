@@ -139,7 +139,7 @@ def test_record_that_does_not_fit_the_others_is_named(
 
 def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
     # Five levels twice, and one parameter: 4.5 degrees of freedom each.
-    levels = thud.solve_case(CASE).levels(force="floor") + np.array([1, -1, 1, -1, 1])
+    levels = thud.solve(CASE).levels(force="floor") + np.array([1, -1, 1, -1, 1])
 
     def fit(uncertainty: float) -> thud.Fit:
         target = thud.LevelTarget(levels.tolist(), uncertainty, force="floor")

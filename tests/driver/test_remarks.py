@@ -116,7 +116,7 @@ def test_values_at_the_limits_of_rubbers_are_not_remarked(case_file: Callable[..
     for ratio, number in ((0.45, 0), (0.4499, 1)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            remarks = thud.solve_case(thud.read_case(case_file(text.format(ratio)))).remarks
+            remarks = thud.solve(thud.read_case(case_file(text.format(ratio)))).remarks
         assert sum("rubbers have" in remark for remark in remarks) == number, remarks
 
 

@@ -202,7 +202,11 @@ def _floor(impact: Impact, moving: FloorImpact) -> Answer:
         "force": _curve(contact[0], 1e3 * contact[1]),
         "velocity": _curve(times[shown], 1e3 * moving.floor_velocity[shown]),
         "numbers": [
-            ["peak force relative to rigid floor", 20 * np.log10(moving.peak_force / impact.peak_force), "dB"],
+            [
+                "peak force relative to rigid floor",
+                20 * np.log10(moving.peak_force / impact.peak_force),
+                "dB",
+            ],
             ["restitution", moving.restitution, ""],
             ["maximum displacement", 1e3 * moving.floor_displacement.max(), "mm"],
             ["energy into the floor", moving.floor_work, "J"],

@@ -203,7 +203,8 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
             raise HTTPException(403, "the request comes from another page")
         given = request.headers.get(TOKEN, "").encode()
         if not secrets.compare_digest(given, request.app.state.token.encode()):
-            raise HTTPException(403, "open the full address shown in the terminal: it holds the token")
+            wanted = "open the full address shown in the terminal: it holds the token"
+            raise HTTPException(403, wanted)
         return await endpoint(request)
 
     return answer

@@ -11,7 +11,7 @@ from plotly.offline import get_plotlyjs
 
 from thud.plot.style import COLOURS, styled
 
-# Line styles and markers of `thud.plot.look` by the names of plotly.
+# Line styles and markers of `thud.plot.style` by the names of plotly.
 _DASHES = ("solid", "dash", "dashdot", "dot", "longdashdot", "2px,2px", "longdash")
 _SYMBOLS = ("circle", "square", "triangle-up", "diamond", "triangle-down", "cross", "x")
 # Maximum number of letters of a line of a legend.

@@ -114,7 +114,7 @@ class Drop(Immutable):
     ) -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
 
-        The arguments are those of `thud.recordings.levels.measure_levels`, which has their
+        The arguments are those of `thud.recordings.recorded_levels.measure_levels`, which has their
         uncertainties too.
         """
         return measure_levels([self], bands, method, low_pass=low_pass)[0].level.copy()

@@ -153,7 +153,7 @@ class Verdict(Displayed):
     ----------
     source : str
         Source whose limits apply.
-    decisions : tuple of Decision
+    decisions : tuple of CriterionResult
         One for each criterion, in the order of `thud.levels.judge`.
     """
 
