@@ -150,7 +150,7 @@ def test_ringing_has_four_times_the_energy_of_the_quiet_before() -> None:
     for part, expected in ((0.45, True), (0.55, False)):
         force = contact.force.copy()
         force[first - len(wave) : first] += part * wave
-        assert bool(tell_ringing(replace(contact, force=force))) == expected
+        assert bool(check_ringing(replace(contact, force=force))) == expected
 
 
 @pytest.mark.parametrize("plate", [None, Plate(1600.0, 30.0)])
