@@ -494,6 +494,17 @@ def test_results_without_their_manifest_are_read_with_a_remark(
     assert len(found.remarks) == len(whole.remarks) + 1
 
 
+@pytest.mark.parametrize("excess", [0, 1])
+def test_path_longer_than_the_system_allows_makes_nothing(
+    run: Run, case_file: CaseFile, tmp_path: Path, excess: int
+) -> None:
+    # The zero at its end counts.
+    length = os.pathconf("/", "PC_PATH_MAX") - 1 + excess
+    path = "made/" + "/" * (length - 8) + "out"
+    assert run(case_file(MINIMAL), "-q", "-o", path).returncode == excess
+    assert (tmp_path / "made/out").exists() == (tmp_path / "made").exists() == (not excess)
+
+
 def test_damaged_results_print_nothing_and_leave_the_screen_to_others(
     run: Run,
     case_file: CaseFile,
