@@ -306,7 +306,7 @@ def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
     # Limits are allowed values.
     levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
     # A set without result has no rating.
-    rating = draw.normal(50, 2, 201)
+    rating = draw.normal(50, 20, 201)
     rated = xr.Dataset({RATING: ("set", rating), "status": ("set", [0] * 200 + [1])})
 
     def spread(level: np.ndarray) -> tuple[str, ...]:
