@@ -315,6 +315,16 @@ def test_share_that_is_radiated_is_that_of_one_side() -> None:
     assert least[1].any()
 
 
+def test_maxima_are_drawn_on_their_decays(impact: thud.Impact) -> None:
+    found = thud.predict_level(impact, thud.Plate(), thud.Room())
+    (axes,) = plot.draw_decay(found).axes
+    drawn = [line.get_xydata() for line in axes.get_lines()][:-1]
+    for decay, ((time, level),) in zip(drawn[::2], drawn[1::2], strict=True):
+        # Its steps are a hundredth of a second or less.
+        assert np.interp(time, *np.transpose(decay)) == pytest.approx(level, abs=0.1)
+        assert decay[np.argmax(decay[:, 1]), 0] == pytest.approx(time, abs=10)
+
+
 def test_few_modes_of_floor_or_room_are_remarked(impact: thud.Impact) -> None:
     found = thud.predict_level(impact, thud.Plate(), thud.Room())
     many = np.full(12, found.few_modes)

@@ -523,6 +523,19 @@ def test_flat_top_is_clipped_where_the_force_beside_it_falls(
             repair(window)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_two_samples_at_full_scale_are_clipped(count: int) -> None:
+    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
+    # At it are samples from 0.999 of it on.
+    scale = np.sort(force)[-count] / 0.999 * (1 - 1e-9)
+    (window,) = find_windows(Hour(force, len(force), 48e3, full_scale=scale))  # type: ignore[arg-type]
+    if count == 1:
+        repair(window)
+        return
+    with pytest.raises(thud.InputError, match=naming("clip", "0.0417 ms")):
+        repair(window)
+
+
 def test_coarse_digits_are_no_clipping() -> None:
     force, _ = make_recording(HALF_SINE, FINE, rate=96e3)
     (drop,) = drops(np.round(force / 2) * 2, 96e3)
@@ -539,6 +552,12 @@ def test_short_dropouts_are_filled_and_long_ones_refused() -> None:
     lost[5200:5300] = 0
     with pytest.raises(thud.InputError, match=naming("dropout", "ms")):
         drops(lost, 48e3)
+    # Fewer samples than may be held are lost where they are 0.
+    for value, told in ((0.0, True), (1.0, False)):
+        lost = force.copy()
+        lost[5200:5202] = value
+        (window,) = find_windows(Signal.from_array(lost, 48e3, "file.wav"))
+        assert bool(repair(window)[1]) == told
 
 
 @pytest.mark.parametrize("offset", [-3000.0, 0.0, 3000.0])

@@ -466,6 +466,18 @@ def test_constant_force_passes_the_correction() -> None:
         np.testing.assert_allclose(corrected, 7.0, rtol=1e-12)
 
 
+def test_end_of_a_record_does_not_reach_its_begin_in_the_correction() -> None:
+    rate, plate = 24e3, Plate(1500, 20)
+    rising = np.linspace(0, 100, 4800)
+    found = correct_plate(rising, rate, plate)
+    # F = F_m + F_m'/(w0 Q) between the ends, which are as if they were held.
+    slope = (rising[1] - rising[0]) * rate
+    expected = rising + slope / (2 * np.pi * 1500 * 20)
+    np.testing.assert_allclose(found[1000:-1000], expected[1000:-1000], atol=1e-3)
+    held = correct_plate(np.pad(rising, 24_000, mode="edge"), rate, plate)[24_000:-24_000]
+    np.testing.assert_allclose(found, held, atol=1e-3)
+
+
 def test_uncertain_resonance_makes_levels_uncertain() -> None:
     plate = Plate(1600, 30, frequency_uncertainty=0.01)
     _, measured = through_plate(half_sine, 51200.0, plate)
@@ -531,9 +543,12 @@ def test_plate_is_held_against_the_standard() -> None:
     assert [check.met for check in edge[:3]] == [True, True, True]
     short = check_plate(Plate(7139, 1e3), time_constant=3.9)
     assert [check.met for check in short[:2]] == [False, False]
-    corrected = Plate(1600, 30, frequency_uncertainty=0.005)
-    assert check_plate(corrected, corrected=True)[1].met
-    assert not check_plate(Plate(1600, 30, frequency_uncertainty=0.05), corrected=True)[1].met
+    # Of a resonance that is less by 1.96 uncertainties, (1 - r2)/(1 - r2/(1 - s)2) is 1.02.
+    square = (1000 / 1600) ** 2
+    shift = 1 - np.sqrt(square / (1 - (1 - square) / 1.02))
+    for factor, met in ((0.999, True), (1.001, False)):
+        plate = Plate(1600, 1e6, frequency_uncertainty=factor * shift / 1.96)
+        assert check_plate(plate, corrected=True)[1].met == met
     forces = [500.0, 1000.0, 2000.0, 5000.0]
     straight = check_plate(
         calibration=[(f, 1.3 * f * (1 + 0.001 * i)) for i, f in enumerate(forces)]

@@ -14,7 +14,12 @@ from conftest import naming
 from scipy.stats import norm
 
 import thud
+<<<<<<< HEAD
 from thud.base._schema import KEYS
+=======
+from thud._schema import KEYS
+from thud.outcomes import RATING
+>>>>>>> 6eb74cb53484552719dc25bcab48ad09bf55302e
 from thud.studies import designs
 from thud.studies.design_map import KIND as DESIGN, DesignMap, _mark
 from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region
@@ -303,17 +308,22 @@ def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:
     levels = np.array([(c.lower + c.upper) / 2 for c in criteria]) + draw.normal(0, 2, (200, 5))
     # Limits are allowed values.
     levels[0], levels[1] = ([getattr(c, end) for c in criteria] for end in ("lower", "upper"))
-    found = Uncertainty(xr.Dataset(), levels, "rubber_ball", 50, 200, 0)
-    for row, level, one in zip(found.table()[1:6], levels.T, criteria, strict=True):
+    # A set without result has no rating.
+    rating = draw.normal(50, 20, 201)
+    rated = xr.Dataset({RATING: ("set", rating), "status": ("set", [0] * 200 + [1])})
+
+    def spread(level: np.ndarray) -> tuple[str, ...]:
         ordered = np.sort(level)
         low, high = (ordered[int(p * 199)] + (p * 199) % 1 * (ordered[int(p * 199) + 1]
                      - ordered[int(p * 199)]) for p in (0.025, 0.975))  # fmt: skip
         deviation = math.sqrt(((level - level.mean()) ** 2).sum() / 199)
+        return f"{level.mean():.2f}", f"{deviation:.2f}", f"{low:.2f} to {high:.2f}"
+
+    rows = Uncertainty(rated, levels, "rubber_ball", 50, 200, 1).table()
+    for row, level, one in zip(rows[1:6], levels.T, criteria, strict=True):
         share = sum(one.lower <= v <= one.upper for v in level) / 200
-        assert row[1:] == (
-            f"{level.mean():.2f}", f"{deviation:.2f}", f"{low:.2f} to {high:.2f}",
-            f"{100 * share:.1f} %",
-        )  # fmt: skip
+        assert row[1:] == (*spread(level), f"{100 * share:.1f} %")
+    assert rows[6][1:] == (*spread(rating[:200]), "")
 
 
 def test_best_place_of_a_map_is_shown_in_its_unit() -> None:

@@ -127,6 +127,13 @@ def test_powers_of_a_lumped_source_are_learned() -> None:
     difference = np.abs(found.indices["total"] - exact.indices["total"]).isel(output=slice(0, 5))
     assert (difference < 0.01).all()
     assert found.table()[0][-1] == "error of the surrogate"
+    # Of other quantities the variances are those in dB; what does not vary has none.
+    learned = thud.surrogate(LUMPED)
+    found = thud.sensitivity({**LUMPED, "design": {"size": 64}}, surrogate=learned)
+    time, peak = found.indices["surrogate"].values[5:7]
+    missed = learned.mean_square("peak_force")[0]
+    assert peak == pytest.approx(missed / np.var(20 * np.log10(found.dataset["peak_force"].values)))
+    assert np.isnan(time)
 
 
 def test_what_exceeds_the_bound_is_withheld() -> None:
