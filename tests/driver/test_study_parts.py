@@ -14,12 +14,8 @@ from conftest import naming
 from scipy.stats import norm
 
 import thud
-<<<<<<< HEAD
 from thud.base._schema import KEYS
-=======
-from thud._schema import KEYS
-from thud.outcomes import RATING
->>>>>>> 6eb74cb53484552719dc25bcab48ad09bf55302e
+from thud.impact.quantities import RATING
 from thud.studies import designs
 from thud.studies.design_map import KIND as DESIGN, DesignMap, _mark
 from thud.studies.emulation.answered_levels import AnsweredLevels, confirmed, within_region

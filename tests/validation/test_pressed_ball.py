@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 import thud
+from thud.base._schema import CompressionGas
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,7 +19,7 @@ EIGHTHS = np.arange(1, 9) / 8
 
 
 @pytest.mark.parametrize("gas", ["vented", "isothermal", "adiabatic"])
-def test_shell_is_a_spring_and_a_gas_between_two_caps(gas: thud._schema.CompressionGas) -> None:
+def test_shell_is_a_spring_and_a_gas_between_two_caps(gas: CompressionGas) -> None:
     ball = thud.Ball(gauge_pressure=0.0 if gas == "vented" else 2e4)
     curve = thud.compress(ball, "hollow_sphere", max_deflection=0.06, points=2001, gas=gas)
     radius, depth = ball.outer_radius, curve.deflection / 2
