@@ -10,10 +10,11 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 
 import thud
-from thud.base._schema import CompressionGas
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from thud.base._schema import CompressionGas
 
 EIGHTHS = np.arange(1, 9) / 8
 
