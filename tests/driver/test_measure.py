@@ -26,7 +26,7 @@ from threadpoolctl import OpenBLASController, threadpool_info, threadpool_limits
 import thud
 from thud import cli
 from thud.base.errors import ReportWarning
-from thud.recordings import checkpoint as kept, measure_drops as measurement
+from thud.recordings import checkpoint, measure_drops
 from thud.recordings.config import Config, checked_config, read_config
 from thud.recordings.measure_drops import measure_window
 from thud.recordings.recorded_levels import measure_levels
@@ -156,7 +156,7 @@ def test_bad_recordings_get_one_sentence(
 def test_source_and_limits_are_checked_before_anything_is_measured(
     config: Config, words: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(measurement, "find_windows")
+    monkeypatch.delattr(measure_drops, "find_windows")
     signal = Signal.from_array(np.ones(100), 24_000)
     with pytest.raises(thud.InputError, match=words):
         thud.Recording.from_signals([signal], config)
@@ -361,7 +361,7 @@ def test_interrupted_measurement_goes_on_where_it_ended(
 ) -> None:
     file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
     folder = tmp_path / "results"
-    monkeypatch.setattr(kept, "INTERVAL", -1.0)
+    monkeypatch.setattr(checkpoint, "INTERVAL", -1.0)
     measured: list[str] = []
 
     def measure(window: Window, config: Config) -> Drop:
@@ -370,7 +370,7 @@ def test_interrupted_measurement_goes_on_where_it_ended(
         measured.append(window.name)
         return measure_window(window, config)
 
-    monkeypatch.setattr(measurement, "measure_window", measure)
+    monkeypatch.setattr(measure_drops, "measure_window", measure)
     with pytest.raises(KeyboardInterrupt):
         thud.read_recording(file, config=config, keep=folder)
     parts = sorted(folder.iterdir())
@@ -390,7 +390,7 @@ def test_interrupted_measurement_goes_on_where_it_ended(
         thud.read_recording(file, config=replace(config, mass=2.4), keep=folder)
     assert len(measured) == 2
     measured.clear()
-    monkeypatch.setattr(measurement, "measure_window", measure_window)
+    monkeypatch.setattr(measure_drops, "measure_window", measure_window)
     whole = thud.read_recording(file, config=config)
     assert [one.contact_time for one in found.drops] == [one.contact_time for one in whole.drops]
     np.testing.assert_array_equal(found.levels(), whole.levels())
@@ -405,10 +405,10 @@ def test_drops_that_cannot_be_kept_at_an_interrupt_are_told(
     def fail(*_: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(kept, "replace_file", fail)
+    monkeypatch.setattr(checkpoint, "replace_file", fail)
 
     def measure() -> None:
-        with kept.Checkpoint(tmp_path) as drops:
+        with checkpoint.Checkpoint(tmp_path) as drops:
             drops.open(signal, Config())
             drops.add(0, drop)
             raise KeyboardInterrupt
@@ -436,7 +436,7 @@ def test_measurement_interrupted_in_its_report_is_not_measured_again(
     def stop(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(measurement, "measure_window", measure)
+    monkeypatch.setattr(measure_drops, "measure_window", measure)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(results, "levels_csv", stop)
         assert cli.main([*command, str(tmp_path / "out")]) != 0
@@ -474,7 +474,7 @@ def test_drops_that_held_more_than_their_force() -> None:
 
 def test_drops_are_measured_in_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     file, config = FOLDER / "three_drops.flac", read_config(FOLDER / "lab.toml")
-    monkeypatch.setattr(measurement, "MIN_FOR_POOL", 1)
+    monkeypatch.setattr(measure_drops, "MIN_FOR_POOL", 1)
     one, two = (thud.read_recording(file, config=config, workers=n) for n in (1, 2))
     assert [drop.name for drop in two.drops] == [drop.name for drop in one.drops]
     np.testing.assert_allclose(two.levels(), one.levels(), rtol=0, atol=1e-9)

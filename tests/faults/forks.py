@@ -211,12 +211,12 @@ def _be_humble() -> None:
 
 def _log_work() -> None:
     """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
-    from thud.recordings import checkpoint as kept
+    from thud.recordings import checkpoint
     from thud.studies import backends, blocks, dataset, sets
 
     sets._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
     backends.SILENCE, backends.LOOK = 4.0, 0.5
-    kept.INTERVAL = 0.0
+    checkpoint.INTERVAL = 0.0
 
     class Frozen(dataset.datetime):  # type: ignore[name-defined, misc]
         @classmethod
@@ -240,7 +240,7 @@ def _log_work() -> None:
         setattr(kind, name, log)
 
     logged(blocks.Blocks, "keep")
-    logged(kept.Checkpoint, "add")
+    logged(checkpoint.Checkpoint, "add")
 
 
 def _serve() -> None:
