@@ -452,6 +452,14 @@ def test_characters_of_any_installed_font_are_not_missing(
     assert missing_characters("a 建") == "a建"
 
 
+@pytest.mark.filterwarnings("ignore::thud.errors.ReportWarning")
+def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(thud.InputError, match=naming("report.html")):
+        one.report(tmp_path)
+    assert (tmp_path / "report.html").read_text() == "mine"
+
+
 def test_equal_recordings_give_equal_pages(one: Recording, tmp_path: Path) -> None:
     pytest.importorskip(
         "weasyprint", reason="the extra report is not installed", exc_type=ImportError
