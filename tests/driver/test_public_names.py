@@ -75,7 +75,8 @@ def test_calls_of_each_model_are_those_of_solve() -> None:
     assert list(options) == [f"{kind.__name__}Options" for kind in MODELS.values()]
     for kind in MODELS.values():
         assert options[f"{kind.__name__}Options"] == {f.name for f in dataclasses.fields(kind)}
-    calls = [node.args for node in tree.body if isinstance(node, ast.FunctionDef)]
+    of_case, *calls = (node.args for node in tree.body if isinstance(node, ast.FunctionDef))
+    assert ast.unparse(of_case) == "ball: Case"
     for call in calls:
         names = [argument.arg for argument in (*call.args, *call.kwonlyargs)]
         assert names == ["ball", "drop", "model"]

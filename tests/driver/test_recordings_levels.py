@@ -188,6 +188,17 @@ def test_many_drops_at_once_are_those_one_by_one() -> None:
         np.testing.assert_allclose(found.uncertainty, alone.uncertainty, rtol=1e-9)
 
 
+def test_uncertain_density_adds_to_the_energy_of_a_band() -> None:
+    drop, bands = make_drop(5.0), thud.get_bands()
+    background = drop.contact.background
+    # Two draws of the white noise, an eighth to either side of their mean.
+    draws = background.draws * np.array([[7 / 8], [9 / 8]])
+    contact = replace(drop.contact, background=replace(background, draws=draws))
+    exact, doubtful = band_noise([drop, replace(drop, contact=contact)], bands)
+    np.testing.assert_allclose(doubtful[:, 0], exact[:, 0])
+    np.testing.assert_allclose(doubtful[:, 1], np.hypot(exact[:, 1], exact[:, 0] / 8))
+
+
 def test_noise_that_rises_towards_0_hz() -> None:
     """Brown noise, 1/f**2, less its prediction from the quiet, against realisations."""
     rate, count, density = 8000.0, 60, 100.0

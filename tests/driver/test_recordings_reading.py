@@ -28,7 +28,9 @@ from thud.recordings import calibration
 from thud.recordings.calibration import calibrate
 from thud.recordings.channel import BoundedFile
 from thud.recordings.config import PlateConfig, read_config
+from thud.recordings.excursion import Excursions, doubt, scan
 from thud.recordings.force_units import Calibration, newtons_per_unit
+from thud.recordings.grid import even_grid
 from thud.recordings.signal import Signal
 from thud.recordings.signal_files import open_signals
 
@@ -191,6 +193,23 @@ def test_unclear_polarity_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=naming("noise.wav", "sign", "polarity")):
         open_signals(path)
     assert open_signals(path, polarity="positive")
+
+
+def test_quiet_is_found_at_either_end() -> None:
+    # A pulse on 500 N, the begin or the end of which is missing.
+    force = 500 + 1500 * np.sin(np.linspace(0.4, np.pi, 985))
+    for record in (
+        np.append(force, np.full(15, 500.0)),
+        np.append(np.full(15, 500.0), force[::-1]),
+    ):
+        seen = scan(lambda start, stop, one=record: one[start:stop], record.size, "t.csv")
+        assert seen.quiet == 500
+
+
+def test_polarity_is_doubted_from_half_as_much_again_on() -> None:
+    for low, expected in ((-1490.0, False), (-1510.0, True)):
+        told = doubt(Excursions(low, 1000.0, 0.0), 1.0, "t.csv", assumed=False)
+        assert any("polarity" in one for one in told) == expected
 
 
 def test_wrong_polarity_is_doubted(tmp_path: Path) -> None:
@@ -392,6 +411,26 @@ def test_rounded_times_are_told(tmp_path: Path) -> None:
     assert signal.sample_rate == pytest.approx(44100, rel=4e-6)
     (step,) = signal.steps
     assert re.search(naming("times", "1e-06 s"), step)
+
+
+def test_rounded_times_miss_the_grid_by_a_digit_at_most() -> None:
+    exact = 1.25e-4 * np.arange(1001)
+    rounded = np.floor(exact / 1e-5 + 1e-6) * 1e-5
+    _, step, (told,) = even_grid(rounded, "t.csv")
+    assert step == pytest.approx(1.25e-4, rel=1e-6)
+    assert re.search(naming("1e-05 s"), told)
+    # Half a digit below the time, and another one below the mean.
+    rounded[501] -= 1e-5
+    with pytest.raises(InputError, match=naming("t.csv", "row 502")):
+        even_grid(rounded, "t.csv")
+
+
+def test_digits_of_many_times_are_counted_at_even_and_odd_rows() -> None:
+    time = np.arange(70_000.0)
+    time[1::4] += 0.05
+    time[3::4] -= 0.05
+    with pytest.raises(InputError, match=naming("evenly")):
+        even_grid(time, "t.csv")
 
 
 def table_of(row: Callable[[int, float, float], str]) -> str:

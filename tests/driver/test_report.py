@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from conftest import naming
 from fontTools.ttLib import TTFont
+from matplotlib import font_manager
 from synthetic import make_recording
 from test_figure_look import assert_clean
 
@@ -30,6 +31,7 @@ from thud.recordings.config import Config, PlateConfig
 from thud.recordings.estimates import Estimate
 from thud.recordings.read_recording import read_recording
 from thud.recordings.recording import Recording
+from thud.report import fonts
 from thud.report.contents import read_date, report_data
 from thud.report.fonts import clip, count_lines, missing_characters
 from thud.report.notes import fit_lines, group_sentences
@@ -438,6 +440,26 @@ def test_missing_font_is_told(
     with pytest.warns(ReportWarning, match=naming("font", "建材")):
         write_report(recording, tmp_path)
     assert not missing_characters("µ − ± ≤ Ω ° … Институт Ελλάς Šč")
+
+
+def test_characters_of_any_installed_font_are_not_missing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    installed = [font_manager.findfont("DejaVu Sans")]
+    monkeypatch.setattr(font_manager, "findSystemFonts", lambda: installed)
+    assert missing_characters("a 建") == "建"
+    monkeypatch.setattr(fonts, "_widths", dict)
+    assert missing_characters("a 建") == "建"
+    installed.clear()
+    assert missing_characters("a 建") == "a建"
+
+
+@pytest.mark.filterwarnings("ignore::thud.errors.ReportWarning")
+def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
+    (tmp_path / "report.html").write_text("mine")
+    with pytest.raises(thud.InputError, match=naming("report.html")):
+        one.report(tmp_path)
+    assert (tmp_path / "report.html").read_text() == "mine"
 
 
 def test_equal_recordings_give_equal_pages(one: Recording, tmp_path: Path) -> None:

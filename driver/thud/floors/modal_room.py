@@ -365,7 +365,7 @@ def _spectrum(source: Impact | Recording, duration: float) -> tuple[Array, Compl
     n_sample = 2 * math.ceil(SAMPLE_RATE / 2 * max(duration, len(force) / source.sample_rate))
     omega = 2 * np.pi * np.arange(n_sample // 2 + 1) * SAMPLE_RATE / n_sample
     # The same period in samples of the force; rounding moves a frequency by less than 1e-5.
-    count = max(round(n_sample * source.sample_rate / SAMPLE_RATE), len(force))
+    count = round(n_sample * source.sample_rate / SAMPLE_RATE)
     return omega, np.fft.rfft(force, count)[: len(omega)] / source.sample_rate
 
 
