@@ -1,4 +1,4 @@
-"""Make schema and typed calls in driver/thud, and docs/keys.md, from the library's schema.
+"""Make what follows from the library's schema: classes, typed calls, public names, reference.
 
 Run by ``./bootstrap schema``: thud --schema | python driver/generate_schema.py [DIRECTORY]
 """
@@ -186,10 +186,10 @@ def public_names(schema: Entry) -> list[str]:
 
 
 def with_public_names(stub: str, schema: Entry) -> str:
-    """Return the stub of the package with the names of the schema, the last that it imports."""
-    begin = "from .base._schema import (\n"
-    head = stub[: stub.index(begin)] + begin
-    return head + "".join(f"    {name} as {name},\n" for name in public_names(schema)) + ")\n"
+    """Return the stub of the package with the names of the schema."""
+    head, begin, rest = stub.partition("from .base._schema import (\n")
+    names = "".join(f"    {name} as {name},\n" for name in public_names(schema))
+    return head + begin + names + rest[rest.index(")") :]
 
 
 def python_module(schema: Entry) -> str:

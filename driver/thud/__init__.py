@@ -10,10 +10,20 @@ from lazy_loader import attach_stub
 
 from thud.base.bridge import version
 from thud.base.checks import suggestion
+from thud.base.errors import InputError
 from thud.base.extras import require_extra
 
 __version__ = version()
-_attribute, __dir__, __all__ = attach_stub(__name__, __file__)
+_attribute, _, __all__ = attach_stub(__name__, __file__)
+
+
+class _MissingError(InputError, AttributeError):
+    """A name whose packages are not installed: `hasattr` and `help` do without it."""
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return [*__all__, "__version__"]
 
 
 def __getattr__(name: str) -> object:
@@ -21,5 +31,8 @@ def __getattr__(name: str) -> object:
     if name not in __all__:
         message = f"module 'thud' has no attribute {name!r}{suggestion(name, __all__)}"
         raise AttributeError(message)
-    with require_extra("studies"):
-        return _attribute(name)
+    try:
+        with require_extra("studies"):
+            return _attribute(name)
+    except InputError as error:
+        raise _MissingError(str(error)) from error

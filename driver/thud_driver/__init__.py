@@ -92,7 +92,7 @@ class _Interrupt:
             _end(number, frame)
 
     def show_lost(self, lost: sys.UnraisableHookArgs) -> None:
-        """Show an error that could not be raised; objects half made at an interrupt have some."""
+        """Print errors of destructors, except after an interrupt: half-built objects have some."""
         if not self.number:
             sys.__unraisablehook__(lost)
 

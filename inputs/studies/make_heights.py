@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import thud
-from thud.impact import compute
+from thud.impact.compute import compute
 
 SEED = 5
 QUIET = 0.04  # s

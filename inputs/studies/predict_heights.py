@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 import thud
-from thud.impact import compute
+from thud.impact.compute import compute
 
 HEIGHTS = (0.1, 1.0, 1.6)  # m
 # Relative step of the derivatives: it averages over the release of single nodes of the mesh.

@@ -1,4 +1,4 @@
-!> Interrupts of long work: a handler of signals notes them in system.c; loops ask here.
+!> Interrupt flag: set by the signal handler in system.c, polled by long loops.
 module thud_interrupt
    use, intrinsic :: iso_c_binding, only: c_int
    use thud_error, only: error_type, signal_base

@@ -18,7 +18,7 @@
 #include <time.h>
 #include <unistd.h>
 
-// Number of the signal that asks to end the work, 0 for none; loops that poll it, by the module thud_interrupt, end theirs.
+// Number of the signal that asks to end the work, 0 for none; polled by long loops through the module thud_interrupt.
 volatile sig_atomic_t thud_latest_signal = 0;
 
 static volatile sig_atomic_t deferred = 0;

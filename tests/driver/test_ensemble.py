@@ -16,7 +16,7 @@ from hypothesis import given, settings, strategies as st
 
 import thud
 from thud.impact import ensemble
-from thud.impact.quantities import FURTHER
+from thud.impact.quantities import FLOOR_QUANTITIES
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +53,7 @@ def single(parameters: dict[str, np.ndarray], i: int, **options: object) -> thud
 def results(ensemble: thud.Ensemble) -> dict[object, np.ndarray]:
     """Return everything that an ensemble computes but the forces, levels by force and bands."""
     left_out = {"case", "parameters", "sample_rate", "elastic_force", "floor_force", "levels"}
-    left_out |= {"contact_levels", *FURTHER}
+    left_out |= {"contact_levels", *FLOOR_QUANTITIES}
     names = [f.name for f in dataclasses.fields(ensemble) if f.name not in left_out]
     return {name: getattr(ensemble, name) for name in names} | ensemble.levels
 

@@ -27,7 +27,7 @@ from matplotlib.transforms import Bbox
 from PIL import Image
 
 import thud
-from thud import cli, plot
+from thud import cli, plot, report
 from thud.plot.style import COLOURS, line_style, marker_style
 
 if TYPE_CHECKING:
@@ -273,7 +273,10 @@ def test_commands_without_a_matplotlib_that_works_keep_the_results(
 
 def test_every_figure_is_drawn_in_its_own_style() -> None:
     found = 0
-    for module in pkgutil.iter_modules(plot.__path__, f"{plot.__name__}."):
+    for module in (
+        *pkgutil.iter_modules(plot.__path__, "thud.plot."),
+        *pkgutil.iter_modules(report.__path__, "thud.report."),
+    ):
         if module.name == "thud.plot.style":
             continue
         for name, draw in vars(importlib.import_module(module.name)).items():

@@ -130,6 +130,7 @@ def test_executable_knows_what_was_added(copy: Path, tmp_path: Path) -> None:
     assert b"&linear_spring" in keys.stdout
 
 
+@pytest.mark.slow
 def test_python_knows_what_was_added(copy: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": str(copy / "driver")}
     done = subprocess.run(

@@ -11,6 +11,7 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
+from thud.comparison.comparison import read_all
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", README, re.DOTALL)
@@ -27,7 +28,7 @@ def test_first_result_is_that_of_the_commands() -> None:
     cases = re.search(r"^first=\((.*)\)$", (REPOSITORY / "bootstrap").read_text(), re.MULTILINE)
     assert cases is not None
     paths = [str(REPOSITORY / path) for path in cases[1].split()]
-    page = thud.compare(thud.read_all(paths))
+    page = thud.compare(read_all(paths))
     shown = [line.split() for line in shown_after("rubber_ball_100cm").splitlines()]
     expected = [[word for cell in row for word in cell.split()] for row in page.table()]
     timed = [line for line in shown if line[:2] != ["computed", "in,"]][: len(expected) - 1]

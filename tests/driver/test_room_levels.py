@@ -339,7 +339,7 @@ def test_tables_hold_the_numbers_of_the_survey() -> None:
         ("reverberation_time_s", found.reverberation_time),
     ):  # fmt: skip
         assert columns[title] == pytest.approx(values, abs=1e-7)
-    assert columns["is_maximum"].tolist() == [0, 0, 0, 1]
+    assert columns["is_upper_bound"].tolist() == [0, 0, 0, 1]
     both, alone = rating_table(found), found.rating.rows()
     assert [row[:2] for row in both[1:]] == alone[1:]
     assert found.standardised_rating is not None

@@ -56,7 +56,7 @@ def test_grid_holds_what_single_drops_give() -> None:
                 cell = found.sel(
                     wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
                 )
-                for name in evaluation.OUTCOMES:
+                for name in evaluation.SCALAR_QUANTITIES:
                     assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
                 for force in ("elastic", "floor"):
                     np.testing.assert_allclose(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import thud
+from thud.comparison.comparison import read_all
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ def fast_calls(folder: Path) -> Calls:
             thud.fit_compression(pressed.deflection, pressed.force, model="modal_ball")
         ),
         "read_case": lambda: str(thud.read_case(folder / "mine.nml")),
-        "read_all": lambda: str(thud.read_all([folder / "mine.nml"])),
+        "read_all": lambda: str(read_all([folder / "mine.nml"])),
         "write_case": write,
         "read_study": lambda: thud.read_study({"parameters": HEIGHTS}).name,
         "refused": refused,

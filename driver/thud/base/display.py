@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from abc import ABC, abstractmethod
 from contextlib import contextmanager
+from html import escape
 from typing import TYPE_CHECKING
 
 from thud.base.errors import ReportWarning
@@ -64,6 +65,4 @@ def html_table(rows: Iterable[Sequence[str]]) -> str:
 
 
 def _escaped(text: str) -> str:
-    from html import escape
-
     return escape(text)

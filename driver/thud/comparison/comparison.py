@@ -259,7 +259,10 @@ def _require_same_drop(impacts: Mapping[str, Impact | Recording]) -> None:
 
 def _named(impacts: object) -> dict[str, Case | Impact | Recording]:
     """Return what is compared by name, checked."""
-    allowed = "one or more cases, impacts or recordings, by name or in a list (files: read_all)"
+    allowed = (
+        "one or more cases, impacts or recordings, by name or in a list "
+        "(files: read_case, read_recording)"
+    )
     if isinstance(impacts, Mapping):
         pairs = list(impacts.items())
     else:

@@ -298,7 +298,7 @@ def levels_csv(found: RoomLevels) -> bytes:
     columns = {
         "nominal_Hz": found.frequency, "mean_dB": found.measured, "spread_dB": found.spread,
         "background_dB": found.background, "level_dB": found.level,
-        "is_maximum": found.is_upper_bound.astype(int),
+        "is_upper_bound": found.is_upper_bound.astype(int),
         "reverberation_time_s": found.reverberation_time, "standardised_dB": found.standardised,
     }  # fmt: skip
     known = {title: values for title, values in columns.items() if values is not None}

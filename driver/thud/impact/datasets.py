@@ -13,7 +13,15 @@ import xarray as xr
 from thud.base import _schema as schema
 from thud.base.bridge import compiler, version
 from thud.case.keys import find_key, users
-from thud.impact.quantities import ALL, FURTHER, LEVELS, MEANINGS, ROOM_BAND, ROOM_LEVEL
+from thud.impact.quantities import (
+    ALL_QUANTITIES,
+    CONTACT_LEVEL,
+    FLOOR_QUANTITIES,
+    LEVELS,
+    ROOM_BAND,
+    ROOM_LEVEL,
+    SET_QUANTITIES,
+)
 from thud.level.levels import BANDWIDTHS, get_bands
 from thud.level.rating import rated_bands
 
@@ -41,11 +49,15 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
         words = attributes(unit.replace("_per_", "/"), name.replace("_", " "))
         variables[name] = ("time", values, words)
     for name, (force, bands) in LEVELS.items():
-        variables[name] = (bands, impact.levels(bands, force=force), attributes(*MEANINGS[name]))
+        variables[name] = (
+            bands,
+            impact.levels(bands, force=force),
+            attributes(*SET_QUANTITIES[name]),
+        )
     for name, entry in schema.SCALARS.items():
         variables[name] = ((), getattr(impact, name), attributes(*entry))
     conforms = impact.conformity().conforms
-    variables["conforms"] = ((), conforms, attributes(*MEANINGS["conforms"]))
+    variables["conforms"] = ((), conforms, attributes(*SET_QUANTITIES["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     remarks = {"remarks": "\n".join(impact.remarks)}
     found = xr.Dataset(variables, coordinates, origin(impact.case) | impact.facts | remarks)
@@ -62,16 +74,16 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
         words = attributes(key.unit, key.meaning)
         coordinates[coordinate(name, key)] = ("set", values, words)
     variables: dict[str, Any] = {}
-    for name, entry in MEANINGS.items():
+    for name, entry in SET_QUANTITIES.items():
         if name not in LEVELS:
             variables[name] = ("set", getattr(ensemble, name), attributes(*entry))
         elif LEVELS[name] in ensemble.levels:
             values = ensemble.levels[LEVELS[name]]
             variables[name] = (("set", LEVELS[name][1]), values, attributes(*entry))
     for bands, level in ensemble.contact_levels.items():
-        words = attributes("dB", "force exposure level on the floor that moves, re 1 N and 1 s")
+        words = attributes(*CONTACT_LEVEL)
         variables[f"contact_{bands}_level"] = (("set", bands), level, words)
-    for name, (unit, meaning) in FURTHER.items():
+    for name, (unit, meaning) in FLOOR_QUANTITIES.items():
         if (values := getattr(ensemble, name)) is not None:
             dimensions = ("set", ROOM_BAND) if name == ROOM_LEVEL else ("set",)
             variables[name] = (dimensions, values, attributes(unit, meaning))
@@ -97,7 +109,7 @@ def attributes(unit: str, meaning: str) -> dict[str, str]:
 def coordinate(parameter: str, key: Key) -> str:
     """Return the name of a parameter's coordinate; some keys are named as results are."""
     name = parameter.replace("(", "_").replace(".", "_").rstrip(")")
-    return f"{key.group}_{name}" if name in ALL else name
+    return f"{key.group}_{name}" if name in ALL_QUANTITIES else name
 
 
 def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact, history
 from thud.impact.mobility import mobility
-from thud.impact.quantities import FURTHER
+from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import force_exposure_levels
 
 if TYPE_CHECKING:
@@ -133,10 +133,10 @@ class FloorImpact(Impact):
         energies = [f"{value:.3g}" for value in energy.by_motion]
         return [head, *zip((f"{f:g}" for f in energy.frequency), *cells, energies, strict=True)]
 
-    def histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the histories by name and unit, shape (n_sample,), those of the floor too."""
+    def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
+        """Return the force on a rigid floor and the motion of this one."""
         points = enumerate(self.point_velocity, 1)
-        return super().histories() | {
+        return {
             "blocked_force_N": self.blocked_force,
             "floor_displacement_m": self.floor_displacement,
             "floor_velocity_m_per_s": self.floor_velocity,
@@ -145,7 +145,8 @@ class FloorImpact(Impact):
 
     def to_xarray(self) -> xr.Dataset:
         """Return the dataset of an impact, see `Impact.to_xarray`, with the work on the floor."""
-        words = {"units": "J", "long_name": FURTHER["floor_work"][1]}
+        unit, meaning = FLOOR_QUANTITIES["floor_work"]
+        words = {"units": unit, "long_name": meaning}
         return super().to_xarray().assign(floor_work=((), self.floor_work, words))
 
     def plot(self) -> Figure:

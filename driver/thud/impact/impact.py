@@ -114,7 +114,7 @@ class Impact(Displayed):
 
     @property
     def measured_contact_time(self) -> float:
-        """Contact time as a recording gives it (`thud.contact_time`), s."""
+        """Contact time as a recording gives it (`thud.impact.contact_time`), s."""
         first = round(self.touch_time * self.sample_rate)
         last = math.ceil((self.touch_time + self.exact_contact_time) * self.sample_rate)
         begin, end = contact_span(self.floor_force[first : last + 1], self.sample_rate)
@@ -250,13 +250,19 @@ class Impact(Displayed):
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the histories by name and unit, shape (n_sample,)."""
-        forces = {"elastic_force": self.elastic_force, "floor_force": self.floor_force}
         return {
             "deflection_m": self.deflection,
             "velocity_m_per_s": self.velocity,
-            **{f"{name}_N": values for name, values in (forces | self.parts).items()},
+            "elastic_force_N": self.elastic_force,
+            "floor_force_N": self.floor_force,
+            **self._floor_histories(),
+            **{f"{name}_N": values for name, values in self.parts.items()},
             **self.channels,
         }
+
+    def _floor_histories(self) -> dict[str, NDArray[np.float64]]:
+        """Return what a floor that moves adds to the histories."""
+        return {}
 
 
 def history(case: Case, found: Bundle, remarks: tuple[str, ...]) -> dict[str, Any]:

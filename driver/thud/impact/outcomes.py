@@ -10,7 +10,7 @@ import numpy as np
 from thud.base._schema import OUTCOMES, SCALARS
 from thud.base.display import Displayed
 from thud.base.extras import require_extra
-from thud.impact.quantities import FURTHER, ROOM_LEVEL
+from thud.impact.quantities import FLOOR_QUANTITIES, ROOM_LEVEL
 from thud.level.levels import BANDWIDTHS
 
 if TYPE_CHECKING:
@@ -110,7 +110,7 @@ class Ensemble(Displayed):
         """Return header and rows of text."""
         rows: list[tuple[str, ...]] = [("", "minimum", "median", "maximum")]
         units = {name: SCALARS[name][0] for name in OUTCOMES} | {"margin": "dB"}
-        units |= {name: unit for name, (unit, _) in FURTHER.items() if name != ROOM_LEVEL}
+        units |= {name: unit for name, (unit, _) in FLOOR_QUANTITIES.items() if name != ROOM_LEVEL}
         for name, unit in units.items():
             values = getattr(self, name)
             if values is None:

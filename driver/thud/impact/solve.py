@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     ball: Ball | Case | None = None,
     drop: Drop | None = None,
-    model: ModelName | ModelOptions = "hollow_sphere",
+    model: ModelName | ModelOptions | None = None,
     *,
-    sample_rate: float = Sampling.sample_rate,
-    duration: float = Sampling.duration,
-    substeps: int = Sampling.substeps,
+    sample_rate: float | None = None,
+    duration: float | None = None,
+    substeps: int | None = None,
     floor: FloorOptions | None = None,
     **options: object,
 ) -> Impact:
@@ -32,11 +32,12 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     Parameters
     ----------
     ball, drop
-        By default the rubber ball of the paper, from 1 m. Or a `Case`, which holds all the rest.
+        By default the rubber ball of the paper, from 1 m. `ball` may instead be a `Case`; then no
+        other argument is allowed.
     model
-        ``"hollow_sphere"`` (the analytical model of the paper), ``"modal_ball"`` (the improved
-        one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``;
-        or an object of the classes below, which holds the options.
+        ``"hollow_sphere"`` (the analytical model of the paper, the default), ``"modal_ball"`` (the
+        improved one), ``"finite_element"``, ``"measured_modes"``, ``"hunt_crossley"`` or
+        ``"two_mass"``; or an object of the classes below, which holds the options.
     sample_rate
         Samples per second, Hz.
     duration
@@ -68,17 +69,18 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     PlausibilityWarning
         As `Impact.remarks`.
     """
-    sampling = Sampling(sample_rate, duration, substeps)
+    sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
+    given = {name: value for name, value in sampling.items() if value is not None}
     if isinstance(ball, Case):
-        if drop or floor or options or (model, sampling) != ("hollow_sphere", Sampling()):
+        if given or options or not drop is floor is model is None:
             refuse("solve() takes a case or the parts of one, not both", "solve(case)")
         case = ball
     else:
         case = Case(
             ball=Ball() if ball is None else ball,
             drop=Drop() if drop is None else drop,
-            model=new_model(model, options),
-            sampling=sampling,
+            model=new_model(model or "hollow_sphere", options),
+            sampling=Sampling(**given),  # type: ignore[arg-type]
             floor=floor,
         )
     impact = compute(case)

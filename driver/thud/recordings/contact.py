@@ -77,7 +77,7 @@ class Contact(Immutable):
     touch, release : Estimate
         First touch and release.
     begin, end : Estimate
-        Times between which the contact lasts (`thud.contact_time`).
+        Times between which the contact lasts (`thud.impact.contact_time`).
     peak : float
         Maximum of the force below 1.25 kHz, less the offset, N: a scale.
     span : tuple of int

@@ -66,7 +66,7 @@ class Drop(Immutable):
         First sample of the contact with its margins, and the one behind it: levels are those of
         ``force[gate[0]:gate[1]]``.
     contact_time, restitution, peak_force, impulse, effective_mass : Estimate
-        In s (`thud.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN where not known.
+        In s (`thud.impact.contact_time`), 1, N (below 1.25 kHz), N s and kg; NaN where not known.
     restitution_shared : dict of str to float
         Standard uncertainties that calibration, mass and drop height make of the restitution of
         all drops alike, beside that stated; signed.

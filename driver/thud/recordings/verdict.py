@@ -102,7 +102,7 @@ class CriterionResult(Immutable):
     Attributes
     ----------
     name, unit : str
-        As those of `thud.levels.Criterion`.
+        As those of `thud.Criterion`.
     quantity : Quantity
         Value and budget.
     lower, upper : float
@@ -154,7 +154,7 @@ class Verdict(Displayed):
     source : str
         Source whose limits apply.
     decisions : tuple of CriterionResult
-        One for each criterion, in the order of `thud.levels.judge`.
+        One for each criterion, in the order of `thud.judge`.
     """
 
     source: LimitsSource

@@ -177,7 +177,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
         "name": drop.name,
         "onset": drop.onset,
         **{name: _estimate(getattr(drop, name)) for name in estimates},
-        "restitution_by": drop.restitution_method,
+        "restitution_method": drop.restitution_method,
         "restitutions": {way: _estimate(one) for way, one in drop.restitutions.items()},
         "bounces": list(drop.bounces),
         "noise": drop.noise.deviation,

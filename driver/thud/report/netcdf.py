@@ -43,7 +43,7 @@ def netcdf(data: dict[str, Any]) -> bytes:
 
 
 def recording_dataset(data: dict[str, Any]) -> xr.Dataset:
-    """Return drops, levels and files of what `thud.report.data.report_data` returns."""
+    """Return drops, levels and files of what `thud.report.contents.report_data` returns."""
     drops, files = data["drops"], data["files"]
     onset = {"units": "s", "long_name": "time of first touch in the file"}
     variables: dict[str, Any] = {"onset": ("drop", _numbers(d["onset"] for d in drops), onset)}

@@ -46,7 +46,7 @@ def report_page(data: dict[str, Any], figures: Sequence[Figure], checksum: str) 
     Parameters
     ----------
     data
-        What `thud.report.data.report_data` returns.
+        What `thud.report.contents.report_data` returns.
     figures
         Two figures of column width, or those of them that can be drawn.
     checksum

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from thud.impact.datasets import band_coordinates, coordinate, origin, room_coordinates
-from thud.impact.quantities import ALL, BANDS, CONTACT, ROOM_BAND, ROOM_LEVEL
+from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
 from thud.studies.designs import makers
 from thud.studies.evaluation import level_names
@@ -38,7 +38,10 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
     `columns` holds their parameters by name, `found` what `evaluate` returns.
     """
     levels = level_names(study.case)
-    dimension: dict[str, str] = {**{name: bands for name, (_, bands) in levels.items()}, **CONTACT}
+    dimension: dict[str, str] = {
+        **{name: bands for name, (_, bands) in levels.items()},
+        **CONTACT_LEVELS,
+    }
     coordinates: dict[str, Any] = band_coordinates(bands for _, bands in levels.values())
     if ROOM_LEVEL in found:
         dimension[ROOM_LEVEL] = ROOM_BAND
@@ -52,7 +55,7 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
         )
     variables = {}
     for name, values in found.items():
-        unit, meaning = ALL[name]
+        unit, meaning = ALL_QUANTITIES[name]
         dimensions = ("set", dimension[name]) if name in dimension else ("set",)
         attributes: dict[str, Any] = {"units": unit, "long_name": meaning}
         if study.surrogate and name in study.surrogate.outputs:
@@ -96,7 +99,9 @@ def provenance(study: SetStudy) -> dict[str, str]:
 
 def in_order(dataset: xr.Dataset) -> xr.Dataset:
     """Return a dataset with variables in their order, which Zarr does not keep."""
-    results = {name: dataset.variables[name] for name in ALL if name in dataset.data_vars}
+    results = {
+        name: dataset.variables[name] for name in ALL_QUANTITIES if name in dataset.data_vars
+    }
     names = [*BANDS, *dataset.attrs["parameters"].split()]
     coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
     return xr.Dataset(results, coordinates, dataset.attrs)

@@ -10,7 +10,7 @@ import numpy as np
 from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.impact.ensemble import solve_many
-from thud.impact.quantities import FURTHER, LEVELS, OUTCOMES
+from thud.impact.quantities import FLOOR_QUANTITIES, LEVELS, SCALAR_QUANTITIES
 from thud.level.levels import BANDWIDTHS, peak_count
 
 if TYPE_CHECKING:
@@ -42,9 +42,9 @@ class Block:
 def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
-    Returns the `OUTCOMES`; the levels of `level_names`, dB, shape (n_set, n_band); ``margin``, dB;
-    ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and the like, and
-    `FURTHER`; of a surrogate ``doubtful``; where they are counted,
+    Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_set, n_band);
+    ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and the like, and
+    `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted,
     the ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
@@ -56,11 +56,11 @@ def evaluate(block: Block) -> Columns:
     if block.surrogate:
         return block.surrogate.predict(block.case, block.columns)
     found = solve_many(block.columns, block.case, threads=1, forces=block.counts_peaks)
-    columns: Columns = {name: getattr(found, name) for name in OUTCOMES}
+    columns: Columns = {name: getattr(found, name) for name in SCALAR_QUANTITIES}
     for name, (force, bands) in level_names(block.case).items():
         columns[name] = found.levels[force, bands]
     columns |= {f"contact_{bands}_level": level for bands, level in found.contact_levels.items()}
-    columns |= {n: v for n in FURTHER if (v := getattr(found, n)) is not None}
+    columns |= {n: v for n in FLOOR_QUANTITIES if (v := getattr(found, n)) is not None}
     if block.counts_peaks:
         forces = getattr(found, f"{block.case.levels.force}_force")
         columns["peaks"] = np.array(

@@ -11,7 +11,7 @@ import xarray as xr
 from thud.base.checks import refuse
 from thud.base.display import Displayed
 from thud.impact.datasets import coordinate
-from thud.impact.quantities import FURTHER
+from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
 from thud.studies.designs import MIN_SAMPLES
 from thud.studies.set_kind import SetKind
@@ -150,7 +150,7 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
     outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
     outputs |= {name.replace("_", " "): dataset[name].values for name in ("contact_time", peak)}
     # On a floor, what comes below it.
-    further = (name for name in FURTHER if name in dataset and dataset[name].ndim == 1)
+    further = (name for name in FLOOR_QUANTITIES if name in dataset and dataset[name].ndim == 1)
     outputs |= {name.replace("_", " "): dataset[name].values for name in further}
     dimension = len(study.parameters)
     usable = (dataset["status"].values == 0).reshape(-1, dimension + 2).all(axis=1)

@@ -145,10 +145,11 @@ contains
       type(criterion_type), intent(in) :: criterion
       !> Shown unit over SI unit.
       real(wp), intent(in) :: scale
-      character(len=18) :: text
+      character(len=:), allocatable :: text
 
       text = right(short(criterion%lower*scale), 7)
-      if (criterion%upper > criterion%lower) text = text(:7)//' to '//short(criterion%upper*scale)
+      if (criterion%upper > criterion%lower) text = text//' to '//short(criterion%upper*scale)
+      text = padded(text, 18)
    end function get_limits
 
    !> Minimum and maximum of a quantity, as a row.

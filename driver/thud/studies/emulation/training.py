@@ -15,7 +15,7 @@ from thud.base.errors import InputError, NumericalError
 from thud.base.extras import require_extra
 from thud.base.threads import one_thread
 from thud.case.keys import find_key
-from thud.impact.quantities import LEVELS, OUTCOMES
+from thud.impact.quantities import LEVELS, SCALAR_QUANTITIES
 from thud.studies.blocks import read_identity, result_names
 from thud.studies.computing import compute_sets
 from thud.studies.designs import unit_sets
@@ -157,7 +157,9 @@ def _learn(
             f"the number of peaks differs among the drops of the surrogate ({listed} drops)",
             "ranges in which it is the same: a count cannot be interpolated",
         )
-    quantities = {str(n): _decibels(str(n), v) for n, v in whole.items() if n in OUTCOMES | LEVELS}
+    quantities = {
+        str(n): _decibels(str(n), v) for n, v in whole.items() if n in SCALAR_QUANTITIES | LEVELS
+    }
     region = np.array([(p.low, p.high) for p in drops.parameters])
     points = unit_sets(drops.design, len(region), drops.size, drops.seed, 0, drops.size)
     points[:, region[:, 0] == region[:, 1]] = 0.0
