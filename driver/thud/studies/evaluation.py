@@ -43,9 +43,9 @@ def evaluate(block: Block) -> Columns:
     """Compute the sets of a block.
 
     Returns the `SCALAR_QUANTITIES`; the levels of `level_names`, dB, shape (n_set, n_band);
-    ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and the like, and
-    `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted,
-    the ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
+    ``margin``, dB; ``conforms``; ``status`` and ``reason``; on floors ``contact_octave_level`` and
+    the like, and `FLOOR_QUANTITIES`; of a surrogate ``doubtful``; where they are counted, the
+    ``peaks`` of the judged force. Sets with an error have no numbers: NaN.
     Raises InputError where this is another version of thud.
     """
     if block.version != version():
