@@ -454,11 +454,11 @@ def test_characters_of_any_installed_font_are_not_missing(
     assert missing_characters("a 建") == "a建"
 
 
-@pytest.mark.filterwarnings("ignore::thud.errors.ReportWarning")
+@pytest.mark.filterwarnings("ignore::thud.base.errors.ReportWarning")
 def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text("mine")
     with pytest.raises(thud.InputError, match=naming("report.html")):
-        one.report(tmp_path)
+        thud.write_report(one, tmp_path)
     assert (tmp_path / "report.html").read_text() == "mine"
 
 
