@@ -32,7 +32,7 @@ from thud.recordings.measure_drops import measure_window
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.signal import Signal
 from thud.recordings.verdict import average_estimates
-from thud.report import recording_files as results
+from thud.report import recording_files
 from thud.report.contents import report_data
 
 if TYPE_CHECKING:
@@ -438,7 +438,7 @@ def test_measurement_interrupted_in_its_report_is_not_measured_again(
 
     monkeypatch.setattr(measure_drops, "measure_window", measure)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(results, "levels_csv", stop)
+        patch.setattr(recording_files, "levels_csv", stop)
         assert cli.main([*command, str(tmp_path / "out")]) != 0
     assert len(measured) == 3
     assert cli.main([*command, str(tmp_path / "out")]) == 0

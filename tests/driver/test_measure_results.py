@@ -20,7 +20,7 @@ import thud
 from thud import cli
 from thud.base.errors import ReportWarning
 from thud.base.files import Results
-from thud.report import recording_files as results
+from thud.report import recording_files
 from thud.report.rows import HEAD
 from thud.report.write import PDF
 
@@ -55,8 +55,8 @@ def names(folder: Path) -> set[str]:
 
 
 def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Path) -> None:
-    results.save(noisy, Results(tmp_path))
-    head, *screen = results.table(noisy)
+    recording_files.save(noisy, Results(tmp_path))
+    head, *screen = recording_files.table(noisy)
     table = rows_of(tmp_path / "criteria.csv")
     data = json.loads((tmp_path / "report.json").read_text())
     rows = re.findall(r'<tr class="[a-z-]+">(.*?)</tr>', (tmp_path / "report.html").read_text())
@@ -95,7 +95,7 @@ def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Pat
 def test_levels_and_criteria_disagreed_on_uncertainty(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
-    results.save(noisy, Results(tmp_path), figures=False)
+    recording_files.save(noisy, Results(tmp_path), figures=False)
     rows = rows_of(tmp_path / "levels.csv")
     data = json.loads((tmp_path / "report.json").read_text())
     criteria = rows_of(tmp_path / "criteria.csv")[:5]
@@ -111,7 +111,7 @@ def test_levels_and_criteria_disagreed_on_uncertainty(
 def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
-    results.save(noisy, Results(tmp_path), figures=False)
+    recording_files.save(noisy, Results(tmp_path), figures=False)
     decisions = noisy.conformity().decisions
     for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
         assert bool(row["uncertainty"]) == bool(one.quantity.contributions), one.name
@@ -120,8 +120,8 @@ def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
 def test_criteria_are_counted_in_words() -> None:
     verdicts = ["conforms"] * 7 + ["does not conform"] * 2 + ["cannot be decided"]
     counts = "7 criteria conform, 2 do not conform, 1 cannot be decided"
-    assert results.count_verdicts(verdicts) == counts
-    assert results.count_verdicts(["cannot be decided"]) == "1 criterion cannot be decided"
+    assert recording_files.count_verdicts(verdicts) == counts
+    assert recording_files.count_verdicts(["cannot be decided"]) == "1 criterion cannot be decided"
 
 
 def test_report_of_another_recording_lay_beside_new_numbers(
@@ -163,9 +163,9 @@ def test_page_that_failed_left_half_of_the_results(
         raise MemoryError
 
     (tmp_path / "levels.csv").write_text("earlier")
-    monkeypatch.setattr(results, "page_contents", fail)
+    monkeypatch.setattr(recording_files, "page_contents", fail)
     with pytest.raises(MemoryError):
-        results.save(noisy, Results(tmp_path))
+        recording_files.save(noisy, Results(tmp_path))
     assert names(tmp_path) == {"levels.csv"}
     assert (tmp_path / "levels.csv").read_text() == "earlier"
 
@@ -176,7 +176,7 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
     drops = tuple(replace(drop, remarks=("long " * 20000,)) for drop in recording.drops)
     config = replace(recording.config, laboratory="Ωmega\udcff\0")
     recording = replace(recording, drops=drops, config=config)
-    results.save(recording, Results(tmp_path), figures=False)
+    recording_files.save(recording, Results(tmp_path), figures=False)
     with xr.open_dataset(tmp_path / "recording.nc") as found:
         assert found.sizes == {"drop": 3, "octave": 5, "third": 15, "file": 3}
         units = {"contact_time": "s", "restitution": "1", "peak_force": "N", "impulse": "N s"}
@@ -201,12 +201,12 @@ def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
 def test_without_xarray_a_remark_tells_what_is_left_out(
     noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    results.save(noisy, Results(tmp_path), figures=False)
+    recording_files.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES
     monkeypatch.setitem(sys.modules, "xarray", None)
     monkeypatch.delitem(sys.modules, "thud.report.netcdf")
     with pytest.warns(ReportWarning, match=naming("recording.nc", "xarray", "pip install")):
-        results.save(noisy, Results(tmp_path), figures=False)
+        recording_files.save(noisy, Results(tmp_path), figures=False)
     assert names(tmp_path) == FILES - {"recording.nc"}
 
 

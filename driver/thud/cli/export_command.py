@@ -28,17 +28,17 @@ KINDS = {
 
 def run_export(options: argparse.Namespace) -> int:
     """Write the blocked force in the formats that are asked for; return the exit code."""
-    from thud.export import force_files as export_force
+    from thud.export import force_files
 
     chosen = [kind for kind in KINDS if getattr(options, kind)]
     if not chosen:
         refuse("export: no format is given", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read(options.source, options.config)
     print_notes(source.remarks)
-    force = export_force.blocked_force(source, drop=options.drop, rate=options.rate)
+    force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
     contents: dict[str, bytes] = {}
     for kind in chosen:
-        ending, make = export_force.EXPORTS[kind]
+        ending, make = force_files.EXPORTS[kind]
         contents |= make(force, f"{force.name}{ending}")
     paths = results_of(options, "export", [options.source, options.config]).write(contents)
     if not options.quiet:

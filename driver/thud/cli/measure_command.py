@@ -32,11 +32,11 @@ def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings.checkpoint import Checkpoint
     from thud.recordings.read_recording import read_recording
-    from thud.report import recording_files as results
+    from thud.report import recording_files
 
     figures = not options.no_figures
     files = results_of(options, Path(options.drops[0]).stem, [*options.drops, options.config])
-    files.require(results.file_names(figures=figures))
+    files.require(recording_files.file_names(figures=figures))
     folder = files.folder
     # Drops stay until the results are written.
     with Checkpoint(folder) as kept:
@@ -60,19 +60,19 @@ def measure(options: argparse.Namespace) -> int:
             keep=kept,
         )
         verdict = recording.conformity()
-        results.save(recording, files, figures=figures)
+        recording_files.save(recording, files, figures=figures)
     if not options.quiet:
-        rows = results.drop_table(recording)
+        rows = recording_files.drop_table(recording)
         print(format_rows(rows[: SHOWN + 1]))
         if len(rows) > SHOWN + 1:
             print(f"and {len(rows) - SHOWN - 1} more drops, in {folder / 'report.json'}")
         print()
-        print(format_rows(results.table(recording)))
+        print(format_rows(recording_files.table(recording)))
         print()
-        for step in (*results.sentences(recording, "steps"), *recording.level_steps):
+        for step in (*recording_files.sentences(recording, "steps"), *recording.level_steps):
             print(f"  {step}")
-        print(f"  {results.verdict_sentence(recording)}")
-    told = results.sentences(recording, "remarks")
+        print(f"  {recording_files.verdict_sentence(recording)}")
+    told = recording_files.sentences(recording, "remarks")
     print_notes((*recording.doubts, *recording.outliers, *told))
     if not options.quiet:
         print(f"Results: {folder}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from thud.impact.datasets import band_coordinates, coordinate, origin, room_coordinates
+from thud.impact.datasets import band_coordinates, origin, room_coordinates
 from thud.impact.quantities import ALL_QUANTITIES, BANDS, CONTACT_LEVELS, ROOM_BAND, ROOM_LEVEL
 from thud.level.levels import get_bands
 from thud.studies.designs import makers
@@ -48,7 +48,7 @@ def new_dataset(study: SetStudy, columns: Columns, found: Columns) -> xr.Dataset
         coordinates |= room_coordinates()
     for parameter in study.parameters:
         values = _objects(columns[parameter.name])
-        coordinates[coordinate(parameter.name, parameter.key)] = (
+        coordinates[parameter.coordinate] = (
             "set",
             values,
             _attributes(study, parameter),
@@ -90,7 +90,7 @@ def provenance(study: SetStudy) -> dict[str, str]:
         "identity": json.dumps(study.identity),
         "design": study.design,
         "seed": str(study.seed) if study.size else "none",
-        "parameters": " ".join(coordinate(p.name, p.key) for p in study.parameters),
+        "parameters": " ".join(parameter.coordinate for parameter in study.parameters),
         **({"surrogate": study.surrogate.sentence} if study.surrogate else {}),
         **makers(study.design),
         **origin(study.case),
@@ -112,7 +112,7 @@ def grid_of(study: SetStudy, dataset: xr.Dataset) -> xr.Dataset:
     if study.design != "grid":
         return dataset
     coordinates = {name: dataset[name] for name in BANDS if name in dataset.coords}
-    names = [coordinate(parameter.name, parameter.key) for parameter in study.parameters]
+    names = [parameter.coordinate for parameter in study.parameters]
     axes = {
         name: (name, _objects(parameter.grid()), dataset[name].attrs)
         for name, parameter in zip(names, study.parameters, strict=True)

@@ -10,7 +10,6 @@ from thud.base.checks import refuse
 from thud.base.display import Displayed
 from thud.case.case import Case
 from thud.case.keys import DENSITY
-from thud.impact.datasets import coordinate
 from thud.impact.quantities import RATING
 from thud.studies.set_kind import SetKind
 from thud.studies.study import value_in, wall_volume
@@ -100,7 +99,7 @@ class DesignMapKind(SetKind[DesignMap]):
 
     def conclude(self, study: SetStudy, dataset: xr.Dataset) -> DesignMap:
         """Return the map of all sets."""
-        first, second = (coordinate(p.name, p.key) for p in study.parameters)
+        first, second = (parameter.coordinate for parameter in study.parameters)
         return DesignMap(dataset.load().sortby([first, second]), (first, second), *_mark(study))
 
     def draw(self, result: DesignMap) -> Figure:

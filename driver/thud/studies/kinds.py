@@ -9,8 +9,6 @@ from thud.base.checks import require_choice
 from thud.base.extras import require_extra
 
 if TYPE_CHECKING:
-    from types import ModuleType
-
     from thud.studies.kind import Kind
     from thud.studies.study import Source, Study
 
@@ -21,7 +19,7 @@ class KindInfo(NamedTuple):
     Attributes
     ----------
     module : str
-        Module of this package with a public function of the same name, and the `Kind` as ``KIND``.
+        Module of this package that holds the `Kind` as ``KIND``.
     help : str
         What the command line says of it.
     has_sets : bool
@@ -44,16 +42,14 @@ KINDS = {
 }
 
 
-def load(module: str) -> ModuleType:
-    """Return a module of this package. Raises InputError where its dependencies are missing."""
-    with require_extra("studies"):
-        return importlib.import_module(f"thud.studies.{module}")
-
-
 def get_kind(name: str) -> Kind[Any, Any]:
-    """Return a kind of study by name. Raises InputError for an unknown one."""
+    """Return a kind of study by name.
+
+    Raises InputError for an unknown one, and where its dependencies are missing.
+    """
     require_choice("kind", name, KINDS)
-    kind: Kind[Any, Any] = load(KINDS[name].module).KIND
+    with require_extra("studies"):
+        kind: Kind[Any, Any] = importlib.import_module(f"thud.studies.{KINDS[name].module}").KIND
     return kind
 
 

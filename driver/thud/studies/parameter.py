@@ -24,6 +24,7 @@ from thud.base.immutable import Plain
 from thud.base.key import Key
 from thud.base.units import power_of, scaled
 from thud.case.keys import Value, find_key
+from thud.impact.datasets import coordinate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -88,6 +89,11 @@ class Parameter(Plain):
     def numeric(self) -> bool:
         """Whether the values are numbers."""
         return self.key.kind in NUMBERS
+
+    @property
+    def coordinate(self) -> str:
+        """Name of its coordinate in datasets."""
+        return coordinate(self.name, self.key)
 
     @property
     def given(self) -> dict[str, object]:

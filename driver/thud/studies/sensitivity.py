@@ -10,7 +10,6 @@ import xarray as xr
 
 from thud.base.checks import refuse
 from thud.base.display import Displayed
-from thud.impact.datasets import coordinate
 from thud.impact.quantities import FLOOR_QUANTITIES
 from thud.level.levels import get_bands
 from thud.studies.designs import MIN_SAMPLES
@@ -183,7 +182,7 @@ def _indices(study: SetStudy, dataset: xr.Dataset) -> Sensitivity:
         variables["surrogate"] = ("output", known / spread, meaning)
     names = {
         "output": list(outputs),
-        "parameter": [coordinate(p.name, p.key) for p in study.parameters],
+        "parameter": [parameter.coordinate for parameter in study.parameters],
     }
     left_out = int((~usable).sum())
     return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)
