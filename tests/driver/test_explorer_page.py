@@ -183,7 +183,7 @@ def test_floor_and_room_are_shown(browser: Browser, server: Served) -> None:
     sync_api.expect(page.locator("#floor_title")).to_contain_text("joist floor")
     sync_api.expect(page.locator("#floor_words")).to_contain_text("energy into the floor 2.7")
     page.locator("#pin").click()
-    sync_api.expect(page.locator("#ball_words")).to_contain_text("times as large")
+    sync_api.expect(page.locator("#ball_words")).to_contain_text("magnified")
     page.locator("#floor").select_option("")
     sync_api.expect(page.locator("#variants li")).to_have_text(
         [
@@ -259,7 +259,7 @@ def test_page_recovers_when_the_server_returns(browser: Browser) -> None:
     port = address.partition("#")[0].strip("/").rpartition(":")[2]
     with serve("--port", port) as (address, _):
         sync_api.expect(page.locator("#message")).to_contain_text(
-            "open the address", timeout=10_000
+            "open the full address", timeout=10_000
         )
         # A new server has a new token, which the address brings into this browser.
         page.context.new_page().goto(address)

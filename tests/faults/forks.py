@@ -211,19 +211,20 @@ def _be_humble() -> None:
 
 def _log_work() -> None:
     """Make blocks small, wait shortly, keep each drop, freeze the date, write down what is kept."""
+    from thud.impact import datasets
     from thud.recordings import checkpoint
-    from thud.studies import backends, blocks, dataset, sets
+    from thud.studies import backends, blocks, sets
 
     sets._BLOCK_TIME = 0.005  # noqa: SLF001 - several blocks in a short time
     backends.SILENCE, backends.LOOK = 4.0, 0.5
     checkpoint.INTERVAL = 0.0
 
-    class Frozen(dataset.datetime):  # type: ignore[name-defined, misc]
+    class Frozen(datasets.datetime):  # type: ignore[name-defined, misc]
         @classmethod
         def now(cls, zone: object = None) -> Frozen:
             return cls(2000, 1, 1, tzinfo=zone)
 
-    dataset.datetime = Frozen  # type: ignore[attr-defined]
+    datasets.datetime = Frozen  # type: ignore[attr-defined]
 
     def logged(kind: type, name: str) -> None:
         usual = getattr(kind, name)
