@@ -24,8 +24,7 @@ CASES = {
 def flagship() -> Figure:
     """Draw forces and octaves of the three cases of `./bootstrap run`."""
     impacts = {
-        name: thud.solve(thud.read_case(INPUTS / f"{case}.nml"))
-        for name, case in CASES.items()
+        name: thud.solve(thud.read_case(INPUTS / f"{case}.nml")) for name, case in CASES.items()
     }
     figure = new_figure(2.4, 2 * WIDTH)
     history, octaves = figure.subplots(1, 2)
