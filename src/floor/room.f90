@@ -155,8 +155,8 @@ contains
 
    !> Predicts the level in the room.
    !>
-   !> The floor takes E = integral 2 |F|**2 Re Y df per band, the mean over positions. The energy is injected instantaneously: a
-   !> contact of 20 ms is short against the detector.
+   !> The floor takes E = integral 2 |F|**2 Re Y df per band, the mean over positions. The energy is injected
+   !> instantaneously: a contact of 20 ms is short against the detector.
    subroutine get_room_level(plate, conductance, room, bands, force_level, prediction)
       !> The plate that radiates.
       type(plate_type), intent(in) :: plate

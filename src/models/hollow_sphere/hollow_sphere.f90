@@ -122,7 +122,7 @@ contains
       shell = new_shell(ball, 0.0_wp, 0.0_wp)
       if (deflection(size(deflection)) >= shell%closing_deflection) then
          error = numerical_error('&compression: max_deflection = '//to_text(deflection(size(deflection))) &
-            //' m: the cavity collapses; allowed: less than the height of the cavity, '//to_text(shell%closing_deflection)//' m')
+            //' m: the cavity collapses; allowed: less than its height, '//to_text(shell%closing_deflection)//' m')
          return
       end if
       force = [(shell%stiffness*deflection(i)/2 + get_gas_force(shell, deflection(i)/2, caps=2), i=1, size(deflection))]
@@ -288,7 +288,7 @@ contains
       end if
       error = numerical_error('&drop: height = '//to_text(drop%height)//' m: the cavity collapses, ' &
          //fixed(1.0e3_wp*time, 3)//' ms after first touch its deflection is '//fixed(1.0e3_wp*state(at_deflection), 2) &
-         //' mm; allowed: less than the height of the cavity, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
+         //' mm; allowed: less than its height, '//fixed(1.0e3_wp*self%closing_deflection, 2)//' mm')
    end function get_failure
 
    !> Force history of one drop.
