@@ -171,6 +171,8 @@ def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
     assert (found.floor_force == default.floor_force).all()
     with pytest.raises(thud.InputError, match=naming("&model")):
         thud.solve(replace(more, model=None))
+    with pytest.raises(thud.InputError, match=naming("&model: name", "''", "'hollow_sphere'")):
+        thud.solve(model="")  # type: ignore[call-overload]
     for given in ({"drop": drop}, {"model": "hollow_sphere"}, {"duration": 0.05}, {"rings": 9}):
         with pytest.raises(thud.InputError, match=naming("solve(case)")):
             thud.solve(more, **given)  # type: ignore[call-overload]

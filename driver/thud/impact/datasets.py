@@ -114,14 +114,18 @@ def coordinate(parameter: str, key: Key) -> str:
 
 def band_coordinates(kinds: Iterable[BandSet]) -> dict[str, Any]:
     """Return the nominal frequencies of bands by the names of their dimensions."""
-    attributes = {"units": "Hz", "long_name": "nominal frequency"}
-    return {bands: (bands, get_bands(bands).nominal, attributes) for bands in kinds}
+    return {bands: _frequencies(bands, get_bands(bands).nominal) for bands in kinds}
 
 
 def room_coordinates() -> dict[str, Any]:
     """Return the nominal frequencies of the thirds in a room by the name of their dimension."""
-    attributes = {"units": "Hz", "long_name": "nominal frequency"}
-    return {ROOM_BAND: (ROOM_BAND, rated_bands(BANDWIDTHS[1]), attributes)}
+    return {ROOM_BAND: _frequencies(ROOM_BAND, rated_bands(BANDWIDTHS[1]))}
+
+
+def _frequencies(
+    dimension: str, nominal: NDArray[np.float64]
+) -> tuple[str, NDArray[np.float64], dict[str, str]]:
+    return dimension, nominal, attributes("Hz", "nominal frequency")
 
 
 def origin(case: Case) -> dict[str, str]:
