@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from thud.recordings.contact import Contact, Estimate, even_edges
+from thud.level.estimate import Estimate
+from thud.recordings.contact import Contact, even_edges
 from thud.recordings.estimates import Drop
 from thud.recordings.noise import Background, Noise
 

@@ -15,10 +15,11 @@ from synthetic import band_limited, coloured_noise, half_sine, make_drop, make_r
 
 import thud
 from thud.impact.contact_time import contact_span
+from thud.level.estimate import Estimate
 from thud.level.levels import record_force
-from thud.recordings.budgets import average_mass, average_restitution, drop_quantities
+from thud.recordings.budgets import average_mass, average_restitution, drop_estimates
 from thud.recordings.config import Config
-from thud.recordings.contact import Contact, Estimate, find_contact
+from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import find_windows
 from thud.recordings.estimates import Drop, measure_drop
 from thud.recordings.faults import repair
@@ -206,7 +207,7 @@ def test_disagreement_of_impulse_and_bounces_was_averaged_away() -> None:
     fits = ratio / (1.75 + 9.81 * 0.02 / SPEED)
     for mass, differs in ((2.5, True), (fits, False)):
         found = thud.Recording.from_array(force, 24e3, height=1.0, mass=mass)
-        one = found.quantities["restitution"]
+        one = found.estimates["restitution"]
         named = {part.name: part.uncertainty for part in one.contributions}
         ways = [way.value for way in found.drops[0].restitutions.values()]
         assert ("impulse against bounces" in named) == differs
@@ -244,10 +245,10 @@ def test_uncertainties_of_mass_and_height_follow_the_formulas() -> None:
     found = thud.Recording.from_array(
         force, 24e3, height=1.0, mass=2.5, mass_uncertainty=0.01, height_uncertainty=0.002
     )
-    budget = {part.name: part.uncertainty for part in found.quantities["restitution"].contributions}
+    budget = {part.name: part.uncertainty for part in found.estimates["restitution"].contributions}
     assert {"mass", "drop height"} < set(budget)
-    assert found.quantities["mass"].uncertainty == 0.01
-    assert found.quantities["drop_height"].uncertainty == 0.002
+    assert found.estimates["mass"].uncertainty == 0.01
+    assert found.estimates["drop_height"].uncertainty == 0.002
 
 
 def propagated(function: Callable[..., float], *estimates: Estimate) -> Estimate:
@@ -413,7 +414,7 @@ def test_edges_of_all_drops_share_the_smallest_uncertainty() -> None:
     times = [Estimate(0.02, 5e-5), Estimate(0.0201, 3e-5)]
     found = [replace(make_drop(), contact_time=time) for time in times]
     for ones, expected in ((found, 3e-5), (found[:1], None)):
-        quantity = drop_quantities(ones, Config(), None)["contact_time"]
+        quantity = drop_estimates(ones, Config(), None)["contact_time"]
         named = {part.name: part.uncertainty for part in quantity.contributions}
         assert named.get("edges of the pulse") == expected
 
@@ -429,7 +430,7 @@ def test_peaks_are_not_counted_in_noise() -> None:
     ):  # fmt: skip
         white = (factor * 0.1 * 1500 / 6) ** 2 / band
         noisy = replace(drop, force=force, noise=replace(drop.noise, white=white))
-        counted = drop_quantities([noisy], Config(), None)["peaks"].value
+        counted = drop_estimates([noisy], Config(), None)["peaks"].value
         assert counted == pytest.approx(expected, nan_ok=True)
 
 
@@ -458,7 +459,7 @@ def test_mass_that_is_not_stated_is_measured() -> None:
         HALF_SINE, FINE, rate=24e3, noise_db=60, drops=tuple(falling(1, 0.75))
     )
     found = thud.Recording.from_array(force, 24e3, height=1.0, calibration_uncertainty=0.01)
-    mass = found.quantities["mass"]
+    mass = found.estimates["mass"]
     expected = 1500 * 0.02 * 2 / np.pi / (SPEED * 1.75 + 9.81 * 0.02)
     assert mass.value == pytest.approx(expected, rel=1e-3)
     assert mass.uncertainty == pytest.approx(0.01 * mass.value, rel=1e-3)

@@ -59,7 +59,7 @@ def measure(options: argparse.Namespace) -> int:
             workers=len(os.sched_getaffinity(0)) if options.workers is None else options.workers,
             keep=kept,
         )
-        verdict = recording.conformity()
+        verdict = recording.assess()
         recording_files.save(recording, files, figures=figures)
     if not options.quiet:
         rows = recording_files.drop_table(recording)

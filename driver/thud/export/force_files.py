@@ -120,7 +120,7 @@ class BlockedForce(Immutable):
 def blocked_force(
     source: Impact | Recording, *, drop: int = 1, rate: float | None = None
 ) -> BlockedForce:
-    """Return the force of an impact that its case judges, or that of a drop of a recording.
+    """Return the force of an impact that its case assesses, or that of a drop of a recording.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _of_impact(impact: Impact) -> BlockedForce:
         force=impact.force(),
         sample_rate=impact.sample_rate,
         start=float(impact.time[0] - impact.touch_time),
-        kind=impact.judged(),
+        kind=impact.assessed_force(),
         origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
         checksum=hashlib.sha256(case_text(case)).hexdigest(),
     )
@@ -172,7 +172,7 @@ def _of_recording(recording: Recording, drop: int) -> BlockedForce:
         force=force,
         sample_rate=one.sample_rate,
         start=float(time[0]),
-        kind=recording.judged(),
+        kind=recording.assessed_force(),
         origin=f"recording {one.name}, {origin.calibration or 'calibration not known'}",
         checksum=origin.checksum,
         date=origin.date,

@@ -243,7 +243,7 @@ def predict_level(
         )
         change = 20 * math.log10(moved.peak("floor") / blocked)
     else:
-        mass = case.ball.mass if isinstance(source, Impact) else source.quantities["mass"].value
+        mass = case.ball.mass if isinstance(source, Impact) else source.estimates["mass"].value
         change = _force_change(mass, source.contact_time, 1 / bands["conductance"].max())
     return RoomPrediction(
         floor=floor,

@@ -56,7 +56,7 @@ def impact_dataset(impact: Impact, histories: Mapping[str, NDArray[np.float64]])
         )
     for name, entry in schema.SCALARS.items():
         variables[name] = ((), getattr(impact, name), attributes(*entry))
-    conforms = impact.conformity().conforms
+    conforms = impact.assess().conforms
     variables["conforms"] = ((), conforms, attributes(*SET_QUANTITIES["conforms"]))
     coordinates = {"time": _time(impact.time), **band_coordinates(BANDWIDTHS)}
     remarks = {"remarks": "\n".join(impact.remarks)}
@@ -132,7 +132,7 @@ def origin(case: Case) -> dict[str, str]:
     """Return the case of results and what has computed them."""
     return {
         "model": case.model.name if case.model else "",
-        "judged_force": case.levels.force,
+        "assessed_force": case.levels.force,
         "limits": case.limits.source,
         "case": f"{case.to_namelist()}",
         "thud_version": version(),

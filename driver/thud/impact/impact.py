@@ -13,7 +13,8 @@ from thud.base.display import Displayed
 from thud.base.extras import require_extra
 from thud.impact.contact_time import contact_span
 from thud.impact.motion import Motion, new_motion
-from thud.level.levels import FORCES, force_exposure_levels, judge, peak_count
+from thud.level.assessment import assess
+from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from thud.base.bridge import Bundle
     from thud.case.case import Case
     from thud.impact.floor_impact import FloorImpact
-    from thud.level.criteria import Conformity
+    from thud.level.assessment import Verdict
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +132,7 @@ class Impact(Displayed):
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
         remarks = [("remark", remark, "", "") for remark in self.remarks]
-        return [*self.conformity().rows(), *remarks]
+        return [*self.assess().rows(), *remarks]
 
     @property
     def shell_force(self) -> NDArray[np.float64]:
@@ -157,16 +158,18 @@ class Impact(Displayed):
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
         """Return the ``"floor"`` or the ``"elastic"`` force, N, shape (n_sample,).
 
-        By default that which the case judges.
+        By default that which the case assesses.
         """
-        return self.elastic_force if self.judged(kind) == "elastic" else self.floor_force
+        return self.elastic_force if self.assessed_force(kind) == "elastic" else self.floor_force
 
     def peak(self, force: LevelsForce | None = None) -> float:
         """Return the maximum of a force, N; see `force` and `peak_force`."""
-        return self.peak_elastic_force if self.judged(force) == "elastic" else self.peak_force
+        return (
+            self.peak_elastic_force if self.assessed_force(force) == "elastic" else self.peak_force
+        )
 
-    def judged(self, force: LevelsForce | None = None) -> LevelsForce:
-        """Return a force, checked, or without it that which the case judges."""
+    def assessed_force(self, force: LevelsForce | None = None) -> LevelsForce:
+        """Return a force, checked, or without it that which the case assesses."""
         chosen = self.case.levels.force if force is None else force
         require_choice("force", chosen, FORCES)
         return chosen
@@ -200,9 +203,9 @@ class Impact(Displayed):
             method or self.level_method,
         )
 
-    def conformity(
+    def assess(
         self, source: LimitsSource | None = None, force: LevelsForce | None = None
-    ) -> Conformity:
+    ) -> Verdict:
         """Return the verdict of the standards.
 
         Parameters
@@ -212,7 +215,7 @@ class Impact(Displayed):
         force
             ``"floor"`` or ``"elastic"``; by default that of the case.
         """
-        return judge(
+        return assess(
             self.levels(force=force),
             self.contact_time,
             self.restitution,
@@ -223,7 +226,7 @@ class Impact(Displayed):
         )
 
     def plot(self) -> Figure:
-        """Return a figure of the force that the case judges, and of its octave levels."""
+        """Return a figure of the force that the case assesses, and of its octave levels."""
         from thud.plot.overview_figure import overview
 
         return overview(self)

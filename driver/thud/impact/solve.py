@@ -46,7 +46,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Integration steps per sampling interval.
     floor
         Floor on which the ball is dropped too, an object of `Rigid`, `InfinitePlate`, `Oscillator`,
-        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards judge the force
+        `Plate`, `FloatingFloor`, `JoistFloor` or `MeasuredMobility`; the standards assess the force
         on a rigid one.
     **options
         Options of the model, see `HollowSphere`, `ModalBall`, `FiniteElement`, `MeasuredModes`,

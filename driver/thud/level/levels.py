@@ -1,4 +1,4 @@
-"""Force exposure levels of any force record, and the verdict of the standards."""
+"""Force exposure levels and peaks of any force record."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ import numpy as np
 
 from thud.base._schema import LevelsForce, LevelsMethod
 from thud.base.bridge import call_direct, level_api, trimmed
-from thud.base.checks import refuse_value, require_array, require_choice, require_real
+from thud.base.checks import require_array, require_choice, require_real
 from thud.base.display import Displayed
 from thud.base.errors import InputError
-from thud.level.criteria import Conformity, Criterion
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -28,12 +27,11 @@ def _names(values: Iterable[bytes]) -> tuple[str, ...]:
     return tuple(map(trimmed, values))
 
 
-_N_SET, _N_SOURCE, _N_CRITERION = level_api.count_names()
+_N_SET, _N_SOURCE, _ = level_api.count_names()
 _sets, _sources = map(_names, level_api.get_names(_N_SET, _N_SOURCE))
 BANDWIDTHS = cast("tuple[BandSet, ...]", _sets)
 SOURCES = cast("tuple[LimitsSource, ...]", _sources)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
-_MAX_PEAKS = 2**31
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
 
@@ -131,7 +129,7 @@ def force_exposure_levels(
     count = len(get_bands(bands).nominal)
     require_choice("method", method, get_args(LevelsMethod))
     record = _record(force)
-    rate = _number("sample_rate", sample_rate)
+    rate = to_float("sample_rate", sample_rate)
     (levels,) = call_direct(level_api.force_exposure, record, rate, bands, method, count)
     result: NDArray[np.float64] = levels
     return result
@@ -158,80 +156,11 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
         what = "holds a value that is not finite" if record.size else "has no samples"
         message = f"force {what}; allowed: real numbers, N"
         raise InputError(message)
-    rate = _number("sample_rate", sample_rate)
+    rate = to_float("sample_rate", sample_rate)
     if not 0 < rate < np.inf:
         message = f"sample_rate = {rate} is not allowed; allowed: sample_rate > 0"
         raise InputError(message)
     return int(level_api.count_peaks(record, rate))
-
-
-def judge(  # noqa: PLR0913, PLR0917 - each is one criterion of the standards
-    levels: ArrayLike,
-    contact_time: float,
-    restitution: float,
-    peaks: int,
-    mass: float,
-    drop_height: float,
-    source: LimitsSource = "rubber_ball",
-) -> Conformity:
-    """Return the verdict of the standards on a source.
-
-    Parameters
-    ----------
-    levels : array_like, shape (5,)
-        Force exposure levels of the octaves 31.5 to 500 Hz, dB.
-    contact_time
-        Contact time, s.
-    restitution
-        Coefficient of restitution.
-    peaks
-        Number of peaks of the force.
-    mass
-        Mass of the source, kg.
-    drop_height
-        Drop height, m.
-    source
-        ``"rubber_ball"`` or ``"tyre"``.
-
-    Raises
-    ------
-    InputError
-        Where the source is not known or `levels` are not five numbers.
-    """
-    require_choice("source", source, SOURCES)
-    octaves = _record(levels, "levels")
-    nominal = get_bands(BANDWIDTHS[0]).nominal
-    if octaves.shape != nominal.shape:
-        message = (
-            f"levels have the shape {octaves.shape}; allowed: {nominal.shape}, "
-            f"the octaves {nominal[0]:g} to {nominal[-1]:g}"
-        )
-        raise InputError(message)
-    if not isinstance(peaks, int | np.integer) or not 0 <= peaks < _MAX_PEAKS:
-        refuse_value("peaks", peaks, f"0 <= peaks < {_MAX_PEAKS}, whole")
-    numbers = {
-        "contact_time": contact_time,
-        "restitution": restitution,
-        "mass": mass,
-        "drop_height": drop_height,
-    }
-    time, bounce, kilograms, height = (_number(name, value) for name, value in numbers.items())
-    names, units, value, lower, upper, met = call_direct(
-        level_api.judge, source, octaves, time, bounce, int(peaks), kilograms, height,
-        _N_CRITERION,
-    )  # fmt: skip
-    rows = zip(_names(names), _names(units), value, lower, upper, met, strict=True)
-    return Conformity(
-        source,
-        tuple(Criterion(n, u, float(v), float(a), float(b), bool(m)) for n, u, v, a, b, m in rows),
-    )
-
-
-def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
-    count = len(get_bands(BANDWIDTHS[0]).nominal)
-    octaves = judge(np.zeros(count), 0, 0, 0, 0, 0, source).criteria[:count]
-    return np.array([o.lower for o in octaves]), np.array([o.upper for o in octaves])
 
 
 def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
@@ -239,7 +168,7 @@ def _record(values: ArrayLike, name: str = "force") -> NDArray[np.float64]:
     return require_real(name, require_array(name, values, dimensions=(1,)))
 
 
-def _number(name: str, value: object) -> float:
+def to_float(name: str, value: object) -> float:
     """Return a number as float; raise InputError where it is not one."""
     try:
         return float(value)  # type: ignore[arg-type]

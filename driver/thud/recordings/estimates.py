@@ -13,8 +13,9 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.immutable import Immutable
+from thud.level.estimate import Estimate
 from thud.level.levels import RECORDED_BAND, record_force
-from thud.recordings.contact import Contact, Estimate, find_contact, find_edges
+from thud.recordings.contact import Contact, find_contact, find_edges
 from thud.recordings.faults import least_quiet, repair
 from thud.recordings.noise import Noise
 from thud.recordings.recorded_levels import measure_levels
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
     from thud.recordings.drops import Window
-
-__all__ = ["Drop", "Estimate", "measure_drop"]
 
 # Draws of noise that show what it adds to the maximum.
 PEAK_DRAWS = 32

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base._schema import Drop
-from thud.recordings.contact import Estimate
+from thud.level.estimate import Estimate
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -9,9 +9,9 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from thud.base.display import left_out
+from thud.level.assessment import RESULTS
 from thud.plot.style import own_style
 from thud.recordings.recorded_levels import BACKGROUND, MARGIN
-from thud.recordings.verdict import VERDICTS
 from thud.report.fonts import FAMILY, clip, count_lines, font_faces, text_width
 from thud.report.notes import fit_lines, group_places
 from thud.report.rows import HEAD, NOT_KNOWN, criterion_row, limits_of, number, style_of
@@ -101,7 +101,7 @@ def _text(text: str) -> str:
 def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     """Return which criteria are not met."""
     parts = []
-    for verdict in VERDICTS[1:]:
+    for verdict in RESULTS[1:]:
         names = [style_of(one).title.split(",")[0] for one in criteria if one["verdict"] == verdict]
         if names:
             parts.append(f"{verdict}: {', '.join(names).lower().replace(' hz', ' Hz')}")
